@@ -96,6 +96,8 @@ class KernelCache:
             return self._implementation().rebuild(target_context, code) if stored == key else None
         except FileNotFoundError:
             return None
+        except (ImportError, AttributeError):
+            return None  # the entry names modules or kernels that have been renamed; a new entry replaces it
         except Exception as error:
             _warn(error)
             return None

@@ -35,7 +35,7 @@ class CameraArrays:
 
     @classmethod
     def of(cls, cameras: Sequence[Camera], last: CameraArrays | None = None) -> CameraArrays:
-        """Return the parameters of cameras; ``last`` itself if it is of the same objects, as those of a still rig."""
+        """Return the parameters of cameras, or ``last`` if it holds these same objects: a rig that stands still."""
         if last is not None and len(cameras) == len(last.cameras) and all(map(operator.is_, cameras, last.cameras)):
             return last
         views = len(cameras)

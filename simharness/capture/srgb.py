@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Weights of linear red, green and blue in luminance (Rec. 709)."""
+
 
 def to_linear(values: NDArray) -> NDArray[np.floating]:
     """Convert sRGB values 0 to 255 to linear light 0 to 1."""

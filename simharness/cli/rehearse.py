@@ -12,6 +12,7 @@ from rich.console import Console
 
 from simharness.cli.exit_codes import exit_on_error, write_json
 from simharness.cli.options import command_line
+from simharness.cli.result_files import make_folder, write_page
 
 if TYPE_CHECKING:
     from simharness.planning.visibility import Obstacle
@@ -139,7 +140,7 @@ def rehearse(
         count = people or (None if around is None else around.people) or _PEOPLE
         name = calibration.stem or calibration.resolve().name
         place = out or Path("results/rehearsal") / name
-        _prepare(place)
+        make_folder(place)
         with reporter() as bars:
             rehearsal = rehearse_rig(
                 rig,
@@ -162,30 +163,9 @@ def rehearse(
             variants=("full",),
             seconds=perf_counter() - start,
         )
-        _write(render_rehearsal(rehearsal, provenance=made), place / "rehearsal.html")
+        write_page(render_rehearsal(rehearsal, provenance=made), place / "rehearsal.html")
         write_json({**made, **rehearsal.to_json()}, place / "rehearsal.json")
     console = Console()
     for sentence in rehearsal.sentences:
         console.print(sentence, highlight=False, markup=False)
     console.print(f"report: {place / 'rehearsal.html'}", soft_wrap=True, highlight=False, markup=False)
-
-
-def _prepare(folder: Path) -> None:
-    """Create the folder of the results before minutes of work.
-
-    Raises:
-        ValueError: it cannot be created.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ValueError(f"--out {folder}: cannot be created: {error.strerror}") from None
-
-
-def _write(page: str, path: Path) -> None:
-    from mvpose.files.atomic_files import write_atomic
-
-    try:
-        write_atomic(path, page.encode())
-    except OSError as error:
-        raise ValueError(f"--out {path.parent}: {path.name} cannot be written: {error.strerror}") from None

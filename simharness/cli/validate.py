@@ -13,6 +13,7 @@ from rich.console import Console
 
 from simharness.cli.exit_codes import REGRESSION, exit_on_error, run_errors_only, write_json
 from simharness.cli.options import JsonFile, RecordingFile, RecordingFolder, command_line
+from simharness.cli.result_files import make_folder, write_page
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -70,7 +71,7 @@ def validate(
         recorded = read_recording(recording, folder)
         other = None if fit_on is None else read_recording(fit_on)
         place = out or Path("results/validation") / recorded.name
-        _prepare(place)
+        make_folder(place)
         from simharness.reality.validation.prediction import predict_halves, simulate_predictions
         from simharness.reality.validation.summary import summarize_halves, summarize_validation
         from simharness.reality.validation.validation import QUICK, Plan
@@ -99,7 +100,7 @@ def validate(
             "split_half": summarize_halves(halves),
         }
         page = render_validation(validation, provenance=made, fitted_on="" if other is None else other.name)
-        _write(page, place / "validation.html")
+        write_page(page, place / "validation.html")
         for path in filter(None, (place / "validation.json", json_file)):
             write_json(summary, path)
     console = Console()
@@ -107,27 +108,6 @@ def validate(
     console.print(f"report: {place / 'validation.html'}", soft_wrap=True, highlight=False, markup=False)
     if validation.failed:
         raise typer.Exit(REGRESSION)
-
-
-def _prepare(folder: Path) -> None:
-    """Create the folder of the results before hours of work.
-
-    Raises:
-        ValueError: it cannot be created.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ValueError(f"--out {folder}: cannot be created: {error.strerror}") from None
-
-
-def _write(page: str, path: Path) -> None:
-    from mvpose.files.atomic_files import write_atomic
-
-    try:
-        write_atomic(path, page.encode())
-    except OSError as error:
-        raise ValueError(f"--out {path.parent}: {path.name} cannot be written: {error.strerror}") from None
 
 
 def _print_verdicts(verdicts: Sequence[Verdict], name: str, console: Console) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -16,6 +17,7 @@ from simharness.planning.room import Room
 _AIM_HEIGHT = 0.95  # metres: the height of the hips, about which people are centred
 _AIM_SPACING = 1.5  # metres between the points of the volume at which candidates look
 _SAME_DIRECTION = 15.0  # degrees: candidates of one place and lens look at least so far apart
+_SAME_PLACE, _SAME_TURN = 1.0, 30.0  # metres and degrees within which two cameras are alike
 _STEEPEST = np.radians(80.0)  # of a direction below or above the horizon: upright cameras have a bearing
 
 
@@ -157,3 +159,15 @@ def far_enough(room: Room, candidates: Sequence[Candidate], fixed: Sequence[Came
     centers = np.array([each.place for each in candidates] + [camera.center for camera in fixed]).reshape(-1, 3)
     gaps = np.linalg.norm(centers[:, None] - centers[None], axis=-1)
     return bool((gaps[np.triu_indices(len(centers), 1)] >= room.keys.cameras.spacing - 1e-9).all())
+
+
+def around(room: Room, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Return candidates in the order of their bearings from the middle of the volume, counter-clockwise."""
+    x, y = room.volume.mean(axis=0).tolist()
+    return tuple(sorted(candidates, key=lambda each: math.atan2(each.place[1] - y, each.place[0] - x) % (2 * math.pi)))
+
+
+def alike(one: Candidate, other: Candidate) -> bool:
+    """Return whether two cameras hang at about the same place and look the same way."""
+    away = float(np.linalg.norm(np.subtract(one.place, other.place)))
+    return away <= _SAME_PLACE and float(one.direction @ other.direction) >= np.cos(np.radians(_SAME_TURN))

@@ -12,7 +12,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -24,11 +23,12 @@ import numpy as np
 
 from mvpose import Rig
 from mvpose.arrays import Floats
-from simharness.planning.candidates import Candidate, candidates_in
+from simharness.planning.candidates import Candidate, alike, around, candidates_in
+from simharness.planning.figures import Figures
 from simharness.planning.layer import FastLayer
 from simharness.planning.ledger import Ledger
 from simharness.planning.limits import Limits
-from simharness.planning.plan_result import Alternative, CurvePoint, Figures, Plan, PlannedCamera
+from simharness.planning.plan_result import Alternative, CurvePoint, Plan, PlannedCamera
 from simharness.planning.prediction import Prediction
 from simharness.planning.rig_comparison import rig_of, simulate_rigs
 from simharness.planning.rig_value import RigValue
@@ -49,7 +49,6 @@ _REFINED = 2  # sets that are refined, judged and simulated
 _SCENES = 8  # simulated scenes
 _JUDGED_PLACES, _JUDGED_REPEATS = 60, 8
 _NEAR_BEST = 1.0  # points of the objective within which a set is as good as the best
-_SAME_PLACE, _SAME_TURN = 1.0, 30.0  # metres and degrees within which two cameras are alike
 _PREVIEW_SHARE = 1e-3  # of seen joints: less is nothing
 
 
@@ -241,7 +240,7 @@ class _Work:
 
                 cameras, value = self.ledger.result(key, work)
                 chosen = tuple(Candidate(c[0], c[1], (c[2][0], c[2][1], c[2][2]), c[3], c[4]) for c in cameras)
-                results.append(Found(_around(self.room, chosen), value))
+                results.append(Found(around(self.room, chosen), value))
                 advance(1)
         return results
 
@@ -264,7 +263,7 @@ class _Work:
             else:
                 sets = []
             figures, cost = self.ledger.result(name, partial(self._curve_point, sets[0] if sets else best))
-            points.append(CurvePoint(free + fixed, _figures(figures), cost))
+            points.append(CurvePoint(free + fixed, Figures.of_row(figures), cost))
         return tuple(points)
 
     def _curve_point(self, found: Found) -> tuple[Any, float]:
@@ -279,19 +278,7 @@ class _Work:
     def _figures_of(self, rig: Rig) -> tuple[Any, ...]:
         """Return the figures of a rig by the fast layer, as values for the ledger."""
         prediction = self.layer.predict([self.layer.terms(camera) for camera in rig], variant=VARIANT)
-        return dataclasses.astuple(self._figures(prediction))
-
-    def _figures(self, prediction: Prediction) -> Figures:
-        figures, target = prediction.summary(), self.room.keys.target
-        within = (prediction.pcp >= target.pcp) & (prediction.error_mm <= target.error)
-        known = np.isfinite(prediction.pcp)
-        pcp, error = figures["pcp"], figures["mpjpe_mm"]
-        return Figures(
-            (float(pcp.value), float(pcp.low), float(pcp.high)),
-            (float(error.value), float(error.low), float(error.high)),
-            100.0 * float(within[known].mean()),
-            float(prediction.pcp[known].min()),
-        )
+        return Figures.of(prediction, self.room.keys.target).to_row()
 
     def _judged(self, refined: Sequence[Found]) -> list[tuple[Found, Figures]]:
         """Return the refined sets with their figures by the fast layer, best first."""
@@ -301,7 +288,7 @@ class _Work:
                 f"judged {self.count} {self.starts} {k}",
                 partial(self._figures_of, self._rig(each.candidates)),
             )
-            results.append((each, _figures(figures)))
+            results.append((each, Figures.of_row(figures)))
         return sorted(results, key=lambda pair: -self._objective(pair[1]))
 
     def _objective(self, figures: Figures) -> float:
@@ -319,7 +306,7 @@ class _Work:
             except ValueError:
                 continue
             figures = self.ledger.result(f"{title} {free}", partial(self._figures_of, rig))
-            results.append((title, rig, _figures(figures)))
+            results.append((title, rig, Figures.of_row(figures)))
         return results
 
     def _confirmed(
@@ -377,7 +364,7 @@ class _Work:
             PlannedCamera(name, None, "fixed", "", float("nan"), worth[k]) for k, name in enumerate(names[:fixed])
         ]
         for k, each in enumerate(best.candidates):
-            sure = float(np.mean([any(_alike(each, other) for other in found.candidates) for found in near]))
+            sure = float(np.mean([any(alike(each, other) for other in found.candidates) for found in near]))
             mount = self.room.mounts[each.mount].name
             lens = self.room.lenses[each.lens]
             title = f"{lens.name}, turned" if lens.turned else lens.name
@@ -395,28 +382,11 @@ class _Unused:
         raise AssertionError(f"{name}: every step is in the ledger")
 
 
-def _around(room: Room, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Return candidates in the order of their bearings from the middle of the volume, counter-clockwise."""
-    x, y = room.volume.mean(axis=0).tolist()
-    return tuple(sorted(candidates, key=lambda each: math.atan2(each.place[1] - y, each.place[0] - x) % (2 * math.pi)))
-
-
-def _alike(one: Candidate, other: Candidate) -> bool:
-    """Return whether two cameras hang at about the same place and look the same way."""
-    away = float(np.linalg.norm(np.subtract(one.place, other.place)))
-    return away <= _SAME_PLACE and float(one.direction @ other.direction) >= np.cos(np.radians(_SAME_TURN))
-
-
 def _identity(room: Room, seed: int, most: int) -> str:
     """Return a text that changes with everything on which finished steps depend."""
     lenses = [(lens.name, lens.turned) for lens in room.lenses]
     values = [room.keys.model_dump(mode="json"), room.detector.model_dump(mode="json"), lenses, seed, most]
     return hashlib.blake2b(json.dumps([*values, code_version()], sort_keys=True).encode(), digest_size=16).hexdigest()
-
-
-def _figures(values: Sequence[Any]) -> Figures:
-    pcp, error, share, worst = values
-    return Figures((pcp[0], pcp[1], pcp[2]), (error[0], error[1], error[2]), share, worst)
 
 
 def _triple(interval: Any) -> tuple[float, float, float]:

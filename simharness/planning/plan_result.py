@@ -9,34 +9,9 @@ from typing import Any
 
 from mvpose import Rig
 from simharness.planning.candidates import Candidate
+from simharness.planning.figures import Figures, number
 from simharness.planning.prediction import Prediction
 from simharness.planning.room import Room
-
-
-@dataclass(frozen=True)
-class Figures:
-    """Figures of a rig in the volume.
-
-    Attributes:
-        pcp: percentage of correct parts, with its interval (90 % by the fast layer, 95 % by simulation).
-        error_mm: mean error of joints, millimetres, with its interval.
-        share: share of the places of the volume within the target, percent; NaN where it was not computed.
-        worst: least PCP of a place, percent; NaN where it was not computed.
-    """
-
-    pcp: tuple[float, float, float]
-    error_mm: tuple[float, float, float]
-    share: float = math.nan
-    worst: float = math.nan
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the figures as JSON values; null where unknown."""
-        return {
-            "pcp": _interval(self.pcp),
-            "mpjpe_mm": _interval(self.error_mm),
-            "share_within_target": _number(self.share),
-            "worst_pcp": _number(self.worst),
-        }
 
 
 @dataclass(frozen=True)
@@ -162,8 +137,8 @@ class Plan:
             "direction": built.R[2].round(4).tolist(),
             "mount": camera.mount,
             "lens": camera.lens,
-            "sure": _number(camera.sure),
-            "worth": _number(camera.worth),
+            "sure": number(camera.sure),
+            "worth": number(camera.worth),
         }
 
 
@@ -221,13 +196,5 @@ def _extent(room: Room) -> str:
     return f"{x:.1f} by {y:.1f} m"
 
 
-def _interval(values: tuple[float, float, float]) -> dict[str, float | None]:
-    return {"value": _number(values[0]), "low": _number(values[1]), "high": _number(values[2])}
-
-
-def _number(value: float) -> float | None:
-    return round(float(value), 4) if math.isfinite(value) else None
-
-
 def _numbers(values: Sequence[float]) -> list[float | None]:
-    return [_number(value) for value in values]
+    return [number(value) for value in values]

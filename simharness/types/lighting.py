@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simharness.types.light_sources import LightSources
 from simharness.types.mirror import Mirror
+from simharness.types.panorama import Panorama
 
 Vector = tuple[float, float, float]
 
@@ -33,6 +34,8 @@ class Lighting:
         fill: strength of the light at the camera, which keeps surfaces in shadow from looking flat.
         tint: colour of all light, linear, 0 to 1.
         background: sRGB of pixels that show no surface, 0 to 1; light does not change it.
+        panorama: what these pixels show instead, as bright as light of 1 makes it without ``sources``; None for
+            ``background``.
         sources: lamps, windows, sun and sky; None for the lighting in closed form.
         mirror: mirror in which the meshes of the picture are reflected; ``sources`` are those before it.
 
@@ -49,10 +52,11 @@ class Lighting:
     background: Vector = (0.82, 0.85, 0.88)
     sources: LightSources | None = None
     mirror: Mirror | None = None
+    panorama: Panorama | None = None
 
     def __post_init__(self) -> None:
         for entry in fields(self):
-            if entry.name in ("sources", "mirror"):
+            if entry.name in ("sources", "mirror", "panorama"):
                 continue
             value = np.asarray(getattr(self, entry.name), float)
             shape = () if entry.name in ("key", "sky", "fill") else (3,)

@@ -211,6 +211,16 @@ def test_only_callers_of_edited_code_are_compiled(toy):
     assert not compiled(module.middle.middle)
 
 
+def test_a_renamed_module_is_compiled_again_without_a_warning(toy):
+    toy.start().outer(5.0)
+    (toy.folder / "inner.py").rename(toy.folder / "innermost.py")
+    toy.edit("middle.py", "toy.inner", "toy.innermost")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert toy.start().outer(5.0) == VALUE
+        assert not compiled_again(toy)
+
+
 @pytest.mark.parametrize("damage", ["empty", "cut", "flipped", "of another kernel"])
 def test_a_damaged_entry_is_compiled_again(toy, damage):
     toy.start().outer(5.0)

@@ -76,7 +76,7 @@ def furnish(rng: np.random.Generator, room: Room, seed: int, cameras: Sequence[C
     openings = draw_openings(room, seed)
     areas = lights_of(room, seed, openings) if room.walls and not is_bare else ()
     furniture = place_furniture(seed, _free_space(room, cameras), openings)
-    above = (make_ceiling(room), *shown_lights_of(room, seed, openings, areas)) if areas else ()
+    above = (make_ceiling(room), *shown_lights_of(room, seed, areas)) if areas else ()
     shell = [_coarser(solid.mesh) for solid in make_room(room, seed, openings)]
     if is_tinted:
         shell = [replace(mesh, colors=mesh.colors * paint[min(m, 1)]) for m, mesh in enumerate(shell)]

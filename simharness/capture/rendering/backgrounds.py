@@ -12,11 +12,11 @@ from simharness.capture.rendering.room_light import RoomLight
 from simharness.capture.rendering.shadow_maps import LightView
 from simharness.types.lighting import Lighting
 
-MOST_BYTES = 256 * 2**20
+MOST_BYTES = 384 * 2**20
 """Bytes of the backgrounds that are kept; the one that was not used for the longest time is dropped first."""
 
 
-_BYTES_PER_PIXEL = 4 + 4 + 3 + 2 + 4
+_BYTES_PER_PIXEL = 4 + 4 + 4 + 2 + 3 + 2 + 4
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,10 @@ class LitBackground:
         light: what the shadow maps cover, or the light of the sources.
         rgb: picture without the shadows of anything that moves, (h, w, 3) uint8.
         shadow_place: place of each pixel in the shadow maps, (h, w) uint16: see
-            :func:`~simharness.capture.rendering.shadow_kernels.shadow_places`; with sources, of the blocks of
-            :class:`~simharness.capture.rendering.lit_scene.Grid`.
+            :func:`~simharness.capture.rendering.shadow_kernels.shadow_places`; empty with sources.
         shadow_depth: inverse depth of each pixel from the light, (h, w) float32; empty with sources.
+        runs: runs of pixels over the blocks of :class:`~simharness.capture.rendering.lit_scene.Grid`, (n, 5): see
+            :func:`~simharness.capture.rendering.dimming_kernels.runs_below`; empty without sources.
     """
 
     lighting: Lighting
@@ -38,6 +39,7 @@ class LitBackground:
     rgb: NDArray[np.uint8]
     shadow_place: NDArray[np.uint16]
     shadow_depth: NDArray[np.float32]
+    runs: NDArray[np.int32]
 
 
 @dataclass
@@ -48,12 +50,19 @@ class Background:
         inverse_depth: inverse depth, 1/m, (h, w) float32; 0 without a surface.
         triangle: visible face, (h, w) int32; -1 without a surface.
         corners: homogeneous pixel coordinates of the vertices, (n, 3).
+        depth: depth, metres, (h, w) float32; +inf without a surface.
+        labels: what the faces are labelled with, (k + 1,): see
+            :attr:`~simharness.capture.rendering.scene_topology.SceneTopology.mesh`.
+        ids: label of each pixel, (h, w).
         lit: the same in the light that was asked for last.
     """
 
     inverse_depth: NDArray[np.float32]
     triangle: NDArray[np.int32]
     corners: NDArray[np.float64]
+    depth: NDArray[np.float32]
+    labels: NDArray[np.int16]
+    ids: NDArray[np.int16]
     lit: LitBackground | None = None
 
     @property

@@ -1,7 +1,7 @@
 """Compiled shading of skin, hair, cloth and leather: private, on plain arrays, single-threaded.
 
-A picture shows the light that a surface receives times its albedo. These kernels add what that leaves out, for the
-pixels of a row: they multiply the received light, and write the share of it that the surface reflects like a mirror.
+A picture shows the light that a surface receives times its albedo. These kernels add what that leaves out, for some
+pixels together: they multiply the received light, and write the share of it that the surface reflects like a mirror.
 
 - All but matte surfaces have a GGX lobe (Walter et al., "Microfacet models for refraction through rough surfaces",
   2007; in the cheap form of Zioma, "Optimizing PBR for mobile", SIGGRAPH 2015), and reflect their surroundings (Karis,
@@ -24,7 +24,9 @@ import math
 import numpy as np
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.occlusion_kernels import light_at
+from simharness.capture.rendering.moving_light_kernels import light_at
+from simharness.capture.rendering.surface_kernels import NORMAL_X, NORMAL_Y, NORMAL_Z, PIXELS, SECOND, THIRD
+from simharness.capture.srgb import LUMINANCE
 from simharness.types.finish import Material
 
 _HEIGHT = 0.75  # share of a figure's height at which its light is taken
@@ -78,6 +80,11 @@ def _strand_tables() -> tuple[np.ndarray, np.ndarray]:
     return np.clip(wide, -1, 1).astype(np.float32), np.clip(fine, -1, 1).astype(np.float32)
 
 
+FINISHING = 9 * PIXELS
+"""Numbers of memory of :func:`finish`, float32."""
+
+_GRAIN_X, _GRAIN_Y, _GRAIN_Z, _TILT, _TONE, _VIEW_X, _VIEW_Y, _VIEW_Z, _GLOSS = (PIXELS * row for row in range(9))
+_RED, _GREEN, _BLUE = LUMINANCE
 _TABLE, _SLOPES = _surface_table(), _fold_table()
 _LOCKS, _STRANDS = _strand_tables()
 
@@ -145,7 +152,7 @@ def figure_light(
         for axis in range(6):
             whole += direct[axis]
             way = (dx if axis < 2 else (dy if axis < 4 else dz)) * (1.0 - 2.0 * (axis % 2))
-            total = 0.2126 * column[3 * axis] + 0.7152 * column[3 * axis + 1] + 0.0722 * column[3 * axis + 2]
+            total = _RED * column[3 * axis] + _GREEN * column[3 * axis + 1] + _BLUE * column[3 * axis + 2]
             rest[axis] = max(total - length * max(way, 0.0), 0.05 * total)
             mean += rest[axis] / 6.0
         rise = min(max(0.5 * (rest[4] - rest[5]), -0.9 * mean), 0.9 * mean)
@@ -157,16 +164,14 @@ def figure_light(
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def finish(
-    triangle: np.ndarray,
-    y: int,
-    first: int,
-    last: int,
+    labels: np.ndarray,
+    columns: np.ndarray,
+    rows: np.ndarray,
     first_face: int,
     faces: np.ndarray,
     first_vertex: int,
     rays: np.ndarray,
-    normal: np.ndarray,
-    weights: np.ndarray,
+    narrow: np.ndarray,
     material: np.ndarray,
     figure: np.ndarray,
     lights: np.ndarray,
@@ -176,21 +181,18 @@ def finish(
     around: float,
     work: np.ndarray,
     received: np.ndarray,
-    gloss: np.ndarray,
-) -> None:
-    """Finish the pixels ``first`` to before ``last`` of a row: multiply the received light, and write the gloss.
+) -> np.ndarray:
+    """Finish some pixels: multiply the received light, and return the share of it that is reflected without colour.
 
     Args:
-        triangle: visible faces of the row, (w,) int32; none of the pixels shows a face before ``first_face``.
-        y: row of the picture.
-        first: first pixel.
-        last: end of the pixels.
+        labels: visible faces, (n,) int32, n at most ``PIXELS``; none is before ``first_face``.
+        columns: columns of the pixels, (n,) int32.
+        rows: rows of the pixels, (n,) int32.
         first_face: first face of the moving meshes.
         faces: vertex indices of all faces, (k, 3).
         first_vertex: first vertex of the moving meshes.
         rays: see :func:`.shading_kernels.shade`.
-        normal: unit normals of the pixels, (3, w).
-        weights: weights of the second and third corner, (2, w).
+        narrow: surfaces of the pixels, see :func:`.surface_kernels.gather`.
         material: material of the moving faces, (m,) int8.
         figure: mesh of the moving faces, (m,) int16.
         lights: light around the meshes, see :func:`figure_light`, (meshes, 7).
@@ -198,96 +200,112 @@ def finish(
         grain: see :func:`grain_of`; of the moving vertices, (v, 4).
         place: see :class:`simharness.types.finish.Finish`, (v,).
         around: period of the place of hair, metres.
-        work: memory, (5, w) float32.
-        received: light on the pixels, (3, w), changed.
-        gloss: share of it that is reflected without colour, (w,), written.
+        work: memory, (``FINISHING``,) float32.
+        received: light on the pixels in rows of ``PIXELS``: red, green, blue; changed.
+
+    Returns:
+        View of ``work``, (``PIXELS``,).
     """
-    second, third, per_turn = weights[0], weights[1], np.float32(around)
-    grain_x, grain_y, grain_z, tilt, tone = work[0], work[1], work[2], work[3], work[4]
-    end, stop = first, first
+    _look(columns, rows, rays, work)
+    per_turn, end, last = np.float32(around), 0, len(labels)
     while end < last:
-        start, f = end, np.uint32(triangle[end] - first_face)
+        start, f = end, np.uint32(labels[end] - first_face)
         kind, m = material[f], figure[f]
         fade = min(max(np.float32(1.6) - pixel[m] * np.float32(90.0), _ZERO), _UNIT)
         fine = min(max(np.float32(1.5) - pixel[m] * np.float32(300.0), _ZERO), _UNIT)
         ragged = False
-        # A stretch of pixels of one material and figure, triangle by triangle.
-        while end < last:
-            stop, label = end, triangle[end]
-            f = np.uint32(label - first_face)
+        while end < last:  # a stretch of pixels of one material and figure
+            f = np.uint32(labels[end] - first_face)
             if material[f] != kind or figure[f] != m:
                 break
-            while end < last and triangle[end] == label:
-                end += 1
+            n = end
+            end += 1
             if kind != _HAIR and kind != _CLOTH:
                 continue
-            t = np.uint32(label)
+            t = np.uint32(labels[n])
             a, b, c = faces[t, 0] - first_vertex, faces[t, 1] - first_vertex, faces[t, 2] - first_vertex
             ax, ay, az, depth, at = grain[a, 0], grain[a, 1], grain[a, 2], grain[a, 3], place[a]
             depth_b, depth_c = grain[b, 3] - depth, grain[c, 3] - depth
             if kind == _CLOTH and fade * max(depth, depth + depth_b, depth + depth_c) < _LEAST:
-                grain_x[stop:end], grain_y[stop:end], grain_z[stop:end], tilt[stop:end] = _ZERO, _ZERO, _UNIT, _ZERO
+                work[_GRAIN_X + n], work[_GRAIN_Y + n], work[_GRAIN_Z + n] = _ZERO, _ZERO, _UNIT
+                work[_TILT + n] = _ZERO
                 continue
             ragged = True
-            bx, by, bz, at_b = grain[b, 0] - ax, grain[b, 1] - ay, grain[b, 2] - az, place[b] - at
-            cx, cy, cz, at_c = grain[c, 0] - ax, grain[c, 1] - ay, grain[c, 2] - az, place[c] - at
+            at_b, at_c, second, third = place[b] - at, place[c] - at, narrow[SECOND + n], narrow[THIRD + n]
+            work[_GRAIN_X + n] = ax + second * (grain[b, 0] - ax) + third * (grain[c, 0] - ax)
+            work[_GRAIN_Y + n] = ay + second * (grain[b, 1] - ay) + third * (grain[c, 1] - ay)
+            work[_GRAIN_Z + n] = az + second * (grain[b, 2] - az) + third * (grain[c, 2] - az)
             if kind == _HAIR:
                 at_b -= per_turn * np.float32(np.rint(at_b / per_turn))
                 at_c -= per_turn * np.float32(np.rint(at_c / per_turn))
-            for x in range(stop, end):
-                vb, vc = second[x], third[x]
-                grain_x[x], grain_y[x] = ax + vb * bx + vc * cx, ay + vb * by + vc * cy
-                grain_z[x] = az + vb * bz + vc * cz
-                u = at + vb * at_b + vc * at_c
-                if kind == _HAIR:
-                    row = np.int32(np.floor(u * np.float32(_HAIR_STEPS / around))) & np.int32(_HAIR_STEPS - 1)
-                    tilt[x] = fade * _LOCKS[row] + fine * _STRANDS[row]
-                else:
-                    row = np.int32(np.floor(u * np.float32(_FOLD_STEPS / _FOLD_PERIOD))) & np.int32(_FOLD_STEPS - 1)
-                    tilt[x] = fade * max(depth + vb * depth_b + vc * depth_c, _ZERO) * _SLOPES[row]
+                u = at + second * at_b + third * at_c
+                at_u = np.int32(np.floor(u * np.float32(_HAIR_STEPS / around))) & np.int32(_HAIR_STEPS - 1)
+                work[_TILT + n] = fade * _LOCKS[at_u] + fine * _STRANDS[at_u]
+            else:
+                u = at + second * at_b + third * at_c
+                at_u = np.int32(np.floor(u * np.float32(_FOLD_STEPS / _FOLD_PERIOD))) & np.int32(_FOLD_STEPS - 1)
+                work[_TILT + n] = fade * max(depth + second * depth_b + third * depth_c, _ZERO) * _SLOPES[at_u]
         if kind == _MATTE or kind == _CLOTH:
-            gloss[start:end] = _ZERO
+            work[_GLOSS + start : _GLOSS + end] = _ZERO
         if kind == _MATTE or (kind == _CLOTH and not ragged):
             continue
-        span = slice(start, end)
-        normals, strands = normal[:, span], work[:3, span]
         if kind == _CLOTH:
-            _fold(normals, strands, tilt[span], lights[m], tone[span])
+            _fold(narrow, work, start, end, lights[m])
         elif kind == _HAIR:
-            _strands_through(normals, strands, tilt[span], lights[m], rays, start, y, tone[span])
-            _strands_over(normals, strands, tilt[span], lights[m], rays, start, y, gloss[span])
-            for x in range(start, end):
-                gloss[x] /= tone[x]
+            _strands_through(narrow, work, start, end, lights[m])
+            _strands_over(narrow, work, start, end, lights[m])
         else:
-            _lobe(normals, lights[m], rays, start, y, _TABLE[kind], gloss[span])
+            _lobe(narrow, work, start, end, lights[m], _TABLE[kind])
             if _TABLE[kind, 2] > _ZERO:
                 for k in range(3):
-                    _tint(normals, lights[m], _TABLE[kind, 2 + k], received[k, span])
+                    _tint(narrow, start, end, lights[m], _TABLE[kind, 2 + k], received[k * PIXELS : (k + 1) * PIXELS])
             continue
+        tone = work[_TONE + start : _TONE + end]
         for k in range(3):
-            lit = received[k]
-            for x in range(start, end):
-                lit[x] *= tone[x]
+            lit = received[k * PIXELS + start : k * PIXELS + end]
+            for n in range(len(tone)):
+                lit[n] *= tone[n]
+    return work[_GLOSS : _GLOSS + PIXELS]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _lobe(
-    normal: np.ndarray, light: np.ndarray, rays: np.ndarray, first: int, y: int, surface: np.ndarray, gloss: np.ndarray
-) -> None:
-    """Write the gloss of pixels of one material, (n,), from unit normals (3, n); ``light`` is a row of lights."""
-    rise_x, rise_y, rise_z, ray_x, ray_y, ray_z = _view(rays, first, y)
+def _look(columns: np.ndarray, rows: np.ndarray, rays: np.ndarray, work: np.ndarray) -> None:
+    """Write the unit directions from pixels to the camera, (n,) each."""
+    x_of, y_of, z_of = (
+        work[_VIEW_X : _VIEW_X + PIXELS],
+        work[_VIEW_Y : _VIEW_Y + PIXELS],
+        work[_VIEW_Z : _VIEW_Z + PIXELS],
+    )
+    ax, bx, cx = np.float32(-rays[0, 0]), np.float32(-rays[0, 1]), np.float32(-rays[0, 2])
+    ay, by, cy = np.float32(-rays[1, 0]), np.float32(-rays[1, 1]), np.float32(-rays[1, 2])
+    az, bz, cz = np.float32(-rays[2, 0]), np.float32(-rays[2, 1]), np.float32(-rays[2, 2])
+    for n in range(len(columns)):
+        x, y = np.float32(columns[n]), np.float32(rows[n])
+        vx, vy, vz = ax * x + bx * y + cx, ay * x + by * y + cy, az * x + bz * y + cz
+        scale = _UNIT / np.float32(math.sqrt(vx * vx + vy * vy + vz * vz))
+        x_of[n], y_of[n], z_of[n] = vx * scale, vy * scale, vz * scale
+
+
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+def _lobe(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray, surface: np.ndarray) -> None:
+    """Write the gloss of pixels of one material; ``light`` is a row of lights."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
+    normal_x, normal_y, normal_z = (
+        narrow[NORMAL_X + first : NORMAL_X + last], narrow[NORMAL_Y + first : NORMAL_Y + last],
+        narrow[NORMAL_Z + first : NORMAL_Z + last],
+    )  # fmt: skip
+    view_x, view_y, view_z = (
+        work[_VIEW_X + first : _VIEW_X + last], work[_VIEW_Y + first : _VIEW_Y + last],
+        work[_VIEW_Z + first : _VIEW_Z + last],
+    )  # fmt: skip
+    gloss = work[_GLOSS + first : _GLOSS + last]
     reflectance, rough = surface[0], surface[1]
     alpha = rough * rough + light[6] * _HALF
     square, share_of_lobe = alpha * alpha, reflectance / (np.float32(4.0) * (rough + _HALF))
     # The surroundings: reflectance straight ahead and, on a rough surface less, at a glance.
     plain, glance = reflectance, np.float32(0.4) * (_UNIT - rough) ** 2
-    normal_x, normal_y, normal_z = normal[0], normal[1], normal[2]
     for n in range(len(gloss)):
-        column, nx, ny, nz = np.float32(n), normal_x[n], normal_y[n], normal_z[n]
-        vx, vy, vz = ray_x - rise_x * column, ray_y - rise_y * column, ray_z - rise_z * column
-        scale = _UNIT / np.float32(math.sqrt(vx * vx + vy * vy + vz * vz))
-        vx, vy, vz = vx * scale, vy * scale, vz * scale
+        nx, ny, nz, vx, vy, vz = normal_x[n], normal_y[n], normal_z[n], view_x[n], view_y[n], view_z[n]
         direct = key * max(nx * light_x + ny * light_y + nz * light_z, _ZERO)
         share = direct / (rest + rise * nz + direct + _TINY)
         hx, hy, hz = vx + light_x, vy + light_y, vz + light_z
@@ -301,23 +319,34 @@ def _lobe(
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _tint(normal: np.ndarray, light: np.ndarray, wrap: np.float32, received: np.ndarray) -> None:
-    """Multiply the light of one colour (n,) by what reaches farther through skin than over it, in place."""
+def _tint(narrow: np.ndarray, first: int, last: int, light: np.ndarray, wrap: np.float32, received: np.ndarray) -> None:
+    """Multiply the light of one colour by what reaches farther through skin than over it, in place."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
-    normal_x, normal_y, normal_z, scale = normal[0], normal[1], normal[2], _UNIT / (_UNIT + wrap)
-    for n in range(len(received)):
+    normal_x, normal_y, normal_z = (
+        narrow[NORMAL_X + first : NORMAL_X + last], narrow[NORMAL_Y + first : NORMAL_Y + last],
+        narrow[NORMAL_Z + first : NORMAL_Z + last],
+    )  # fmt: skip
+    lit, scale = received[first:last], _UNIT / (_UNIT + wrap)
+    for n in range(len(lit)):
         nz = normal_z[n]
         cosine = normal_x[n] * light_x + normal_y[n] * light_y + nz * light_z
         even, wrapped = rest + rise * nz + _TINY, max((cosine + wrap) * scale, _ZERO)
-        received[n] *= min((even + key * wrapped) / (even + key * max(cosine, _ZERO)), _MOST_TINT)
+        lit[n] *= min((even + key * wrapped) / (even + key * max(cosine, _ZERO)), _MOST_TINT)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _fold(normal: np.ndarray, strands: np.ndarray, tilt: np.ndarray, light: np.ndarray, tone: np.ndarray) -> None:
-    """Write how the light changes on normals (3, n) that are tilted by slopes (n,) along the grain (3, n), (n,)."""
+def _fold(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray) -> None:
+    """Write to ``_TONE`` how the light changes on normals that are tilted by slopes along the grain."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
-    normal_x, normal_y, normal_z = normal[0], normal[1], normal[2]
-    grain_x, grain_y, grain_z = strands[0], strands[1], strands[2]
+    normal_x, normal_y, normal_z = (
+        narrow[NORMAL_X + first : NORMAL_X + last], narrow[NORMAL_Y + first : NORMAL_Y + last],
+        narrow[NORMAL_Z + first : NORMAL_Z + last],
+    )  # fmt: skip
+    grain_x, grain_y, grain_z = (
+        work[_GRAIN_X + first : _GRAIN_X + last], work[_GRAIN_Y + first : _GRAIN_Y + last],
+        work[_GRAIN_Z + first : _GRAIN_Z + last],
+    )  # fmt: skip
+    tilt, tone = work[_TILT + first : _TILT + last], work[_TONE + first : _TONE + last]
     for n in range(len(tone)):
         nx, ny, nz, gx, gy, gz = normal_x[n], normal_y[n], normal_z[n], grain_x[n], grain_y[n], grain_z[n]
         along = nx * gx + ny * gy + nz * gz
@@ -335,22 +364,28 @@ def _fold(normal: np.ndarray, strands: np.ndarray, tilt: np.ndarray, light: np.n
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _strands_over(
-    normal: np.ndarray, strands: np.ndarray, tilt: np.ndarray, light: np.ndarray, rays: np.ndarray, first: int, y: int,
-    gloss: np.ndarray,
-) -> None:  # fmt: skip
-    """Write the highlight of the surface of hair, (n,); ``tilt`` (n,) is how the strands differ."""
-    rise_x, rise_y, rise_z, ray_x, ray_y, ray_z = _view(rays, first, y)
+def _strands_over(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray) -> None:
+    """Write the highlight of the surface of hair, as a share of the light that ``_TONE`` has changed."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
-    normal_x, normal_y, normal_z = normal[0], normal[1], normal[2]
-    grain_x, grain_y, grain_z = strands[0], strands[1], strands[2]
+    normal_x, normal_y, normal_z = (
+        narrow[NORMAL_X + first : NORMAL_X + last], narrow[NORMAL_Y + first : NORMAL_Y + last],
+        narrow[NORMAL_Z + first : NORMAL_Z + last],
+    )  # fmt: skip
+    view_x, view_y, view_z = (
+        work[_VIEW_X + first : _VIEW_X + last], work[_VIEW_Y + first : _VIEW_Y + last],
+        work[_VIEW_Z + first : _VIEW_Z + last],
+    )  # fmt: skip
+    grain_x, grain_y, grain_z = (
+        work[_GRAIN_X + first : _GRAIN_X + last], work[_GRAIN_Y + first : _GRAIN_Y + last],
+        work[_GRAIN_Z + first : _GRAIN_Z + last],
+    )  # fmt: skip
+    tilt, tone = work[_TILT + first : _TILT + last], work[_TONE + first : _TONE + last]
+    gloss = work[_GLOSS + first : _GLOSS + last]
     for n in range(len(gloss)):
-        column, nx, ny, nz = np.float32(n), normal_x[n], normal_y[n], normal_z[n]
-        vx, vy, vz = ray_x - rise_x * column, ray_y - rise_y * column, ray_z - rise_z * column
-        scale = _UNIT / np.float32(math.sqrt(vx * vx + vy * vy + vz * vz))
+        nx, ny, nz, vx, vy, vz = normal_x[n], normal_y[n], normal_z[n], view_x[n], view_y[n], view_z[n]
         direct = key * max(nx * light_x + ny * light_y + nz * light_z, _ZERO)
         share = direct / (rest + rise * nz + direct + _TINY)
-        hx, hy, hz = vx * scale + light_x, vy * scale + light_y, vz * scale + light_z
+        hx, hy, hz = vx + light_x, vy + light_y, vz + light_z
         gx, gy, gz = grain_x[n], grain_y[n], grain_z[n]
         along = nx * gx + ny * gy + nz * gz
         square = max(gx * gx + gy * gy + gz * gz - along * along, _LEAST)
@@ -364,29 +399,34 @@ def _strands_over(
         sine *= sine
         sine *= sine
         sine *= sine
-        away = _UNIT - min(max((nx * vx + ny * vy + nz * vz) * scale, _ZERO), _UNIT)
+        away = _UNIT - min(max(nx * vx + ny * vy + nz * vz, _ZERO), _UNIT)
         away *= away
         lit = _UNIT + _STREAKS * tilt[n]
-        gloss[n] = lit * share * _PRIMARY * sine * sine + (_UNIT - share) * (_DULL + _DULL * away * away)
+        gloss[n] = (lit * share * _PRIMARY * sine * sine + (_UNIT - share) * (_DULL + _DULL * away * away)) / tone[n]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _strands_through(
-    normal: np.ndarray, strands: np.ndarray, tilt: np.ndarray, light: np.ndarray, rays: np.ndarray, first: int, y: int,
-    tone: np.ndarray,
-) -> None:  # fmt: skip
-    """Write how much more light comes back in the colour of hair, (n,): by strands, and by light through them."""
-    rise_x, rise_y, rise_z, ray_x, ray_y, ray_z = _view(rays, first, y)
+def _strands_through(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray) -> None:
+    """Write to ``_TONE`` how much more light comes back in the colour of hair: by strands, and through them."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
-    normal_x, normal_y, normal_z = normal[0], normal[1], normal[2]
-    grain_x, grain_y, grain_z = strands[0], strands[1], strands[2]
+    normal_x, normal_y, normal_z = (
+        narrow[NORMAL_X + first : NORMAL_X + last], narrow[NORMAL_Y + first : NORMAL_Y + last],
+        narrow[NORMAL_Z + first : NORMAL_Z + last],
+    )  # fmt: skip
+    view_x, view_y, view_z = (
+        work[_VIEW_X + first : _VIEW_X + last], work[_VIEW_Y + first : _VIEW_Y + last],
+        work[_VIEW_Z + first : _VIEW_Z + last],
+    )  # fmt: skip
+    grain_x, grain_y, grain_z = (
+        work[_GRAIN_X + first : _GRAIN_X + last], work[_GRAIN_Y + first : _GRAIN_Y + last],
+        work[_GRAIN_Z + first : _GRAIN_Z + last],
+    )  # fmt: skip
+    tilt, tone = work[_TILT + first : _TILT + last], work[_TONE + first : _TONE + last]
     for n in range(len(tone)):
-        column, nx, ny, nz = np.float32(n), normal_x[n], normal_y[n], normal_z[n]
-        vx, vy, vz = ray_x - rise_x * column, ray_y - rise_y * column, ray_z - rise_z * column
-        scale = _UNIT / np.float32(math.sqrt(vx * vx + vy * vy + vz * vz))
+        nx, ny, nz, vx, vy, vz = normal_x[n], normal_y[n], normal_z[n], view_x[n], view_y[n], view_z[n]
         direct = key * max(nx * light_x + ny * light_y + nz * light_z, _ZERO)
         share = direct / (rest + rise * nz + direct + _TINY)
-        hx, hy, hz = vx * scale + light_x, vy * scale + light_y, vz * scale + light_z
+        hx, hy, hz = vx + light_x, vy + light_y, vz + light_z
         gx, gy, gz = grain_x[n], grain_y[n], grain_z[n]
         along = nx * gx + ny * gy + nz * gz
         square = max(gx * gx + gy * gy + gz * gz - along * along, _LEAST)
@@ -399,13 +439,3 @@ def _strands_through(
         sine *= sine
         sine *= sine
         tone[n] = (_UNIT + _STREAKS * tilt[n]) * (_UNIT + _SECONDARY * share * sine * sine)
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _view(rays: np.ndarray, first: int, y: int) -> tuple:
-    """Return the change of the way to the camera from pixel to pixel, and minus that way at the first pixel."""
-    rise_x, rise_y, rise_z = np.float32(rays[0, 0]), np.float32(rays[1, 0]), np.float32(rays[2, 0])
-    ray_x = np.float32(-(rays[0, 0] * first + rays[0, 1] * y + rays[0, 2]))
-    ray_y = np.float32(-(rays[1, 0] * first + rays[1, 1] * y + rays[1, 2]))
-    ray_z = np.float32(-(rays[2, 0] * first + rays[2, 1] * y + rays[2, 2]))
-    return rise_x, rise_y, rise_z, ray_x, ray_y, ray_z

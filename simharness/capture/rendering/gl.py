@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from mvpose.camera import Camera
 from simharness.capture.rendering.face_kernels import normals
 from simharness.capture.rendering.lens import through_lens
+from simharness.capture.rendering.panoramas import fill_empty
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, Unavailable, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.scene_topology import pyramid
@@ -31,6 +32,7 @@ from simharness.capture.rendering.shading_kernels import LEAST_COSINE
 from simharness.capture.rendering.shadow_maps import Shadows
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
+from simharness.world.rigs.projection import projection_matrix
 
 _FAR = 200.0  # metres; 24 bits of depth between NEAR and this resolve 0.04 mm at 6 m
 _MOST_MESHES = 254
@@ -114,6 +116,9 @@ class GlRenderer:
                 self._renderer.light(lighting, self._geometry)
                 rgba, depth = self._renderer.render(self._scene, wanted)
                 rgb = np.ascontiguousarray(rgba[..., :3])
+                if lighting.panorama is not None:
+                    rays = np.linalg.inv(projection_matrix(camera)[:, :3].astype(np.float64))
+                    fill_empty(rgb, rgba[..., 3] == 0, lighting, rays)
             if parts or not color:
                 rgba, depth = self._renderer.render(self._scene, wanted | flags.FLAT)
         finally:

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.ray_kernels import DEEPEST, trace
+from simharness.capture.rendering.box_tree_kernels import DEEPEST, trace
 
 _SIDE = 4  # points on an area light along each side, of which shadow rays are cast
 _OFF = 2e-3  # metres from a surface to the start of its rays
@@ -29,7 +29,7 @@ def from_area(
         y: see ``x``.
         z: see ``x``.
         area: centre, right, up, radiance (the last is not used here), focus, (13,).
-        boxes: see :func:`.ray_kernels.build_tree`, as ``links`` and ``triangles``.
+        boxes: see :func:`.box_tree_kernels.build_tree`, as ``links`` and ``triangles``.
         links: see ``boxes``.
         triangles: see ``boxes``.
         stack: memory.
@@ -107,7 +107,7 @@ def sunlit(
         sun: unit direction to the sun, (3,).
         areas: area lights, see :func:`from_area`, (n, 13).
         windows: which of them are windows, (n,) bool.
-        boxes: see :func:`.ray_kernels.build_tree`, as ``links`` and ``triangles``.
+        boxes: see :func:`.box_tree_kernels.build_tree`, as ``links`` and ``triangles``.
         links: see ``boxes``.
         triangles: see ``boxes``.
         stack: memory.
@@ -156,7 +156,7 @@ def direct_light(
         areas: area lights, see :func:`from_area`, (m, 13).
         windows: which of them are windows, (m,) bool.
         sun: unit direction to the sun and its irradiance, (6,); zeros without sun.
-        boxes: see :func:`.ray_kernels.build_tree`, as ``links`` and ``triangles``.
+        boxes: see :func:`.box_tree_kernels.build_tree`, as ``links`` and ``triangles``.
         links: see ``boxes``.
         triangles: see ``boxes``.
     """
@@ -183,16 +183,14 @@ def direct_light(
         if cosine <= 0 or sun[3] + sun[4] + sun[5] <= 0:
             continue
         # The edges of sunlight are sharper than the distances between samples: each stands for its neighbourhood.
-        sign = 1.0 if nz >= 0 else -1.0
-        a = -1.0 / (sign + nz)
-        b = nx * ny * a
+        ux, uy, uz, vx, vy, vz = _basis(nx, ny, nz)
         hits = 0
         for n in range(_SIDE * _SIDE):
             u = reach_of[s] * ((n // _SIDE + 0.5) / _SIDE - 0.5)
             v = reach_of[s] * ((n % _SIDE + 0.5) / _SIDE - 0.5)
             hits += sunlit(
-                x + u * (1.0 + sign * nx * nx * a) + v * b, y + u * sign * b + v * (sign + ny * ny * a),
-                z - u * sign * nx - v * ny, sun, areas, windows, boxes, links, triangles, stack,
+                x + u * ux + v * vx, y + u * uy + v * vy, z + u * uz + v * vz, sun, areas, windows, boxes, links,
+                triangles, stack,
             )  # fmt: skip
         for c in range(3):
             light[s, c] += np.float32(cosine * sun[3 + c] * hits / (_SIDE * _SIDE))
@@ -218,7 +216,7 @@ def met(
         places: starts, (n, 3).
         normals: unit normals there, about which the directions are turned, (n, 3); zeros: they are not turned.
         ways: unit directions of the rays, for a normal along z, (rays, 3).
-        boxes: see :func:`.ray_kernels.build_tree`, as ``links``, ``triangles`` and ``order``.
+        boxes: see :func:`.box_tree_kernels.build_tree`, as ``links``, ``triangles`` and ``order``.
         links: see ``boxes``.
         triangles: see ``boxes``.
         order: see ``boxes``; here the index of the face.
@@ -231,16 +229,11 @@ def met(
         nx, ny, nz = np.float64(normals[s, 0]), np.float64(normals[s, 1]), np.float64(normals[s, 2])
         x, y, z = places[s, 0] + _OFF * nx, places[s, 1] + _OFF * ny, places[s, 2] + _OFF * nz
         turned = nx * nx + ny * ny + nz * nz > 0.5
-        # Axes about the normal (Duff et al., "Building an orthonormal basis, revisited", 2017).
-        sign = 1.0 if nz >= 0 else -1.0
-        a = -1.0 / (sign + nz)
-        b = nx * ny * a
+        ux, uy, uz, vx, vy, vz = _basis(nx, ny, nz)
         for r in range(len(ways)):
             u, v, w = ways[r, 0], ways[r, 1], ways[r, 2]
             if turned:
-                dx = u * (1.0 + sign * nx * nx * a) + v * b + w * nx
-                dy = u * sign * b + v * (sign + ny * ny * a) + w * ny
-                dz = -u * sign * nx - v * ny + w * nz
+                dx, dy, dz = u * ux + v * vx + w * nx, u * uy + v * vy + w * ny, u * uz + v * vz + w * nz
             else:
                 dx, dy, dz = u, v, w
             t, _, second, third = trace(boxes, links, triangles, stack, (x, y, z), (dx, dy, dz), 1e4, False)
@@ -261,6 +254,18 @@ def met(
                 best = 0 if first >= max(second, third) else (1 if second >= third else 2)
                 found[s, r] = corner_samples[f, best]
     return found
+
+
+@njit(cache=True, error_model="numpy")
+def _basis(nx: float, ny: float, nz: float) -> tuple[float, float, float, float, float, float]:
+    """Return two unit vectors, perpendicular to each other and to a unit normal.
+
+    Duff et al., "Building an orthonormal basis, revisited", Journal of Computer Graphics Techniques 6(1), 2017.
+    """
+    sign = 1.0 if nz >= 0 else -1.0
+    a = -1.0 / (sign + nz)
+    b = nx * ny * a
+    return 1.0 + sign * nx * nx * a, sign * b, -sign * nx, b, sign + ny * ny * a, -ny
 
 
 @njit(cache=True, error_model="numpy")
@@ -311,7 +316,7 @@ def probe_light(
         areas: see :func:`direct_light`, as ``windows`` and ``sun``.
         windows: see ``areas``.
         sun: see ``areas``.
-        boxes: see :func:`.ray_kernels.build_tree`, as ``links`` and ``triangles``.
+        boxes: see :func:`.box_tree_kernels.build_tree`, as ``links`` and ``triangles``.
         links: see ``boxes``.
         triangles: see ``boxes``.
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simharness.capture.rendering.scene_topology import SceneTopology
+from simharness.capture.srgb import to_linear
 
 Floats = NDArray[np.float32]
 
@@ -142,14 +143,9 @@ def _lattice(n: int) -> NDArray[np.float64]:
 def _albedo(topology: SceneTopology) -> Floats:
     """Return the linear albedo of every face, (k, 3): of its texture the mean."""
     mean = [
-        np.ones(3) if mesh.texture is None else linear(mesh.texture[::4, ::4].reshape(-1, 3) / 255).mean(axis=0)
+        np.ones(3) if mesh.texture is None else to_linear(mesh.texture[::4, ::4].reshape(-1, 3)).mean(axis=0)
         for mesh in topology.meshes
     ]
     counts = [len(mesh.faces) for mesh in topology.meshes]
     dye = np.repeat(np.array(mean, np.float32).reshape(-1, 3), counts, axis=0)
-    return (linear(topology.colors) * dye).astype(np.float32)
-
-
-def linear(srgb: NDArray) -> NDArray:
-    """Return linear values of sRGB ones, 0 to 1 (IEC 61966-2-1)."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    return (to_linear(255 * topology.colors) * dye).astype(np.float32)

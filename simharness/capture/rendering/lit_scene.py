@@ -17,19 +17,25 @@ from numpy.typing import NDArray
 from mvpose.camera import Camera
 from simharness.capture.rendering import tone
 from simharness.capture.rendering.backgrounds import Background, LitBackground
+from simharness.capture.rendering.capsule_kernels import capsules
+from simharness.capture.rendering.dimming_kernels import dim, runs_below
 from simharness.capture.rendering.finishes import MATTE, Finishes, PosedFinishes
-from simharness.capture.rendering.lit_kernels import blocks_below, dim, shade_lit
-from simharness.capture.rendering.occlusion_kernels import capsules, cast, moving_light, touched_blocks
-from simharness.capture.rendering.room_light import LUMINANCE, RoomLight, last_light, room_light
+from simharness.capture.rendering.lit_kernels import shade_lit
+from simharness.capture.rendering.moving_light_kernels import moving_light
+from simharness.capture.rendering.panoramas import fill_empty
+from simharness.capture.rendering.room_light import RoomLight, last_light, room_light
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.scene_topology import SceneTopology
+from simharness.capture.rendering.shadow_layer_kernels import BLOCK, cast, touched_blocks
+from simharness.capture.rendering.span_kernels import whole
+from simharness.capture.srgb import LUMINANCE
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 
 Floats = NDArray[np.float32]
 
+_LUMINANCE = np.array(LUMINANCE)
 _CELL, _MOST_CELLS = 0.06, 384  # metres; cells of the map along each side: beyond, they are larger
-_BLOCK = 8  # cells
 _HEIGHTS = np.array([0.0, 0.5, 1.1, 1.9], np.float32)  # metres, of the maps above the floor
 
 
@@ -204,12 +210,12 @@ class LitScene:
         assert sources is not None
         lamps = np.zeros((len(sources.areas), 11))
         for row, area in zip(lamps, sources.areas, strict=True):
-            radiance = LUMINANCE @ (self.room.exposure * area.radiance)
+            radiance = _LUMINANCE @ (self.room.exposure * area.radiance)
             row[:] = *area.center, *area.right, *area.up, radiance, area.focus
         sun = np.zeros(4)
         if sources.sun is not None:
-            sun[:] = *sources.sun.direction, LUMINANCE @ (self.room.exposure * sources.sun.irradiance)
-        up = probes.every[..., 4, :] @ LUMINANCE.astype(np.float32)
+            sun[:] = *sources.sun.direction, _LUMINANCE @ (self.room.exposure * sources.sun.irradiance)
+        up = probes.every[..., 4, :] @ _LUMINANCE.astype(np.float32)
         fixed = (
             self._bodies, self._samples.ranges, lamps, sun, probes.origin, probes.step,
             np.ascontiguousarray(up[..., None]), probes.shares,
@@ -228,46 +234,48 @@ class LitScene:
         kept = background.lit
         if kept is not None and kept.lighting == self.lighting and kept.light is self.room:
             return kept
-        empty = np.round(255 * np.array(self.lighting.background)).astype(np.uint8)
         triangle, inverse_depth = background.triangle, background.inverse_depth
-        rgb = np.full((*triangle.shape, 3), empty, np.uint8)
+        rgb = np.empty((*triangle.shape, 3), np.uint8)
+        fill_empty(rgb, triangle < 0, self.lighting, rays, self.room.exposure)
         still, samples, grid = self.geometry.still, self.room.samples, Grid.of(self.room)
         if len(still.topology.faces):
             emission = still.topology.emission * self.room.exposure
+            seen = whole(*triangle.shape), triangle, background.corners
             self._shade(
-                still.topology, (triangle, background.corners), still.normals, rays, emission, self.room.light,
+                still.topology, seen, still.normals, rays, emission, self.room.light,
                 samples.corner_samples, samples.divisions, (0, 0), MATTE, rgb,
             )  # fmt: skip
-        block, (rows, columns) = _BLOCK * grid.cell, grid.blocks
-        place = blocks_below(
+        block, (rows, columns) = BLOCK * grid.cell, grid.blocks
+        runs = runs_below(
             triangle, inverse_depth, camera.center, rays, grid.corner, block, rows, columns, float(_HEIGHTS[-1])
         )
-        background.lit = LitBackground(self.lighting, self.room, rgb, place, np.zeros((0, 0), np.float32))
+        nothing = np.zeros((0, 0), np.uint16), np.zeros((0, 0), np.float32)
+        background.lit = LitBackground(self.lighting, self.room, rgb, *nothing, runs)
         return background.lit
 
     def draw(
         self,
         lit: LitBackground,
-        seen: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float64]],
+        seen: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32], NDArray[np.float64]],
         camera: Camera,
         rays: NDArray[np.float64],
     ) -> NDArray[np.uint8]:
         """Return the picture, (h, w, 3): the background with the moving meshes and what they keep from it."""
         rgb, topology, samples = lit.rgb.copy(), self.geometry.topology, self._samples
-        triangle, inverse_depth, corners = seen
+        spans, triangle, inverse_depth, corners = seen
         first = topology.still[0]
         if first == len(topology.faces):
             return rgb
         grid, shadows = Grid.of(self.room), self.shadows
         if first:
             dim(
-                triangle, inverse_depth, first, lit.shadow_place, camera.center, rays, grid.corner, grid.cell,
+                inverse_depth, lit.runs, camera.center, rays, grid.corner, grid.cell,
                 shadows.fine, shadows.coarse, _HEIGHTS, shadows.touched, tone.dimming(), rgb,
             )  # fmt: skip
         emission = topology.emission[first:] * self.room.exposure
         divisions, finishes = np.ones(len(samples.corner_samples), np.int32), self._finishes
         self._shade(
-            topology, (triangle, corners), self.geometry.normals, rays, emission, self.moving_light,
+            topology, (spans, triangle, corners), self.geometry.normals, rays, emission, self.moving_light,
             samples.corner_samples, divisions, topology.still, MATTE if finishes is None else
             finishes.arguments(camera, rays), rgb,
         )  # fmt: skip
@@ -276,7 +284,7 @@ class LitScene:
     @staticmethod
     def _shade(
         topology: SceneTopology,
-        seen: tuple[NDArray[np.int32], NDArray[np.float64]],
+        seen: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]],
         normals: tuple[Floats, Floats],
         rays: NDArray[np.float64],
         emission: Floats,
@@ -315,10 +323,10 @@ class Grid:
         counts = np.array(probes.every.shape[:2])
         extent = probes.step[:2] * (counts - 1) + 0.12
         cell = max(_CELL, float(extent.max()) / _MOST_CELLS)
-        columns, rows = (np.ceil(extent / (_BLOCK * cell)).astype(int) * _BLOCK).tolist()
+        columns, rows = (np.ceil(extent / (BLOCK * cell)).astype(int) * BLOCK).tolist()
         return cls(probes.origin[:2] - 0.06, cell, (rows, columns))
 
     @property
     def blocks(self) -> tuple[int, int]:
         """Rows and columns of blocks."""
-        return self.shape[0] // _BLOCK, self.shape[1] // _BLOCK
+        return self.shape[0] // BLOCK, self.shape[1] // BLOCK

@@ -19,12 +19,15 @@ from mvpose.camera import Camera
 from simharness.capture.rendering.backgrounds import Background, Backgrounds, LitBackground
 from simharness.capture.rendering.lens import through_lens
 from simharness.capture.rendering.lit_scene import LitScene
-from simharness.capture.rendering.raster_kernels import LONGEST_SIDE, NOTHING_DRAWN, rasterise, resolve
+from simharness.capture.rendering.panoramas import fill_empty
+from simharness.capture.rendering.raster_kernels import LONGEST_SIDE, NOTHING_DRAWN, draw_projected, rasterise
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.shading_kernels import shade
 from simharness.capture.rendering.shadow_kernels import shadow_places
 from simharness.capture.rendering.shadow_maps import NO_SHADOW, SHADOW_SIZE, ShadowMap
+from simharness.capture.rendering.span_kernels import covering_spans, lifted, put_back, resolve, whole
+from simharness.capture.rendering.vertex_kernels import project_vertices
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.world.rigs.projection import projection_matrix
@@ -50,7 +53,6 @@ class RasterRenderer:
 
     def __init__(self) -> None:
         self._scenes: list[_Scene] = []
-        self._inverse_depth, self._triangle = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.int32)
 
     def render(
         self,
@@ -73,7 +75,7 @@ class RasterRenderer:
             )
         check_count(meshes, most=_MOST_MESHES)
         scene = self._scene(meshes)
-        return through_lens(camera, lambda pinhole: self._picture(scene, pinhole, color, lighting, parts))
+        return through_lens(camera, lambda pinhole: _picture(scene, pinhole, color, lighting, parts))
 
     def _scene(self, meshes: Sequence[Mesh]) -> _Scene:
         """Return the scene of these meshes: the last one with the same still meshes, moved on."""
@@ -85,37 +87,37 @@ class RasterRenderer:
         self._scenes = [scene, *self._scenes][:_KEPT_SCENES]
         return scene
 
-    def _picture(self, scene: _Scene, camera: Camera, color: bool, lighting: Lighting, parts: bool) -> Image:
-        geometry, background = scene.geometry, _background(scene, camera)
-        topology, projection = geometry.topology, projection_matrix(camera)
-        inverse_depth, triangle = self._buffers(background)
-        first = topology.still[0]
-        corners = rasterise(
-            geometry.vertices, topology.faces, projection, NEAR, inverse_depth, triangle, background.corners, first
-        )
-        depth, ids = resolve(inverse_depth, triangle, topology.mesh)
-        sources = LitScene.of(geometry, lighting) if color else None
-        if sources is not None:
-            rays = _rays(camera)
-            lit = sources.background(background, camera, rays)
-            rgb = sources.draw(lit, (triangle, inverse_depth, corners), camera, rays)
-        elif color:
-            lit = _lit(background, geometry, camera, lighting)
-            rgb = lit.rgb.copy()
-            seen, moving = (triangle, inverse_depth, corners), geometry.shadows(lighting).moving
-            _shade(geometry, camera, lighting, *seen, moving, lit.shadow_place, lit.shadow_depth, first, rgb)
-        else:
-            rgb = np.zeros((*triangle.shape, 3), np.uint8)
-        return Image(rgb=rgb, depth=depth, ids=ids, parts=topology.parts[triangle] if parts else None)
 
-    def _buffers(self, background: Background) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """Return copies of the inverse depth and the faces of a background, in the memory of the last picture."""
-        if self._triangle.shape != background.triangle.shape:
-            self._inverse_depth = np.empty_like(background.inverse_depth)
-            self._triangle = np.empty_like(background.triangle)
-        np.copyto(self._inverse_depth, background.inverse_depth)
-        np.copyto(self._triangle, background.triangle)
-        return self._inverse_depth, self._triangle
+def _picture(scene: _Scene, camera: Camera, color: bool, lighting: Lighting, parts: bool) -> Image:
+    """Draw the moving meshes into the background of a camera, and take them out again when the picture is done."""
+    geometry, background = scene.geometry, _background(scene, camera)
+    topology, (width, height) = geometry.topology, camera.size
+    inverse_depth, triangle, first = background.inverse_depth, background.triangle, topology.still[0]
+    corners, seen, codes = project_vertices(
+        geometry.vertices, projection_matrix(camera), NEAR, background.corners, width, height
+    )
+    rays, rgb = _rays(camera), np.zeros((height, width, 3), np.uint8)
+    sources = LitScene.of(geometry, lighting) if color else None
+    if sources is not None:
+        lit = sources.background(background, camera, rays)
+    elif color:
+        lit = _lit(background, geometry, camera, lighting)
+    depth, ids = background.depth.copy(), _ids(background, topology.mesh).copy()
+    spans = covering_spans(codes, topology.moving_starts, height, width)
+    hidden = lifted(spans, inverse_depth, triangle)
+    try:
+        draw_projected(topology.faces, corners, seen, codes, NEAR, inverse_depth, triangle, first)
+        resolve(spans, inverse_depth, triangle, topology.mesh, depth, ids)
+        labels = topology.parts[triangle] if parts else None
+        if sources is not None:
+            rgb = sources.draw(lit, (spans, triangle, inverse_depth, corners), camera, rays)
+        elif color:
+            rgb, moving = lit.rgb.copy(), geometry.shadows(lighting).moving
+            drawn = triangle, inverse_depth, corners
+            _shade(geometry, camera, lighting, *drawn, moving, lit.shadow_place, lit.shadow_depth, first, rgb)
+    finally:
+        put_back(spans, *hidden, inverse_depth, triangle)
+    return Image(rgb=rgb, depth=depth, ids=ids, parts=labels)
 
 
 def _background(scene: _Scene, camera: Camera) -> Background:
@@ -127,20 +129,29 @@ def _background(scene: _Scene, camera: Camera) -> Background:
         inverse_depth, triangle = np.zeros(shape, np.float32), np.full(shape, -1, np.int32)
         faces = still.topology.faces
         corners = rasterise(still.vertices, faces, projection, NEAR, inverse_depth, triangle, NOTHING_DRAWN, 0)
-        found = Background(inverse_depth, triangle, corners)
+        depth, labels, ids = np.empty(shape, np.float32), scene.geometry.topology.mesh, np.empty(shape, np.int16)
+        resolve(whole(*shape), inverse_depth, triangle, labels, depth, ids)
+        found = Background(inverse_depth, triangle, corners, depth, labels, ids)
         scene.backgrounds.keep(projection, camera.size, found)
     return found
+
+
+def _ids(background: Background, labels: NDArray[np.int16]) -> NDArray[np.int16]:
+    """Return the mesh at every pixel of a background; it changes with the order of the meshes in the scene."""
+    if background.labels is not labels:
+        background.labels, background.ids = labels, labels[background.triangle]
+    return background.ids
 
 
 def _lit(background: Background, geometry: SceneGeometry, camera: Camera, lighting: Lighting) -> LitBackground:
     """Return the background in a light; the last one is kept."""
     shadows, seen = geometry.shadows(lighting), (background.triangle, background.inverse_depth)
     if background.lit is None or background.lit.lighting != lighting or background.lit.light != shadows.light:
-        empty = np.round(255 * np.array(lighting.background)).astype(np.uint8)
-        rgb = np.full((*background.triangle.shape, 3), empty, np.uint8)
+        rgb = np.empty((*background.triangle.shape, 3), np.uint8)
+        fill_empty(rgb, background.triangle < 0, lighting, _rays(camera))
         place, depth = shadow_places(*seen, camera.center, _rays(camera), shadows.light.P, SHADOW_SIZE)
         _shade(geometry, camera, lighting, *seen, background.corners, NO_SHADOW, place, depth, 0, rgb)
-        background.lit = LitBackground(lighting, shadows.light, rgb, place, depth)
+        background.lit = LitBackground(lighting, shadows.light, rgb, place, depth, np.zeros((0, 5), np.int32))
     return background.lit
 
 

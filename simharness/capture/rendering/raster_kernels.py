@@ -20,6 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from mvpose.kernels import njit
+from simharness.capture.rendering.vertex_kernels import SLACK, drawable, project_vertices
 
 # The kernels are typed by the arrays of the first call. Indices are unsigned or count from 0: an index that may be
 # negative would be checked at every use, and prevents vectorisation of loops.
@@ -27,10 +28,8 @@ from mvpose.kernels import njit
 NOTHING_DRAWN = np.zeros((0, 3))  # pixel coordinates of no vertices
 LONGEST_SIDE = 0x7FFE  # pixels: codes of vertices have 15 bits for a column or row
 
-_SLACK = 4e-3  # pixels: bounding boxes are in single precision; the edges decide
 _TILE = 4  # pixels
 _SMALL = 12  # pixels: larger triangles are drawn row by row
-_BATCH = 256  # vertices processed together
 _ROWS_OF_WORK = 12  # quantities of a triangle, see _set_up
 _CHUNK = 256  # triangles processed together: their lists stay in the first-level cache
 _LOWEST = np.array([0, 1, 2, 5, 3, 9, 6, 11, 15, 4, 8, 10, 14, 7, 13, 12])  # lowest set bit by de Bruijn sequence
@@ -70,14 +69,30 @@ def rasterise(
         Homogeneous pixel coordinates of the vertices, (n, 3).
     """
     height, width = triangle.shape
-    q, seen, codes = _project(vertices, P, near, drawn, width, height)
+    q, seen, codes = project_vertices(vertices, P, near, drawn, width, height)
+    draw_projected(faces, q, seen, codes, near, inverse_depth, triangle, first)
+    return q
+
+
+@njit(cache=True, error_model="numpy")
+def draw_projected(
+    faces: np.ndarray,
+    q: np.ndarray,
+    seen: np.ndarray,
+    codes: np.ndarray,
+    near: float,
+    inverse_depth: np.ndarray,
+    triangle: np.ndarray,
+    first: int,
+) -> None:
+    """Do the same with vertices that are projected already, see :func:`.vertex_kernels.project_vertices`."""
     tiles = (_SMALL // _TILE) ** 2
     hits, planes = np.empty((_CHUNK * tiles + 1, 4), np.int32), np.empty((_CHUNK * tiles + 1, 5))
     kept, work = np.empty(_CHUNK + 1, np.uint32), np.empty(_ROWS_OF_WORK * _CHUNK)
     lists, counts = np.empty((4, len(faces) - first + 1), np.uint32), np.zeros(4, np.int64)
     for start in range(first, len(faces), _CHUNK):
         drawn_small = counts[0]
-        candidates = kept[: _candidates(start, min(start + _CHUNK, len(faces)), faces, codes, kept)]
+        candidates = kept[: drawable(start, min(start + _CHUNK, len(faces)), faces, codes, kept)]
         _sort(candidates, faces, seen, lists, counts)
         count = _cover(lists[0, drawn_small : counts[0]], faces, q, seen, codes, work, hits, planes)
         _fill(hits, planes, count, inverse_depth, triangle)
@@ -90,82 +105,6 @@ def rasterise(
             _fill(hits, planes, count, inverse_depth, triangle)
         large = lists[3, : _drop_hidden(lists[3, : counts[3]], faces, codes, seen, inverse_depth, blocks)]
         _draw(large, faces, q, seen, near, inverse_depth, triangle)
-    return q
-
-
-@njit(cache=True, error_model="numpy")
-def _project(
-    vertices: np.ndarray, P: np.ndarray, near: float, drawn: np.ndarray, width: int, height: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Project vertices (n, 3), the first of which are ``drawn`` already.
-
-    Returns:
-        Homogeneous pixel coordinates, (n, 3); pixels and inverse depths, (n, 3) float32, for the vertices that follow
-        the first ones, the latter 0 behind the near plane, where the pixel is not used; and their codes, (n,) uint32.
-
-    The upper half of a code is for the columns of pixels, the lower half for the rows. It is twice the number of the
-    first column that is not left of the vertex, from 0 to ``width``, plus 1 if the vertex is on this column, within
-    ``_SLACK``. So the columns between vertices are those from ``min(codes) // 2`` to ``(max(codes) + 1) // 2 - 1``.
-    All bits are set behind the near plane.
-    """
-    n, first = len(vertices), len(drawn)
-    q, seen, codes = np.empty((n, 3)), np.empty((n, 3), np.float32), np.empty(n, np.uint32)
-    q[:first] = drawn
-    # Local copies: otherwise P is read again for every vertex, because q might alias it.
-    p00, p01, p02, p03 = P[0, 0], P[0, 1], P[0, 2], P[0, 3]
-    p10, p11, p12, p13 = P[1, 0], P[1, 1], P[1, 2], P[1, 3]
-    p20, p21, p22, p23 = P[2, 0], P[2, 1], P[2, 2], P[2, 3]
-    slack, right, bottom = np.float32(_SLACK), np.float32(width), np.float32(height)
-    work, code = np.empty(6 * _BATCH), np.empty(_BATCH, np.int32)
-    for start in range(first, n, _BATCH):
-        count = min(n - start, _BATCH)
-        for i in range(count):
-            work[i], work[_BATCH + i] = vertices[start + i, 0], vertices[start + i, 1]
-            work[2 * _BATCH + i] = vertices[start + i, 2]
-        for i in range(count):  # vectorised by the compiler, as coordinates are apart
-            x, y, z = work[i], work[_BATCH + i], work[2 * _BATCH + i]
-            depth = p20 * x + p21 * y + p22 * z + p23
-            x, y = p00 * x + p01 * y + p02 * z + p03, p10 * x + p11 * y + p12 * z + p13
-            scale = 1.0 / depth
-            column, row = np.float32(x * scale), np.float32(y * scale)
-            work[i], work[_BATCH + i], work[2 * _BATCH + i] = x, y, depth
-            work[3 * _BATCH + i], work[4 * _BATCH + i] = x * scale, y * scale
-            work[5 * _BATCH + i] = scale if depth >= near else 0.0
-            code_x, code_y = _code(column, slack, right), _code(row, slack, bottom)
-            code[i] = (code_x << np.int32(16)) | code_y if depth >= near else np.int32(-1)
-        for i in range(count):
-            q[start + i, 0], q[start + i, 1], q[start + i, 2] = work[i], work[_BATCH + i], work[2 * _BATCH + i]
-            seen[start + i, 0], seen[start + i, 1] = work[3 * _BATCH + i], work[4 * _BATCH + i]
-            seen[start + i, 2] = work[5 * _BATCH + i]
-            codes[start + i] = code[i]
-    return q, seen, codes
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _code(place: np.float32, slack: np.float32, size: np.float32) -> np.int32:
-    """Return half of the code of a vertex; see :func:`_project`."""
-    zero = np.float32(0.0)
-    first, last = np.ceil(place - slack), np.floor(place + slack)
-    on_pixel = (first == last) & (first >= zero) & (first < size)
-    first = first if first > zero else zero
-    first = first if first < size else size
-    return (np.int32(first) << np.int32(1)) | np.int32(on_pixel)
-
-
-@njit(cache=True, error_model="numpy")
-def _candidates(start: int, end: int, faces: np.ndarray, codes: np.ndarray, kept: np.ndarray) -> int:
-    """Write to ``kept`` the triangles from ``start`` to before ``end`` that may cover a pixel; return their number.
-
-    They have pixel columns between their vertices, and pixel rows: codes that differ, or a vertex on a pixel.
-    """
-    count, none = np.uint32(0), np.uint32(0)
-    columns, rows, on_pixel = np.uint32(0xFFFF0000), np.uint32(0xFFFF), np.uint32(0x10001)
-    for t in range(start, end):
-        a, b, c = codes[faces[t, 0]], codes[faces[t, 1]], codes[faces[t, 2]]
-        spans = (a ^ b) | (a ^ c) | (a & on_pixel)
-        kept[count] = t
-        count += np.uint32((spans & columns) != none) & np.uint32((spans & rows) != none)
-    return int(count)
 
 
 @njit(cache=True, error_model="numpy")
@@ -176,7 +115,7 @@ def _sort(candidates: np.ndarray, faces: np.ndarray, seen: np.ndarray, lists: np
     from behind.
     """
     facing_small, facing_large, averted_small, averted_large = counts[0], counts[1], counts[2], counts[3]
-    slack, most = np.float32(_SLACK), np.float32(_SMALL)
+    slack, most = np.float32(SLACK), np.float32(_SMALL)
     for index in range(len(candidates)):
         t = candidates[index]
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
@@ -296,7 +235,7 @@ def _cover(
         faces: vertex indices, (k, 3) uint32.
         q: homogeneous pixel coordinates of the vertices, (n, 3).
         seen: pixels and inverse depths of the vertices, (n, 3) float32.
-        codes: codes of the vertices, (n,), see :func:`_project`.
+        codes: codes of the vertices, (n,), see :func:`.vertex_kernels.project_vertices`.
         work: memory for intermediate values.
         hits: output; for every tile with covered pixels the triangle, the first column and row of the tile, and one bit
             for each of its pixels, (most, 4) int32.
@@ -411,8 +350,8 @@ def _draw(
                 share = (near - q[i, 2]) / (q[j, 2] - q[i, 2])
                 x, y = (q[i, 0] + share * (q[j, 0] - q[i, 0])) / near, (q[i, 1] + share * (q[j, 1] - q[i, 1])) / near
                 left, right, top, bottom = min(left, x), max(right, x), min(top, y), max(bottom, y)
-        left, right = max(np.ceil(left - _SLACK), 0.0), min(np.floor(right + _SLACK), width - 1.0)
-        top, bottom = max(np.ceil(top - _SLACK), 0.0), min(np.floor(bottom + _SLACK), height - 1.0)
+        left, right = max(np.ceil(left - SLACK), 0.0), min(np.floor(right + SLACK), width - 1.0)
+        top, bottom = max(np.ceil(top - SLACK), 0.0), min(np.floor(bottom + SLACK), height - 1.0)
         if left > right or top > bottom:
             continue
         for k in range(3):
@@ -467,17 +406,3 @@ def _draw(
                 w = low if w < low else (high if w > high else w)
                 depths[x] = w if w > before else before
                 triangles[x] = label if w > before else other
-
-
-@njit(cache=True, error_model="numpy")
-def resolve(inverse_depth: np.ndarray, triangle: np.ndarray, labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return depth (h, w) float32, +inf without a face, and the label of the visible face, ``labels[-1]`` for none."""
-    height, width = triangle.shape
-    depth, seen = np.empty((height, width), np.float32), np.empty((height, width), labels.dtype)
-    last = np.uint32(len(labels) - 1)
-    for y in range(height):
-        for x in range(width):
-            depth[y, x] = np.float32(1.0) / inverse_depth[y, x]
-        for x in range(width):
-            seen[y, x] = labels[min(np.uint32(triangle[y, x]), last)]  # as unsigned, -1 is the largest index
-    return depth, seen

@@ -7,17 +7,17 @@ scene and depends on nothing else, so it is the same in every process and for ev
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from simharness.capture.rendering.box_tree_kernels import build_tree
 from simharness.capture.rendering.light_kernels import DARK, direct_light, gathered, met, probe_light
 from simharness.capture.rendering.light_samples import Floats, LightSamples, light_samples
-from simharness.capture.rendering.ray_kernels import build_tree
-from simharness.capture.rendering.scene_topology import SceneTopology
+from simharness.capture.rendering.scene_topology import SceneTopology, same_meshes
+from simharness.capture.srgb import LUMINANCE
 from simharness.types.light_sources import LightSources
 from simharness.types.mesh import Mesh
 
@@ -35,8 +35,9 @@ _APART = 0.5  # metres between probes
 _MOST_PROBES = 6000  # beyond, they are farther apart
 _REACH = 15.0  # metres from the middle of the scene that probes cover at most
 _HIGHEST = 3.5  # metres
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709
+_LUMINANCE = np.array(LUMINANCE)
 _PEOPLE = (0.2, 1.9)  # metres: heights at which the exposure is measured
+_SPECK = 6.0  # times the mean radiance of all surfaces: what is brighter counts as much
 _KEPT = 2
 
 
@@ -91,7 +92,7 @@ def room_light(
         normals: normals of faces, (k, 3), and vertices, (v, 3).
     """
     for place, (known, meshes, light) in enumerate(_kept):
-        if known == sources and _same(meshes, topology.meshes):
+        if known == sources and same_meshes(meshes, topology.meshes):
             _kept.insert(0, _kept.pop(place))
             return light
     light = _computed(sources, topology, vertices, normals)
@@ -103,10 +104,6 @@ def room_light(
 def last_light(sources: LightSources) -> RoomLight | None:
     """Return the light that these sources gave last, for a picture of the same scene in a mirror."""
     return next((light for known, _, light in _kept if known == sources), None)
-
-
-def _same(one: Sequence[Mesh], other: Sequence[Mesh]) -> bool:
-    return len(one) == len(other) and all(a is b for a, b in zip(one, other, strict=True))
 
 
 def _computed(
@@ -136,7 +133,7 @@ def _computed(
         direct[inside], found[inside] = direct[nearest], found[nearest]
     light = direct
     for _ in range(_BOUNCES):
-        light = direct + gathered(found, _REFLECTED * samples.albedo * light[stands_for], sky)
+        light = direct + gathered(found, _reflected(samples, light[stands_for]), sky)
     everywhere = np.concatenate([samples.places, _TURN * samples.normals], axis=1)
     away, nearest = cKDTree(sites).query(everywhere, k=min(3, len(sites)))
     weight = (1 / (away.reshape(len(everywhere), -1) ** 2 + 1e-6)).astype(np.float32)[..., None]
@@ -145,6 +142,17 @@ def _computed(
     light, direct = ((weight * part[nearest]).sum(axis=1) / scale for part in (light, direct))
     light = direct + _smoothed(samples, light - direct)
     return _exposed(sources, samples, light, _probes(sources, samples, light, vertices, lights, sky, tree, surface))
+
+
+def _reflected(samples: LightSamples, light: Floats) -> Floats:
+    """Return the radiance (n, 3) of surfaces in a light (n, 3), without that of specks that are far brighter than most.
+
+    Few rays meet a speck, such as the sill of a window beside its light; it would show as streaks on the floor.
+    """
+    radiance = _REFLECTED * samples.albedo * light
+    bright = radiance @ np.array(_LUMINANCE, np.float32)
+    most = _SPECK * float(bright.mean()) / np.maximum(bright, 1e-9)
+    return np.asarray(radiance * np.minimum(most, 1.0)[:, None], np.float32)
 
 
 def _few(samples: LightSamples) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -175,13 +183,13 @@ def _exposed(sources: LightSources, samples: LightSamples, light: Floats, probes
     height = probes.origin[2] + probes.step[2] * np.arange(probes.every.shape[2])
     among = (height >= _PEOPLE[0]) & (height <= _PEOPLE[1])
     mean = probes.every[:, :, among if among.any() else slice(None)].mean(axis=(0, 1, 2, 3), dtype=float)
-    level = max(float(mean @ LUMINANCE), 1e-9)
+    level = max(float(mean @ _LUMINANCE), 1e-9)
     exposure = (sources.brightness / level * (level / np.maximum(mean, 1e-9)) ** sources.balance).astype(np.float32)
     exposed = Probes(
         probes.origin,
         probes.step,
         probes.every * exposure,
-        probes.straight * np.float32(exposure @ LUMINANCE),
+        probes.straight * np.float32(exposure @ _LUMINANCE),
         probes.shares,
     )
     return RoomLight(samples, light * exposure, exposed, exposure)
@@ -235,12 +243,12 @@ def _probes(
     places = (low + grid * step).reshape(-1, 3)
     ways = _sphere(_AIR_RAYS)
     found = met(places, np.zeros_like(places), ways, *tree, *surface)
-    every, straight, shares = probe_light(places, found, ways, _REFLECTED * samples.albedo * light, sky, *lights, *tree)
+    every, straight, shares = probe_light(places, found, ways, _reflected(samples, light), sky, *lights, *tree)
     inside = (found == DARK).mean(axis=1) > _INSIDE
     shape = tuple(counts)
     filled = [
         _filled(part.reshape(*shape, -1), inside.reshape(shape)).reshape(*shape, *part.shape[1:])
-        for part in (every, straight @ LUMINANCE.astype(np.float32), shares)
+        for part in (every, straight @ _LUMINANCE.astype(np.float32), shares)
     ]
     return Probes(low, step, *filled)
 

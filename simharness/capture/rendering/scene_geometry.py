@@ -8,7 +8,6 @@ depends on the vertices of meshes that stay where they are is in :class:`StillGe
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simharness.capture.rendering.face_kernels import casters, normals
-from simharness.capture.rendering.scene_topology import SceneTopology
+from simharness.capture.rendering.scene_topology import SceneTopology, same_meshes
 from simharness.capture.rendering.shadow_maps import LightView, ShadowMap, Shadows, shadow_map
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
@@ -35,7 +34,7 @@ class StillGeometry:
 
     def holds(self, meshes: Sequence[Mesh]) -> bool:
         """Return whether the still ones among ``meshes`` are these, in this order."""
-        return _same([mesh for mesh in meshes if mesh.still], self.meshes)
+        return same_meshes([mesh for mesh in meshes if mesh.still], self.meshes)
 
     @cached_property
     def topology(self) -> SceneTopology:
@@ -99,12 +98,12 @@ class SceneGeometry:
         still = tuple(mesh for mesh in ordered if mesh.still)
         if last is None:
             return cls(SceneTopology(ordered, tuple(order)), ordered, StillGeometry(still))
-        if tuple(order) == last.topology.order and _same(ordered, last.meshes):
+        if tuple(order) == last.topology.order and same_meshes(ordered, last.meshes):
             return last  # the same frozen objects: nothing changed
         return cls(
             last.topology if last.topology.matches(ordered, order) else SceneTopology(ordered, tuple(order)),
             ordered,
-            last.still if _same(still, last.still.meshes) else StillGeometry(still),
+            last.still if same_meshes(still, last.still.meshes) else StillGeometry(still),
         )
 
     @cached_property
@@ -161,8 +160,3 @@ class SceneGeometry:
 
 def _vertices(meshes: Iterable[Mesh]) -> Floats:
     return np.concatenate([np.zeros((0, 3), np.float32), *(mesh.vertices for mesh in meshes)])
-
-
-def _same(meshes: Sequence[Mesh], others: Sequence[Mesh]) -> bool:
-    """Return whether two lists hold the same frozen objects."""
-    return len(meshes) == len(others) and all(map(operator.is_, meshes, others))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from simharness.capture.rendering.shading_kernels import packed
+from simharness.capture.rendering.surface_kernels import packed
 from simharness.types.mesh import Mesh
 
 Floats = NDArray[np.float32]
@@ -54,6 +55,12 @@ class SceneTopology:
         """Faces of the other meshes, with indices into their vertices alone."""
         faces, vertices = self.still
         return self.faces[faces:] - np.uint32(vertices)
+
+    @cached_property
+    def moving_starts(self) -> NDArray[np.int64]:
+        """First vertex of each of the other meshes, and the end of all vertices, (moving meshes + 1,)."""
+        counts = [len(mesh.vertices) for mesh in self.meshes if not mesh.still]
+        return np.cumsum([self.still[1], *counts])
 
     @cached_property
     def mesh(self) -> NDArray[np.int16]:
@@ -154,3 +161,8 @@ def pyramid(texture: NDArray[np.uint8]) -> Iterator[NDArray[np.uint8]]:
             return
         size = (max(1, width // 2), max(1, height // 2))
         picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+
+
+def same_meshes(meshes: Sequence[Mesh], others: Sequence[Mesh]) -> bool:
+    """Return whether two lists hold the same frozen objects."""
+    return len(meshes) == len(others) and all(map(operator.is_, meshes, others))

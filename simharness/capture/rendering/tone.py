@@ -11,6 +11,9 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from simharness.capture.srgb import from_linear
 
 STEPS = 4096
 """Entries of :func:`table`."""
@@ -37,33 +40,23 @@ def _hable(x: ArrayLike) -> NDArray[np.float64]:
 @cache
 def _scale() -> float:
     """Return the factor before the curve that keeps middle grey."""
-    low, high = 0.0, 10.0
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if _hable(middle * _GREY) / _hable(_WHITE) < _GREY else (low, middle)
-    return low
-
-
-def srgb(linear: ArrayLike) -> NDArray[np.float64]:
-    """Return sRGB of linear values, 0 to 1 (IEC 61966-2-1)."""
-    linear = np.asarray(linear, float)
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
+    return float(brentq(lambda factor: float(_hable(factor * _GREY) / _hable(_WHITE)) - _GREY, 0.0, 10.0, xtol=1e-15))
 
 
 @cache
 def table() -> NDArray[np.uint8]:
     """Return the value of 8 bits of linear light x, at index ``sqrt(x / BRIGHTEST) (STEPS - 1)``, (``STEPS``,)."""
     light = BRIGHTEST * (np.arange(STEPS) / (STEPS - 1)) ** 2
-    return np.round(255 * srgb(tone(light))).astype(np.uint8)
+    return np.round(from_linear(tone(light))).astype(np.uint8)
 
 
 @cache
 def dimming() -> NDArray[np.uint8]:
     """Return what is left of a value of 8 bits at a share k / ``DIMMED`` of its light, (``DIMMED`` + 1, 256)."""
     light = np.linspace(0, np.sqrt(BRIGHTEST), 20_000) ** 2
-    shown = 255 * srgb(tone(light))
+    shown = from_linear(tone(light))
     inverse = np.interp(np.arange(256), shown, light)
     left = np.arange(DIMMED + 1)[:, None] / DIMMED * inverse
-    result = np.round(255 * srgb(tone(left))).astype(np.uint8)
+    result = np.round(from_linear(tone(left))).astype(np.uint8)
     result[DIMMED] = np.arange(256)
     return np.ascontiguousarray(result)

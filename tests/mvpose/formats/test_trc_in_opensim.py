@@ -19,7 +19,8 @@ def people():
 
 
 @pytest.mark.parametrize("unit", ["m", "mm"])
-def test_opensim_reads_markers_times_units_and_gaps(people, tmp_path, unit):
+def test_opensim_reads_markers_times_units_and_gaps(people, tmp_path, unit, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # where OpenSim writes its log
     opensim = pytest.importorskip("opensim", reason="OpenSim is not installed")
     write_people(people, tmp_path, formats=["trc"], options=Options(units=unit))
     file = str(tmp_path / "person_7.trc")

@@ -9,9 +9,10 @@ import pytest
 from mesh_shapes import ball, sheet
 from test_renderers import camera_at
 
-from simharness.capture.rendering.finish_kernels import finish, grain_of
+from simharness.capture.rendering.finish_kernels import FINISHING, finish, grain_of
 from simharness.capture.rendering.finishes import Finishes
 from simharness.capture.rendering.raster import RasterRenderer
+from simharness.capture.rendering.surface_kernels import NORMAL_X, NORMAL_Y, NORMAL_Z, PIXELS, memory
 from simharness.types.finish import Finish, Material
 from simharness.types.light_sources import AreaLight, LightSources
 from simharness.types.lighting import Lighting
@@ -66,17 +67,17 @@ def test_a_highlight_lies_where_the_normal_is_between_lamp_and_camera():
 
 def finished(normal, *, light, material=Material.SKIN, slope=0.0, view=(0.0, 0.0, 1.0)):
     """Factor of the received light (3,) and gloss of one pixel in the middle of a large picture."""
-    row, weights = np.zeros(1, np.int32), np.zeros((2, 1), np.float32)
+    pixel, narrow = np.zeros(1, np.int32), memory()[0]
+    narrow[[NORMAL_X, NORMAL_Y, NORMAL_Z]] = normal
     x, y, z = view
     rays = np.array([[1e-9, 0, -x], [0, 1e-9, -y], [0, 0, -z]])
-    received, gloss = np.ones((3, 1), np.float32), np.zeros(1, np.float32)
-    grain = np.tile(np.array([1, 0, 0, slope], np.float32), (3, 1))
-    finish(
-        row, 0, 0, 1, 0, np.array([[0, 1, 2]], np.uint32), 0, rays, np.array(normal, np.float32).reshape(3, 1), weights,
-        np.array([material], np.int8), np.zeros(1, np.int16), np.array([light], np.float32), np.zeros(1, np.float32),
-        grain, np.zeros(3, np.float32), 0.6, np.zeros((5, 1), np.float32), received, gloss,
+    received, grain = np.ones(3 * PIXELS, np.float32), np.tile(np.array([1, 0, 0, slope], np.float32), (3, 1))
+    gloss = finish(
+        pixel, pixel, pixel, 0, np.array([[0, 1, 2]], np.uint32), 0, rays, narrow, np.array([material], np.int8),
+        np.zeros(1, np.int16), np.array([light], np.float32), np.zeros(1, np.float32), grain, np.zeros(3, np.float32),
+        0.6, np.zeros(FINISHING, np.float32), received,
     )  # fmt: skip
-    return received[:, 0], gloss[0]
+    return received[::PIXELS], gloss[0]
 
 
 def test_gloss_is_that_of_a_ggx_lobe():

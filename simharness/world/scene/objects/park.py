@@ -6,14 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from mvpose.arrays import Floats
-from simharness.types.mesh import Mesh
 from simharness.world.scene.objects.belongings import DARK, STEEL, put_backpack, put_bottle, put_papers
+from simharness.world.scene.objects.foliage import crown, leaf_color, put_tree, sprays
 from simharness.world.scene.objects.furnishing import Furnishing
-from simharness.world.scene.objects.shapes import loft
 
 _TIMBER, _STONE = np.array([0.52, 0.38, 0.26]), np.array([0.66, 0.65, 0.62])
-_GREENS = np.array([[0.30, 0.44, 0.20], [0.24, 0.38, 0.18], [0.38, 0.48, 0.22], [0.28, 0.42, 0.26]])
 
 
 def park_bench(f: Furnishing, rng: np.random.Generator) -> None:
@@ -37,38 +34,26 @@ def park_bench(f: Furnishing, rng: np.random.Generator) -> None:
 
 def planter(f: Furnishing, rng: np.random.Generator) -> None:
     """Draw a stone planter with a clipped shrub."""
-    side, green = rng.uniform(0.6, 0.9), _GREENS[rng.integers(len(_GREENS))]
+    side, color = rng.uniform(0.6, 0.9), leaf_color(rng)
     f.block((-side / 2, -side / 2, 0.0), (side / 2, side / 2, 0.45), _STONE * rng.uniform(0.8, 1.05), "fabric")
     f.block((-side / 2 - 0.02, -side / 2 - 0.02, 0.45), (side / 2 + 0.02, side / 2 + 0.02, 0.50), 0.95 * _STONE)
-    f.part(
-        _crown(rng, (0.55 * side, 0.55 * side, rng.uniform(0.35, 0.5)), np.minimum(1.7 * green, 1)),
-        "leaves",
-        center=(0, 0, 0.75),
-    )
+    half = (0.52 * side, 0.52 * side, rng.uniform(0.35, 0.5))
+    f.part(crown(rng, half, color), "leaves", center=(0, 0, 0.75))
+    f.part(sprays(rng, half, color, 260, 0.04), "leaves", center=(0, 0, 0.75))
 
 
 def hedge(f: Furnishing, rng: np.random.Generator) -> None:
     """Draw a clipped hedge."""
-    long, tall = rng.uniform(1.6, 2.6), rng.uniform(0.8, 1.2)
-    color = np.minimum(1.7 * _GREENS[rng.integers(len(_GREENS))], 1)
-    f.part(_crown(rng, (0.34, long / 2, tall / 2), color, box=5.0), "leaves", center=(0, 0, tall / 2 - 0.02))
+    long, tall, color = rng.uniform(1.6, 2.6), rng.uniform(0.8, 1.2), leaf_color(rng)
+    half, center = (0.34, long / 2, tall / 2), (0, 0, tall / 2 - 0.02)
+    f.part(crown(rng, half, color, box=5.0), "leaves", center=center)
+    f.part(sprays(rng, half, color, 520, 0.035, box=5.0), "leaves", center=center)
 
 
 def small_tree(f: Furnishing, rng: np.random.Generator) -> None:
-    """Draw a young tree with a stake and a round crown."""
-    tall, reach = rng.uniform(1.7, 2.1), rng.uniform(0.55, 0.75)
-    color = np.minimum(1.7 * _GREENS[rng.integers(len(_GREENS))], 1)
-    f.turned([(0, 0), (0.06, 0), (0.045, 0.3), (0.035, tall), (0, tall)], (0.34, 0.27, 0.21), "wood", sides=9)
-    f.bar((0.12, 0.1, 0.0), (0.10, 0.08, 1.3), 0.025, _TIMBER, "wood", sides=6)
-    for _ in range(4):
-        turn, up = rng.uniform(0, 6), rng.uniform(0.0, 0.6)
-        place = 0.3 * np.array([np.cos(turn), np.sin(turn)])
-        f.part(
-            _crown(rng, (0.6 * reach, 0.6 * reach, 0.5 * reach), color * rng.uniform(0.85, 1.0)),
-            "leaves",
-            center=(*place, tall + up),
-        )
-    f.part(_crown(rng, (0.8 * reach, 0.8 * reach, 0.8 * reach), color), "leaves", center=(0, 0, tall + 0.35))
+    """Draw a young tree with a stake."""
+    put_tree(f, rng, rng.uniform(2.9, 3.6), leaves=110, rows=8, sides=12)
+    f.bar((0.16, 0.1, 0.0), (0.12, 0.08, 1.2), 0.025, _TIMBER, "wood", sides=6)
 
 
 def litter_bin(f: Furnishing, rng: np.random.Generator) -> None:
@@ -124,18 +109,3 @@ def lamp_post(f: Furnishing, rng: np.random.Generator) -> None:
     f.turned(profile, color, sides=14)
     f.turned([(0, 2.6), (0.07, 2.62), (0.11, 2.85), (0, 2.86)], (0.93, 0.91, 0.84), sides=14)
     f.turned([(0, 2.86), (0.15, 2.86), (0.04, 2.97), (0, 2.98)], color, sides=14)
-
-
-def _crown(rng: np.random.Generator, half: tuple[float, float, float], color: Floats, box: float = 2.0) -> Mesh:
-    """Return foliage: a superellipsoid with bumps; ``box`` is its exponent, 2 for an ellipsoid."""
-    rows, sides = 9, 16
-    up, turn = np.linspace(-np.pi / 2, np.pi / 2, rows), 2 * np.pi * np.arange(sides) / sides
-    c, s = np.cos(turn), np.sin(turn)
-    round_ = np.column_stack([np.sign(c) * np.abs(c) ** (2 / box), np.sign(s) * np.abs(s) ** (2 / box)])
-    ring = np.maximum(np.cos(up), 0.0) ** (2 / box)
-    ring[[0, -1]] = 0.0
-    bumps = 1 + rng.uniform(-0.12, 0.12, (rows, sides))
-    heights = np.sign(np.sin(up)) * np.abs(np.sin(up)) ** (2 / box)
-    flat = ring[:, None, None] * bumps[..., None] * round_ * half[:2]
-    rings = np.concatenate([flat, np.broadcast_to((heights * half[2])[:, None, None], (rows, sides, 1))], axis=2)
-    return loft(rings, color)

@@ -98,7 +98,7 @@ def _window(f: Furnishing, opening: Opening, color: np.ndarray) -> None:
     f.block((-deep, a - 0.01, low - 0.02), (face, a, high + 0.01), plaster)
     f.block((-deep, b, low - 0.02), (face, b + 0.01, high + 0.01), plaster)
     f.block((-deep, a, high), (face, b, high + 0.01), plaster)
-    f.block((-deep, a - 0.04, low - 0.03), (0.02, b + 0.04, low), 0.94 * _WHITE)
+    f.block((-deep, a - 0.04, low - 0.03), (-0.003, b + 0.04, low), 0.94 * _WHITE)
     x0, x1 = -deep, -deep + 0.06
     for y0, y1 in ((a, a + rim), (b - rim, b)):
         f.block((x0, y0, low), (x1, y1, high), color)

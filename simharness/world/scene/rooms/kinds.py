@@ -80,7 +80,7 @@ ROOM_KINDS: Mapping[str, RoomKind] = MappingProxyType(
             prints=(("whiteboard", 1.9, 1.0), ("clock", 0.30, 0.30), *_NOTICES, *_POSTERS),
         ),
         "living_room": RoomKind(
-            floors=("parquet", "wood", "carpet"),
+            floors=("parquet", "wood"),
             walls=("wallpaper", "tinted", "tinted", "stripes"),
             furniture=(
                 Furniture("sofa", home.sofa, (1, 1)),

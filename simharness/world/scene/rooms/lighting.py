@@ -13,6 +13,7 @@ from simharness.types.light_sources import AreaLight, LightSources, Sun, Vector
 from simharness.types.lighting import Lighting
 from simharness.types.random_streams import stream
 from simharness.world.scene.rooms.lamps import MOODS, Mood, ceiling_lamps, wall_windows
+from simharness.world.scene.rooms.open_air import open_air, view_outside
 
 LIGHTS: Mapping[str, Lighting] = MappingProxyType(
     {
@@ -48,11 +49,14 @@ def room_lighting(room: Room, seed: int, areas: Sequence[AreaLight] | None = Non
             lighting is in closed form.
     """
     name, light = _named(room, seed)
+    if room.kind == "outdoors":
+        return open_air(name, light, seed)
     if not areas:
         return light
     mood = MOODS[name]
     sun = None if mood.sun is None else replace(mood.sun, direction=_towards(light.direction, mood.sun))
-    return replace(light, sources=LightSources(tuple(areas), sun, brightness=mood.brightness))
+    sources = LightSources(tuple(areas), sun, brightness=mood.brightness)
+    return replace(light, sources=sources, panorama=view_outside(name, light, seed, mood.window))
 
 
 def room_areas(room: Room, seed: int) -> tuple[AreaLight, ...]:

@@ -23,6 +23,7 @@ from simharness.world.scene.rooms.finish import Finish
 from simharness.world.scene.rooms.kinds import settled
 from simharness.world.scene.rooms.lighting import room_lighting
 from simharness.world.scene.rooms.openings import Opening
+from simharness.world.scene.rooms.surroundings import AROUND
 from simharness.world.scene.rooms.textures import FLOORS, WALLS
 from simharness.world.scene.rooms.walls import Wall, walls_of
 
@@ -31,7 +32,6 @@ Choice = TypeVar("Choice")
 _ANY = 4  # finishes from which "any" is drawn: the first of each list
 _CELL = 1.0  # metres: approximate cell size of the grids of floor and walls
 _THICK = 0.1  # metres: thickness of floor and walls as solids, outside the room
-_AROUND = 4.0  # metres of ground around an open floor
 _RIM = 0.25  # metres: approximate cell size of that ground, which fades into the background
 # Opposite walls share a tone, so that corners are visible and pictures show the direction of view.
 _TONES = {"x": (0.93, 0.97, 1.0), "y": (1.0, 0.98, 0.93)}
@@ -49,6 +49,8 @@ def make_room(room: Room, seed: int, openings: Sequence[Opening] = ()) -> tuple[
     finish = _chosen(FLOORS, room.floor, rng)(rng)
     slab = Box((0.0, 0.0, -_THICK / 2), (x, y, _THICK / 2))
     floor = Solid("room", "floor", _floor(x, y, finish), (slab,), slab)
+    if room.kind == "outdoors":
+        return floor, _open_ground(x, y, finish)
     if not room.walls:
         return floor, _ground(room, seed, finish)
     rng = stream(seed, "room", "wall")
@@ -104,8 +106,8 @@ def _ground(room: Room, seed: int, finish: Finish) -> Solid:
     light = room_lighting(room, seed)
     shown = np.array(light.background) / np.sqrt((light.key * light.direction[2] + light.sky) * np.array(light.tint))
     mean = finish.texture.reshape(-1, 3).mean(axis=0) / 255
-    steps = round(_AROUND / _RIM)
-    rings = np.stack([_outline(half + _AROUND * k / steps) for k in range(steps + 1)])
+    steps = round(AROUND / _RIM)
+    rings = np.stack([_outline(half + AROUND * k / steps) for k in range(steps + 1)])
     sides = rings.shape[1]
     k = np.arange(sides)
     after = (k + 1) % sides
@@ -117,7 +119,22 @@ def _ground(room: Room, seed: int, finish: Finish) -> Solid:
     )
     fade = np.repeat(((np.arange(steps) + 1) / steps) ** 1.5, sides)[:, None]
     mesh = quad_mesh(rings.reshape(-1, 3), quads, (1 - fade) * mean + fade * np.clip(shown, 0, 1))
-    slab = Box((0.0, 0.0, -_THICK / 2), (float(half[0] + _AROUND), float(half[1] + _AROUND), _THICK / 2))
+    slab = Box((0.0, 0.0, -_THICK / 2), (float(half[0] + AROUND), float(half[1] + AROUND), _THICK / 2))
+    return Solid("room", "ground", mesh, (slab,), slab)
+
+
+def _open_ground(x: float, y: float, finish: Finish) -> Solid:
+    """Return the ground around a floor outdoors, which goes on like the floor."""
+    columns, rows = (
+        _cut(np.concatenate([_ticks(-half - AROUND, -half, _CELL), _ticks(-half, half, _CELL),
+                             _ticks(half, half + AROUND, _CELL)]), ())
+        for half in (x, y)
+    )  # fmt: skip
+    grid = np.stack([*np.meshgrid(columns, rows, indexing="ij"), np.zeros((len(columns), len(rows)))], axis=-1)
+    middles = (grid[:-1, :-1, :2] + grid[1:, 1:, :2]) / 2
+    beside: Bools = np.any(np.abs(middles) > (x, y), axis=-1)
+    mesh = _textured_grid(grid, grid[..., :2], finish, (1.0, 1.0, 1.0), beside)
+    slab = Box((0.0, 0.0, -_THICK / 2), (x + AROUND, y + AROUND, _THICK / 2))
     return Solid("room", "ground", mesh, (slab,), slab)
 
 

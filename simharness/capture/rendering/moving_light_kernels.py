@@ -1,0 +1,161 @@
+"""Compiled kernels of the light on moving bodies: private, on plain arrays, single-threaded.
+
+It is that of the room, at probes in the air, less what bodies keep from each other (see
+:mod:`simharness.capture.rendering.capsule_kernels`).
+"""
+
+# ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mvpose.kernels import njit
+from simharness.capture.rendering.capsule_kernels import enclose, hide
+from simharness.capture.srgb import LUMINANCE
+
+_CHUNK = 512  # samples processed together
+_LEVELS = 6  # heights at which the light of the room is taken for a body
+_RED, _GREEN, _BLUE = LUMINANCE
+
+
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+def light_at(
+    origin: np.ndarray, step: np.ndarray, values: np.ndarray, x: float, y: float, z: float, out: np.ndarray
+) -> None:
+    """Write the values (c,) of a grid (nx, ny, nz, c) at a place, by trilinear interpolation; at its border outside."""
+    out[:] = 0.0
+    u = min(max((x - origin[0]) / step[0], 0.0), values.shape[0] - 1.001)
+    v = min(max((y - origin[1]) / step[1], 0.0), values.shape[1] - 1.001)
+    w = min(max((z - origin[2]) / step[2], 0.0), values.shape[2] - 1.001)
+    i, j, k = int(u), int(v), int(w)
+    u, v, w = u - i, v - j, w - k
+    for n in range(8):
+        di, dj, dk = n & 1, (n >> 1) & 1, n >> 2
+        weight = (u if di else 1.0 - u) * (v if dj else 1.0 - v) * (w if dk else 1.0 - w)
+        if weight <= 0:
+            continue
+        for c in range(len(out)):
+            out[c] += weight * values[i + di, j + dj, k + dk, c]
+
+
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+def moving_light(
+    vertices: np.ndarray,
+    face_normals: np.ndarray,
+    vertex_normals: np.ndarray,
+    of_vertex: np.ndarray,
+    of_face: np.ndarray,
+    spans: np.ndarray,
+    bodies: np.ndarray,
+    ranges: np.ndarray,
+    origin: np.ndarray,
+    step: np.ndarray,
+    every: np.ndarray,
+    straight: np.ndarray,
+) -> np.ndarray:
+    """Return the irradiance (n, 3) at the light samples of moving meshes.
+
+    The light of the room is taken along the axis of each mesh, upright through its middle; what the mesh itself and
+    others nearby keep from it, at every sample.
+
+    Args:
+        vertices: vertices of the moving meshes, (v, 3).
+        face_normals: unit normals of their faces, (k, 3).
+        vertex_normals: unit normals of the vertices, (v, 3).
+        of_vertex: vertex of each sample, (n,).
+        of_face: face whose normal a sample has, or -1 for that of its vertex, (n,).
+        spans: first and end of the samples of each mesh, (meshes, 2).
+        bodies: capsules, (c, 7).
+        ranges: first and end of the capsules of each mesh, (meshes, 2).
+        origin: origin of the probes, (3,).
+        step: distances of the probes, (3,).
+        every: light of all sources at the probes by the six directions, (nx, ny, nz, 18).
+        straight: luminance of what comes straight from area lights and sun, (nx, ny, nz, 6).
+    """
+    light = np.zeros((len(of_vertex), 3), np.float32)
+    column, direct = np.empty((_LEVELS, 18)), np.empty((_LEVELS, 6))
+    ways = np.empty((_LEVELS, 4))
+    place, normal = np.empty((3, _CHUNK), np.float32), np.empty((3, _CHUNK), np.float32)
+    way, wide, far = np.empty((3, _CHUNK), np.float32), np.empty(_CHUNK, np.float32), np.empty(_CHUNK, np.float32)
+    seen, around = np.empty(_CHUNK, np.float32), np.empty(_CHUNK, np.float32)
+    for mesh in range(len(spans)):
+        first, end = spans[mesh, 0], spans[mesh, 1]
+        if first == end:
+            continue
+        low = np.full(3, np.inf)
+        high = np.full(3, -np.inf)
+        for s in range(first, end):
+            for c in range(3):
+                value = np.float64(vertices[of_vertex[s], c])
+                low[c], high[c] = min(low[c], value), max(high[c], value)
+        mid_x, mid_y = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
+        rise = max(high[2] - low[2], 1e-3) / (_LEVELS - 1)
+        for n in range(_LEVELS):
+            z = low[2] + n * rise
+            light_at(origin, step, every, mid_x, mid_y, z, column[n])
+            light_at(origin, step, straight, mid_x, mid_y, z, direct[n])
+            # Direction and spread of the direct light: sources all around cancel.
+            dx, dy, dz = direct[n, 0] - direct[n, 1], direct[n, 2] - direct[n, 3], direct[n, 4] - direct[n, 5]
+            length = math.sqrt(dx * dx + dy * dy + dz * dz)
+            whole = 1e-6
+            for axis in range(6):
+                whole += direct[n, axis]
+            if length > 1e-6:
+                ways[n, 0], ways[n, 1], ways[n, 2] = dx / length, dy / length, dz / length
+            else:
+                ways[n, 0], ways[n, 1], ways[n, 2] = 0.0, 0.0, 1.0
+            ways[n, 3] = min(max(0.9 - 0.8 * length / whole, 0.15), 0.7)
+        # The capsules of this body and of others that are near.
+        near, count = np.empty(len(bodies), np.int64), 0
+        for k in range(len(bodies)):
+            radius = bodies[k, 6]
+            own = ranges[mesh, 0] <= k < ranges[mesh, 1]
+            if radius <= 0:
+                continue
+            px, py = bodies[k, 0] + 0.5 * bodies[k, 3], bodies[k, 1] + 0.5 * bodies[k, 4]
+            if own or max(low[0] - px, px - high[0], low[1] - py, py - high[1]) < 0.6:
+                near[count] = k
+                count += 1
+        for start in range(first, end, _CHUNK):
+            size = min(end - start, _CHUNK)
+            for s in range(size):
+                i, f = of_vertex[start + s], of_face[start + s]
+                place[0, s], place[1, s], place[2, s] = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+                for c in range(3):
+                    normal[c, s] = vertex_normals[i, c] if f < 0 else face_normals[f, c]
+                at = (np.float64(place[2, s]) - low[2]) / rise
+                n = min(int(at), _LEVELS - 2)
+                at -= n
+                lx, ly = (1.0 - at) * ways[n, 0] + at * ways[n + 1, 0], (1.0 - at) * ways[n, 1] + at * ways[n + 1, 1]
+                lz = (1.0 - at) * ways[n, 2] + at * ways[n + 1, 2]
+                length = 1.0 / math.sqrt(lx * lx + ly * ly + lz * lz + 1e-12)
+                way[0, s], way[1, s], way[2, s] = length * lx, length * ly, length * lz
+                wide[s] = (1.0 - at) * ways[n, 3] + at * ways[n + 1, 3]
+                far[s], seen[s], around[s] = 3.0, 1.0, 1.0
+            for c in range(count):
+                enclose(bodies[near[c]], place, normal, around[:size])
+                hide(bodies[near[c]], place, way, wide, far, seen[:size])
+            for s in range(size):
+                nx, ny, nz = normal[0, s], normal[1, s], normal[2, s]
+                at = (np.float64(place[2, s]) - low[2]) / rise
+                n = min(int(at), _LEVELS - 2)
+                at -= n
+                one, two, three = (0 if nx >= 0 else 1), (2 if ny >= 0 else 3), (4 if nz >= 0 else 5)
+                xx, yy, zz = nx * nx, ny * ny, nz * nz
+                part = (1.0 - at) * (xx * direct[n, one] + yy * direct[n, two] + zz * direct[n, three])
+                part += at * (xx * direct[n + 1, one] + yy * direct[n + 1, two] + zz * direct[n + 1, three])
+                whole = 1e-9
+                for c in range(3):
+                    i, j, k = 3 * one + c, 3 * two + c, 3 * three + c
+                    value = (1.0 - at) * (xx * column[n, i] + yy * column[n, j] + zz * column[n, k])
+                    value += at * (xx * column[n + 1, i] + yy * column[n + 1, j] + zz * column[n + 1, k])
+                    light[start + s, c] = value
+                    whole += value * (_RED if c == 0 else (_GREEN if c == 1 else _BLUE))
+                share = min(part / whole, 1.0)
+                factor = np.float32(share * seen[s] + (1.0 - share) * around[s])
+                for c in range(3):
+                    light[start + s, c] *= factor
+    return light
