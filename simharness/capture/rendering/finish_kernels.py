@@ -367,7 +367,9 @@ def _strands_over(
         away = _UNIT - min(max((nx * vx + ny * vy + nz * vz) * scale, _ZERO), _UNIT)
         away *= away
         lit = _UNIT + _STREAKS * tilt[n]
-        gloss[n] = lit * share * _PRIMARY * sine * sine + (_UNIT - share) * (_DULL + _DULL * away * away)
+        # Where hair has no direction, as at its edges, it has no highlight.
+        known = min(np.float32(4.0) * square, _UNIT)
+        gloss[n] = lit * known * share * _PRIMARY * sine * sine + (_UNIT - share) * (_DULL + _DULL * away * away)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
@@ -398,7 +400,8 @@ def _strands_through(
         sine = max(sine, _ZERO)
         sine *= sine
         sine *= sine
-        tone[n] = (_UNIT + _STREAKS * tilt[n]) * (_UNIT + _SECONDARY * share * sine * sine)
+        known = min(np.float32(4.0) * square, _UNIT)
+        tone[n] = (_UNIT + _STREAKS * tilt[n]) * (_UNIT + _SECONDARY * known * share * sine * sine)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
