@@ -38,25 +38,26 @@ _ZERO, _UNIT, _HALF, _TINY = np.float32(0.0), np.float32(1.0), np.float32(0.5), 
 _PRIMARY, _SECONDARY, _STREAKS = np.float32(0.10), np.float32(1.1), np.float32(0.22)
 _SHIFT, _RAGGED = np.float32(0.09), np.float32(0.12)  # tilt of the highlights, and its change between strands
 _DULL = np.float32(0.012)  # share of even light that hair reflects
-_MOST_TINT = np.float32(1.22)  # by light that went through skin: in a cast shadow there is none
+_MOST_TINT = np.float32(0.22)  # by light that went through skin: in a cast shadow there is none
+_OF_GREEN, _OF_BLUE = np.float32(0.38), np.float32(0.2)  # share of it in green and blue light
 
-# Reflectance at normal incidence, roughness, and wrap of red, green and blue. Skin: Weyrich et al., "Analysis of human
+# Reflectance at normal incidence, roughness, and wrap of red light. Skin: Weyrich et al., "Analysis of human
 # faces", 2006 (roughness 0.3 to 0.45, refractive index 1.4); hair and leather: refractive index 1.55 and 1.5.
 _SURFACES = {
-    Material.SKIN: (0.028, 0.45, 0.14, 0.05, 0.03),
-    Material.HAIR: (0.046, 0.60, 0.0, 0.0, 0.0),
-    Material.CLOTH: (0.02, 0.95, 0.0, 0.0, 0.0),
-    Material.LEATHER: (0.04, 0.50, 0.0, 0.0, 0.0),
-    Material.PLASTIC: (0.045, 0.28, 0.0, 0.0, 0.0),
-    Material.EYE: (0.035, 0.16, 0.0, 0.0, 0.0),
-    Material.METAL: (0.60, 0.30, 0.0, 0.0, 0.0),
+    Material.SKIN: (0.028, 0.45, 0.14),
+    Material.HAIR: (0.046, 0.60, 0.0),
+    Material.CLOTH: (0.02, 0.95, 0.0),
+    Material.LEATHER: (0.04, 0.50, 0.0),
+    Material.PLASTIC: (0.045, 0.28, 0.0),
+    Material.EYE: (0.035, 0.16, 0.0),
+    Material.METAL: (0.60, 0.30, 0.0),
 }
 _MATTE, _HAIR, _CLOTH = int(Material.MATTE), int(Material.HAIR), int(Material.CLOTH)
 
 
 def _surface_table() -> np.ndarray:
-    """Return reflectance, roughness and wraps by material, (materials, 5) float32."""
-    table = np.zeros((len(Material), 5), np.float32)
+    """Return reflectance, roughness and wrap by material, (materials, 3) float32."""
+    table = np.zeros((len(Material), 3), np.float32)
     for material, row in _SURFACES.items():
         table[material] = row
     return table
@@ -261,8 +262,13 @@ def finish(
         else:
             _lobe(normals, lights[m], rays, start, y, _TABLE[kind], gloss[span])
             if _TABLE[kind, 2] > _ZERO:
-                for k in range(3):
-                    _tint(normals, lights[m], _TABLE[kind, 2 + k], received[k, span])
+                _tint(normals, lights[m], _TABLE[kind, 2], tone[span])
+                red, green, blue = received[0], received[1], received[2]
+                for x in range(start, end):
+                    more = tone[x]
+                    red[x] += more * red[x]
+                    green[x] += _OF_GREEN * more * green[x]
+                    blue[x] += _OF_BLUE * more * blue[x]
             continue
         for k in range(3):
             lit = received[k]
@@ -301,15 +307,15 @@ def _lobe(
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _tint(normal: np.ndarray, light: np.ndarray, wrap: np.float32, received: np.ndarray) -> None:
-    """Multiply the light of one colour (n,) by what reaches farther through skin than over it, in place."""
+def _tint(normal: np.ndarray, light: np.ndarray, wrap: np.float32, more: np.ndarray) -> None:
+    """Write by which share there is more red light on skin (n,), since it reaches farther through skin than over it."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
     normal_x, normal_y, normal_z, scale = normal[0], normal[1], normal[2], _UNIT / (_UNIT + wrap)
-    for n in range(len(received)):
+    for n in range(len(more)):
         nz = normal_z[n]
         cosine = normal_x[n] * light_x + normal_y[n] * light_y + nz * light_z
-        even, wrapped = rest + rise * nz + _TINY, max((cosine + wrap) * scale, _ZERO)
-        received[n] *= min((even + key * wrapped) / (even + key * max(cosine, _ZERO)), _MOST_TINT)
+        plain, wrapped = max(cosine, _ZERO), max((cosine + wrap) * scale, _ZERO)
+        more[n] = min(key * (wrapped - plain) / (rest + rise * nz + key * plain + _TINY), _MOST_TINT)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
