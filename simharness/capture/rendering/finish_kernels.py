@@ -33,32 +33,33 @@ _HEIGHT = 0.75  # share of a figure's height at which its light is taken
 _FOLD_PERIOD, _FOLD_STEPS = 0.36, 256  # metres and entries of the profile of folds
 _HAIR_STEPS = 512
 _SLACK = 0.02  # share of its length by which cloth shortens without a fold
-_DEPTH, _DEEPEST = 1.1, 0.6  # slope of folds for each unit of shortening beyond it, and at most
-_EVER = 0.05  # slope of folds of loose cloth at rest
+_DEPTH, _DEEPEST = 1.3, 0.65  # slope of folds for each unit of shortening beyond it, and at most
+_EVER = 0.07  # slope of folds of loose cloth at rest
 _LEAST = np.float32(0.012)  # slope of folds that cannot be seen
 _ZERO, _UNIT, _HALF, _TINY = np.float32(0.0), np.float32(1.0), np.float32(0.5), np.float32(1e-6)
-_PRIMARY, _SECONDARY, _STREAKS = np.float32(0.10), np.float32(1.1), np.float32(0.22)
+_PRIMARY, _SECONDARY, _STREAKS = np.float32(0.07), np.float32(0.9), np.float32(0.22)
 _SHIFT, _RAGGED = np.float32(0.09), np.float32(0.12)  # tilt of the highlights, and its change between strands
 _DULL = np.float32(0.012)  # share of even light that hair reflects
-_MOST_TINT = np.float32(1.22)  # by light that went through skin: in a cast shadow there is none
+_MOST_TINT = np.float32(0.22)  # by light that went through skin: in a cast shadow there is none
+_TINTS = (np.float32(1.0), np.float32(0.38), np.float32(0.2))  # shares of it in red, green and blue light
 
-# Reflectance at normal incidence, roughness, and wrap of red, green and blue. Skin: Weyrich et al., "Analysis of human
+# Reflectance at normal incidence, roughness, and wrap of red light. Skin: Weyrich et al., "Analysis of human
 # faces", 2006 (roughness 0.3 to 0.45, refractive index 1.4); hair and leather: refractive index 1.55 and 1.5.
 _SURFACES = {
-    Material.SKIN: (0.028, 0.45, 0.14, 0.05, 0.03),
-    Material.HAIR: (0.046, 0.60, 0.0, 0.0, 0.0),
-    Material.CLOTH: (0.02, 0.95, 0.0, 0.0, 0.0),
-    Material.LEATHER: (0.04, 0.50, 0.0, 0.0, 0.0),
-    Material.PLASTIC: (0.045, 0.28, 0.0, 0.0, 0.0),
-    Material.EYE: (0.035, 0.16, 0.0, 0.0, 0.0),
-    Material.METAL: (0.60, 0.30, 0.0, 0.0, 0.0),
+    Material.SKIN: (0.028, 0.45, 0.14),
+    Material.HAIR: (0.046, 0.60, 0.0),
+    Material.CLOTH: (0.02, 0.95, 0.0),
+    Material.LEATHER: (0.04, 0.50, 0.0),
+    Material.PLASTIC: (0.045, 0.28, 0.0),
+    Material.EYE: (0.035, 0.16, 0.0),
+    Material.METAL: (0.60, 0.30, 0.0),
 }
 _MATTE, _HAIR, _CLOTH = int(Material.MATTE), int(Material.HAIR), int(Material.CLOTH)
 
 
 def _surface_table() -> np.ndarray:
-    """Return reflectance, roughness and wraps by material, (materials, 5) float32."""
-    table = np.zeros((len(Material), 5), np.float32)
+    """Return reflectance, roughness and wrap by material, (materials, 3) float32."""
+    table = np.zeros((len(Material), 3), np.float32)
     for material, row in _SURFACES.items():
         table[material] = row
     return table
@@ -257,8 +258,12 @@ def finish(
         else:
             _lobe(narrow, work, start, end, lights[m], _TABLE[kind])
             if _TABLE[kind, 2] > _ZERO:
+                _tint(narrow, work, start, end, lights[m], _TABLE[kind, 2])
+                more = work[_TONE + start : _TONE + end]
                 for k in range(3):
-                    _tint(narrow, start, end, lights[m], _TABLE[kind, 2 + k], received[k * PIXELS : (k + 1) * PIXELS])
+                    lit, part = received[k * PIXELS + start : k * PIXELS + end], _TINTS[k]
+                    for n in range(len(more)):
+                        lit[n] += part * more[n] * lit[n]
             continue
         tone = work[_TONE + start : _TONE + end]
         for k in range(3):
@@ -319,19 +324,19 @@ def _lobe(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _tint(narrow: np.ndarray, first: int, last: int, light: np.ndarray, wrap: np.float32, received: np.ndarray) -> None:
-    """Multiply the light of one colour by what reaches farther through skin than over it, in place."""
+def _tint(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray, wrap: np.float32) -> None:
+    """Write to ``_TONE`` by which share there is more red light on skin: it reaches farther through than over it."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
     normal_x, normal_y, normal_z = (
         narrow[NORMAL_X + first : NORMAL_X + last], narrow[NORMAL_Y + first : NORMAL_Y + last],
         narrow[NORMAL_Z + first : NORMAL_Z + last],
     )  # fmt: skip
-    lit, scale = received[first:last], _UNIT / (_UNIT + wrap)
-    for n in range(len(lit)):
+    more, scale = work[_TONE + first : _TONE + last], _UNIT / (_UNIT + wrap)
+    for n in range(len(more)):
         nz = normal_z[n]
         cosine = normal_x[n] * light_x + normal_y[n] * light_y + nz * light_z
-        even, wrapped = rest + rise * nz + _TINY, max((cosine + wrap) * scale, _ZERO)
-        lit[n] *= min((even + key * wrapped) / (even + key * max(cosine, _ZERO)), _MOST_TINT)
+        plain, wrapped = max(cosine, _ZERO), max((cosine + wrap) * scale, _ZERO)
+        more[n] = min(key * (wrapped - plain) / (rest + rise * nz + key * plain + _TINY), _MOST_TINT)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
@@ -402,7 +407,10 @@ def _strands_over(narrow: np.ndarray, work: np.ndarray, first: int, last: int, l
         away = _UNIT - min(max(nx * vx + ny * vy + nz * vz, _ZERO), _UNIT)
         away *= away
         lit = _UNIT + _STREAKS * tilt[n]
-        gloss[n] = (lit * share * _PRIMARY * sine * sine + (_UNIT - share) * (_DULL + _DULL * away * away)) / tone[n]
+        # Where hair has no direction, as at its edges, it has no highlight.
+        known = min(np.float32(4.0) * square, _UNIT)
+        spot = lit * known * share * _PRIMARY * sine * sine
+        gloss[n] = (spot + (_UNIT - share) * (_DULL + _DULL * away * away)) / tone[n]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
@@ -438,4 +446,5 @@ def _strands_through(narrow: np.ndarray, work: np.ndarray, first: int, last: int
         sine = max(sine, _ZERO)
         sine *= sine
         sine *= sine
-        tone[n] = (_UNIT + _STREAKS * tilt[n]) * (_UNIT + _SECONDARY * share * sine * sine)
+        known = min(np.float32(4.0) * square, _UNIT)
+        tone[n] = (_UNIT + _STREAKS * tilt[n]) * (_UNIT + _SECONDARY * known * share * sine * sine)
