@@ -57,6 +57,11 @@ class MovingSamples:
     group: NDArray[np.int32]
     ranges: NDArray[np.int64]
 
+    @cached_property
+    def divisions(self) -> NDArray[np.int32]:
+        """Divisions of the faces, (k,): none, unlike those of still meshes."""
+        return np.ones(len(self.corner_samples), np.int32)
+
     @classmethod
     def of(cls, meshes: tuple[Mesh, ...]) -> MovingSamples:
         """Return the samples of meshes in the order of their faces and vertices."""
@@ -225,10 +230,9 @@ class LitScene:
         fill_empty(rgb, triangle < 0, self.lighting, rays, self.room.exposure)
         still, samples, grid = self.geometry.still, self.room.samples, Grid.of(self.room)
         if len(still.topology.faces):
-            emission = still.topology.emission * self.room.exposure
             seen = whole(*triangle.shape), triangle, background.corners
             self._shade(
-                still.topology, seen, still.normals, rays, emission, self.room.light,
+                still.topology, seen, still.normals, rays, self.room.exposure, self.room.light,
                 samples.corner_samples, samples.divisions, 0, rgb,
             )  # fmt: skip
         block, (rows, columns) = BLOCK * grid.cell, grid.blocks
@@ -258,11 +262,9 @@ class LitScene:
                 inverse_depth, lit.runs, camera.center, rays, grid.corner, grid.cell,
                 shadows.fine, shadows.coarse, _HEIGHTS, shadows.touched, tone.dimming(), rgb,
             )  # fmt: skip
-        emission = topology.emission[first:] * self.room.exposure
-        divisions = np.ones(len(samples.corner_samples), np.int32)
         self._shade(
-            topology, (spans, triangle, corners), self.geometry.normals, rays, emission, self.moving_light,
-            samples.corner_samples, divisions, first, rgb,
+            topology, (spans, triangle, corners), self.geometry.normals, rays, self.room.exposure, self.moving_light,
+            samples.corner_samples, samples.divisions, first, rgb,
         )  # fmt: skip
         return rgb
 
@@ -272,7 +274,7 @@ class LitScene:
         seen: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]],
         normals: tuple[Floats, Floats],
         rays: NDArray[np.float64],
-        emission: Floats,
+        exposure: Floats,
         light: Floats,
         corner_samples: NDArray[np.int32],
         divisions: NDArray[np.int32],
@@ -281,8 +283,8 @@ class LitScene:
     ) -> None:
         shade_lit(
             *seen, topology.faces, topology.colors, topology.smooth, *normals, topology.texture, topology.uv,
-            *topology.pyramids, rays, emission, light, corner_samples, divisions, first, tone.table(),
-            tone.BRIGHTEST, rgb,
+            *topology.pyramids, rays, topology.emission[first:], exposure, light, corner_samples, divisions, first,
+            tone.table(), tone.BRIGHTEST, rgb,
         )  # fmt: skip
 
 
