@@ -20,6 +20,16 @@ def number_views(view: Integers) -> Integers:
 
 
 @njit(cache=True)
+def chosen_pairs(pairs, chosen):
+    """Return the rows and columns of a matrix (m, m) for chosen detections (k,), in their order, (k, k)."""
+    result = np.empty((len(chosen), len(chosen)))
+    for i in range(len(chosen)):
+        for j in range(len(chosen)):
+            result[i, j] = pairs[chosen[i], chosen[j]]
+    return result
+
+
+@njit(cache=True)
 def restored_pairs(pairs, chosen, count):
     """Return a matrix of chosen detections (k, k) as one of all detections (count, count), 1 on the diagonal."""
     result = np.eye(count)

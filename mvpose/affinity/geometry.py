@@ -76,8 +76,7 @@ class GeometricAffinity:
             rays.view, rays.origins, rays.directions, rays.weights, self.nearest, self.saturation,
             self.widest * self.threshold, max(self.least_joints, 1), False,
         )  # fmt: skip
-        factor = min(max(misfit(rays.view, distance) / _EXPLAINED, 1.0), self.widest) if self.widest > 1.0 else 1.0
-        _to_affinity(distance, factor * self.midpoint, factor * self.slope, factor * self.threshold)
+        _to_affinity(distance, rays.view, self.midpoint, self.slope, self.threshold, self.widest)
         return distance
 
 
@@ -113,27 +112,34 @@ def misfit(view, distance):
         view: camera of each detection, (m,).
         distance: distances between detections, (m, m), metres; infinite where they are not compared.
     """
-    order, start = group_by_view(view)
-    distances, count = np.empty(len(view) * len(start)), 0
+    m, (order, start) = len(view), group_by_view(view)
+    distances, count = np.empty(m * len(start)), 0
+    near, row_least, column_least = np.empty(m, np.int64), np.empty(m), np.empty(m)
     for p in range(len(start) - 2):
         for q in range(p + 1, len(start) - 1):
+            for b in range(start[q], start[q + 1]):
+                column_least[b] = np.inf
             for a in range(start[p], start[p + 1]):
-                i, near = order[a], -1
-                for b in range(start[q], start[q + 1]):
-                    if distance[i, order[b]] < (distance[i, near] if near >= 0 else np.inf):
-                        near = order[b]
-                mutual = near >= 0
-                for c in range(start[p], start[p + 1]):
-                    mutual = mutual and (c == a or distance[near, order[c]] >= distance[near, i])
-                if mutual:
-                    distances[count] = distance[i, near]
+                i, nearest, least = order[a], start[q], np.inf
+                for b in range(start[q], start[q + 1]):  # no branches, because half of them would be mispredicted
+                    value = distance[i, order[b]]
+                    column_least[b] = value if value < column_least[b] else column_least[b]
+                    nearest = b if value < least else nearest
+                    least = value if value < least else least
+                near[a], row_least[a] = nearest, least
+            for a in range(start[p], start[p + 1]):
+                if column_least[near[a]] == row_least[a] < np.inf:
+                    distances[count] = row_least[a]
                     count += 1
-    return np.sort(distances[:count])[int(_QUANTILE * count)] if count >= _LEAST_PAIRS else 0.0
+    rank = int(_QUANTILE * count)
+    return np.partition(distances[:count], rank)[rank] if count >= _LEAST_PAIRS else 0.0
 
 
 @njit(cache=True)
-def _to_affinity(distance, midpoint, slope, threshold):
-    """Replace distances by affinities, in place."""
+def _to_affinity(distance, view, midpoint, slope, threshold, widest):
+    """Replace distances by affinities, in place, at the scale of the frame."""
+    factor = min(max(misfit(view, distance) / _EXPLAINED, 1.0), widest) if widest > 1.0 else 1.0
+    midpoint, slope, threshold = factor * midpoint, factor * slope, factor * threshold
     m = len(distance)
     for i in range(m):
         distance[i, i] = 0.0

@@ -15,6 +15,7 @@ from mvpose.matching import admm
 from mvpose.matching.assignment import match_view_pairs
 from mvpose.matching.clustering import cluster, contract
 from mvpose.matching.rounding import number_people, read_only, round_to_people
+from mvpose.ordering import chosen_pairs, restored_pairs
 
 __all__ = ["Matcher", "match", "objective"]
 
@@ -53,10 +54,9 @@ class Matcher:
             matched = match_view_pairs(affinity, view, alpha=self.alpha)
             return self._matching(round_to_people(matched, view, threshold=self.alpha), affinity)
         order = np.argsort(view, kind="stable")
-        back = np.argsort(order, kind="stable")
         parts = contract(affinity, view, alpha=self.alpha)
-        relaxed = admm.solve(affinity[order[:, None], order], view[order], parts=parts[order], alpha=self.alpha)
-        P = relaxed.P[back[:, None], back]
+        relaxed = admm.solve(chosen_pairs(affinity, order), view[order], parts=parts[order], alpha=self.alpha)
+        P = restored_pairs(relaxed.P, order, len(order))
         return self._matching(
             round_to_people(P, view),
             affinity,

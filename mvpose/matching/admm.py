@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 from mvpose.kernels import njit
 from mvpose.matching.projection import block_starts, project_block
+from mvpose.matching.rounding import read_only
 from mvpose.threads import one_thread
 
 _BALANCE = 10.0  # ratio of residuals beyond which rho changes (Boyd et al. 2011, section 3.4.1)
@@ -96,20 +97,36 @@ def solve(
     Returns:
         The relaxed P, and the state of the solver at the end.
     """
-    m, starts = len(view), block_starts(view)
-    gain = np.where(view[:, None] == view, 0.0, affinity - alpha)
-    if m == 0:
-        return Relaxation(gain, gain, 0, (0.0, 0.0), True, gain, weight)
-    parts = np.arange(m) if parts is None else np.asarray(parts)
-    P = (parts[:, None] == parts).astype(np.float64)
-    edges = np.maximum(gain, 0.0)
-    S = np.diag((_WITHIN * P * edges).sum(axis=1)) - np.where(P > 0, _WITHIN, _BETWEEN) * edges
+    view = read_only(view, np.int64)
+    parts = np.arange(len(view)) if parts is None else parts
+    starts = block_starts(view)
+    gain, P, S, held = _start(read_only(affinity, np.float64), view, read_only(parts, np.int64), float(alpha))
+    if len(view) == 0:
+        return Relaxation(P, S, 0, (0.0, 0.0), True, gain, weight)
+    np.fill_diagonal(S, held.sum(axis=1))
     with one_thread():
-        iterations, primal, dual = _iterate(P, S, gain, starts, weight, rho, tolerance, most_iterations)
+        iterations, primal, dual = _iterate(P, S, gain, held, starts, weight, rho, tolerance, most_iterations)
+    Y = np.subtract(0.0, S, out=S)
+    Y.ravel()[:: len(view) + 1] += weight
     _fill_lower(P)
-    _fill_lower(S)
-    converged = primal < tolerance and dual < tolerance
-    return Relaxation(P, weight * np.eye(m) - S, iterations, (primal, dual), converged, gain, weight)
+    _fill_lower(Y)
+    return Relaxation(P, Y, iterations, (primal, dual), primal < tolerance and dual < tolerance, gain, weight)
+
+
+@njit(cache=True)
+def _start(affinity, view, parts, alpha):
+    """Return the gains, the initial P, the initial S without its diagonal, and its gains within parts, (m, m) each."""
+    m = len(view)
+    gain, P, S, held = np.empty((m, m)), np.empty((m, m)), np.empty((m, m)), np.empty((m, m))
+    for i in range(m):
+        for j in range(m):
+            within = parts[i] == parts[j]
+            gain[i, j] = affinity[i, j] - alpha if view[i] != view[j] else 0.0
+            edge = gain[i, j] if gain[i, j] > 0.0 else 0.0
+            P[i, j] = 1.0 if within else 0.0
+            S[i, j] = 0.0 - (_WITHIN if within else _BETWEEN) * edge
+            held[i, j] = _WITHIN * edge if within else 0.0
+    return gain, P, S, held
 
 
 @njit(cache=True, borrows=True)
@@ -124,14 +141,18 @@ def _iterate(
     P: Floats,
     S: Floats,
     gain: Floats,
+    Z: Floats,
     starts: NDArray[np.int64],
     weight: float,
     rho: float,
     tolerance: float,
     most_iterations: int,
 ) -> tuple[int, float, float]:
-    """Run Algorithm 1 on the upper triangles of P and S, in place; return the iterations and both residuals."""
-    Z, prices = np.zeros_like(P), np.zeros((len(starts), len(P)))
+    """Run Algorithm 1 on the upper triangles of P and S, in place; return the iterations and both residuals.
+
+    Z, (m, m), is working memory: to fill pages that are new to the process takes longer than the arithmetic on them.
+    """
+    prices = np.zeros((len(starts), len(P)))
     primal, dual, moved, iteration, positive = np.inf, np.inf, np.inf, 0, 0
     while iteration < most_iterations and (primal >= tolerance or dual >= tolerance):
         iteration += 1
@@ -157,13 +178,16 @@ def _positive_part(Z: Floats, expected: int, *, single: bool) -> tuple[Floats, i
     solve_part, solve_all = (lapack.ssyevr, lapack.ssyevd) if single else (lapack.dsyevr, lapack.dsyevd)
     requested, complete = expected + max(_SPARE, expected // 8), False
     while expected and not complete and _FEW * requested < m:
-        values, vectors, found, _, info = solve_part(Z.T.astype(kind), range="I", il=m - requested + 1, iu=m, lower=1)
+        copy = Z.T.astype(kind)
+        values, vectors, found, _, info = solve_part(
+            copy, range="I", il=m - requested + 1, iu=m, lower=1, overwrite_a=1
+        )
         values, complete, requested = values[:found], info == 0 and values[0] <= 0.0, 2 * requested
     if not complete:
-        values, vectors, info = solve_all(Z.T.astype(kind), lower=1)
+        values, vectors, info = solve_all(Z.T.astype(kind), lower=1, overwrite_a=1)
         if info:
             values, vectors = np.linalg.eigh(Z, UPLO="U")
-    positive = int((values > 0.0).sum())
+    positive = int(np.count_nonzero(values > 0.0))
     root = vectors[:, len(values) - positive : len(values)] * np.sqrt(values[len(values) - positive :])
     return (root @ root.T).astype(np.float64, copy=False), positive
 

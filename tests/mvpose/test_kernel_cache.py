@@ -1,5 +1,6 @@
 """Cache of compiled kernels: never stale, never damaged, shared by processes, and free of old entries."""
 
+import gc
 import importlib
 import json
 import os
@@ -409,3 +410,32 @@ print(json.dumps(Pipeline.preset("full").estimate(rig, seen).joints.tolist()))
     (after,) = processes(1, code, tmp_path, NUMBA_CACHE_DIR="")
     assert len(before) == 1
     assert np.shape(after) != np.shape(before) or not np.allclose(after, before, atol=1e-3)
+
+
+class _CollectorDuring(numba.core.event.Listener):
+    """Whether the collector of cyclic garbage ran at the start of each compilation."""
+
+    def __init__(self):
+        self.enabled = []
+
+    def on_start(self, event):
+        self.enabled.append(gc.isenabled())
+
+    def on_end(self, event):
+        pass
+
+
+def test_the_collector_of_garbage_rests_during_compilation_alone(toy):
+    during = _CollectorDuring()
+    with numba.core.event.install_listener("numba:compile", during):
+        assert toy.start().outer(5.0) == VALUE
+    assert during.enabled
+    assert not any(during.enabled)
+    assert gc.isenabled()
+
+
+def test_the_collector_of_garbage_runs_again_after_an_error():
+    kernel = njit(lambda x: x + "text")
+    with pytest.raises(numba.TypingError):
+        kernel(1.0)
+    assert gc.isenabled()

@@ -14,8 +14,9 @@ from mvpose.kernels import njit
 
 _ZERO, _UNIT, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _FLOOR = np.float32(0.02)  # metres: what is lower is the floor
-_PIXELS = 64  # processed together
-_U, _V, _Z, _LEFT = (_PIXELS * row for row in range(4))  # rows of memory, which the compiler knows to be apart
+_PIXELS = 128  # processed together
+# Rows of memory, which the compiler knows to be apart.
+_U, _V, _Z, _LEFT, _ONE, _TWO, _THREE, _FOUR, _MEMORY = (_PIXELS * row for row in range(9))
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
@@ -107,13 +108,14 @@ def dim(
         dimming: see :func:`.tone.dimming`.
         rgb: picture to change, (h, w, 3) uint8.
     """
-    steps, full = np.float32(len(dimming) - 1), len(dimming) - 1
+    steps = np.float32(len(dimming) - 1)
     per_cell, levels = np.float32(1.0 / cell), len(heights)
     rise_x, rise_y, rise_z = np.float32(rays[0, 0]), np.float32(rays[1, 0]), np.float32(rays[2, 0])
     from_x, from_y = np.float32(center[0] - origin[0]), np.float32(center[1] - origin[1])
     from_z = np.float32(center[2])
-    work, near, k = np.zeros(4 * _PIXELS, np.float32), np.ones(_PIXELS, np.float32), 0
-    lines = np.zeros(_PIXELS, np.int32)
+    work, near, whole, k = np.zeros(_MEMORY, np.float32), np.ones(_PIXELS, np.float32), np.zeros(_PIXELS, np.int32), 0
+    floor, colors, shades = fine.reshape(-1), rgb.reshape(-1), dimming.reshape(-1)
+    rows, columns, width = np.int32(fine.shape[0]), np.int32(fine.shape[1]), rgb.shape[1]
     while k < len(runs):
         y, begin, end, on_floor = runs[k, 0], runs[k, 1], runs[k, 2], runs[k, 4]
         dark = touched[runs[k, 3]]
@@ -129,15 +131,15 @@ def dim(
         ray_z = np.float32(rays[2, 1] * y + rays[2, 2])
         for start in range(begin, end, _PIXELS):
             size = min(end - start, _PIXELS)
-            near[:size] = inverse_depth[y, start : start + size]
+            for n in range(size):
+                near[n] = inverse_depth[y, start + n]
             for n in range(_PIXELS):
                 far, column = _UNIT / near[n], np.float32(start + n)
                 work[_U + n] = (from_x + far * (rise_x * column + ray_x)) * per_cell
                 work[_V + n] = (from_y + far * (rise_y * column + ray_y)) * per_cell
                 work[_Z + n] = from_z + far * (rise_z * column + ray_z)
             if on_floor:
-                for n in range(size):
-                    work[_LEFT + n] = _between(fine, work[_U + n] - _HALF, work[_V + n] - _HALF)
+                _left_on_floor(floor, rows, columns, size, work, whole)
             else:
                 for n in range(size):
                     z, level = work[_Z + n], 0
@@ -149,12 +151,46 @@ def dim(
                     left = _between(coarse[level], u, v)
                     work[_LEFT + n] = left + share * (_between(coarse[level + 1], u, v) - left)
             for n in range(_PIXELS):
-                lines[n] = np.int32(work[_LEFT + n] * steps + _HALF)
+                whole[n] = np.int32(work[_LEFT + n] * steps + _HALF)
+            pixels = colors[3 * (y * width + start) : 3 * (y * width + start + size)]
             for n in range(size):
-                row = lines[n]
-                if row < full:
-                    values, shades = rgb[y, start + n], dimming[row]
-                    values[0], values[1], values[2] = shades[values[0]], shades[values[1]], shades[values[2]]
+                row, red = np.uint32(whole[n]) << np.uint32(8), np.uint32(3 * n)
+                green, blue = red + np.uint32(1), red + np.uint32(2)
+                pixels[red] = shades[row | np.uint32(pixels[red])]
+                pixels[green] = shades[row | np.uint32(pixels[green])]
+                pixels[blue] = shades[row | np.uint32(pixels[blue])]
+
+
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+def _left_on_floor(
+    floor: np.ndarray, rows: np.int32, columns: np.int32, size: int, work: np.ndarray, cells: np.ndarray
+) -> None:
+    """Write the share of the light that is left on the floor, by bilinear interpolation, as :func:`_between`.
+
+    Args:
+        floor: map of the floor, (rows * columns,).
+        rows: its rows.
+        columns: its columns.
+        size: number of pixels.
+        work: rows of memory; columns and rows of places on the map in units of cells are read, and overwritten.
+        cells: memory for one index of each pixel.
+    """
+    right, bottom = np.float32(columns - 1.001), np.float32(rows - 1.001)
+    for n in range(_PIXELS):
+        u = min(max(work[_U + n] - _HALF, _ZERO), right)
+        v = min(max(work[_V + n] - _HALF, _ZERO), bottom)
+        i, j = np.int32(u), np.int32(v)
+        cells[n] = j * columns + i
+        work[_U + n], work[_V + n] = u - np.float32(i), v - np.float32(j)
+    for n in range(size):
+        at, below = np.uint32(cells[n]), np.uint32(cells[n] + columns)
+        work[_ONE + n], work[_TWO + n] = floor[at], floor[at + np.uint32(1)]
+        work[_THREE + n], work[_FOUR + n] = floor[below], floor[below + np.uint32(1)]
+    for n in range(_PIXELS):
+        u, one, two = work[_U + n], work[_ONE + n], work[_THREE + n]
+        one += u * (work[_TWO + n] - one)
+        two += u * (work[_FOUR + n] - two)
+        work[_LEFT + n] = one + work[_V + n] * (two - one)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"}, inline="always")

@@ -36,6 +36,7 @@ def shade_lit(
     pyramids: np.ndarray,
     rays: np.ndarray,
     emission: np.ndarray,
+    exposure: np.ndarray,
     light: np.ndarray,
     corner_samples: np.ndarray,
     divisions: np.ndarray,
@@ -69,6 +70,7 @@ def shade_lit(
         pyramids: levels of all textures.
         rays: rays of the pixels.
         emission: radiance of the faces from ``first_face`` on, times which the albedo is shown, (m, 3).
+        exposure: factor on it, (3,) float32.
         light: irradiance at the light samples, (n, 3) float32.
         corner_samples: samples of the faces from ``first_face`` on, (m, 3); see :class:`.light_samples.LightSamples`.
         divisions: divisions of these faces, (m,).
@@ -107,7 +109,7 @@ def shade_lit(
                 labels[chunk], columns[chunk], lines[chunk], q, faces, colors, smooth, face_normals, vertex_normals,
                 texture, uv, texels, pyramids, narrow, wide, exact, level,
             )  # fmt: skip
-            _receive(labels[chunk], narrow, emission, light, corner_samples, divisions, first_face, received)
+            _receive(labels[chunk], narrow, emission, exposure, light, corner_samples, divisions, first_face, received)
             if len(material):
                 gloss = finish(
                     labels[chunk], columns[chunk], lines[chunk], first_face, faces, first_vertex, rays, narrow,
@@ -135,6 +137,7 @@ def _receive(
     labels: np.ndarray,
     narrow: np.ndarray,
     emission: np.ndarray,
+    exposure: np.ndarray,
     light: np.ndarray,
     corner_samples: np.ndarray,
     divisions: np.ndarray,
@@ -157,7 +160,7 @@ def _receive(
         received[_SHARES + n], received[_SHARES + PIXELS + n] = second, third
         for color in range(3):
             one, row = light[a, color], color * PIXELS + n
-            received[row] = one + emission[f, color]
+            received[row] = one + emission[f, color] * exposure[color]
             received[_TO_SECOND + row], received[_TO_THIRD + row] = light[b, color] - one, light[c, color] - one
     for row in range(0, 3 * PIXELS, PIXELS):
         for n in range(PIXELS):

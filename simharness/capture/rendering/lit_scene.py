@@ -59,6 +59,11 @@ class MovingSamples:
     group: NDArray[np.int32]
     ranges: NDArray[np.int64]
 
+    @cached_property
+    def divisions(self) -> NDArray[np.int32]:
+        """Divisions of the faces, (k,): none, unlike those of still meshes."""
+        return np.ones(len(self.corner_samples), np.int32)
+
     @classmethod
     def of(cls, meshes: tuple[Mesh, ...]) -> MovingSamples:
         """Return the samples of meshes in the order of their faces and vertices."""
@@ -239,10 +244,9 @@ class LitScene:
         fill_empty(rgb, triangle < 0, self.lighting, rays, self.room.exposure)
         still, samples, grid = self.geometry.still, self.room.samples, Grid.of(self.room)
         if len(still.topology.faces):
-            emission = still.topology.emission * self.room.exposure
             seen = whole(*triangle.shape), triangle, background.corners
             self._shade(
-                still.topology, seen, still.normals, rays, emission, self.room.light,
+                still.topology, seen, still.normals, rays, self.room.exposure, self.room.light,
                 samples.corner_samples, samples.divisions, (0, 0), MATTE, rgb,
             )  # fmt: skip
         block, (rows, columns) = BLOCK * grid.cell, grid.blocks
@@ -272,11 +276,10 @@ class LitScene:
                 inverse_depth, lit.runs, camera.center, rays, grid.corner, grid.cell,
                 shadows.fine, shadows.coarse, _HEIGHTS, shadows.touched, tone.dimming(), rgb,
             )  # fmt: skip
-        emission = topology.emission[first:] * self.room.exposure
-        divisions, finishes = np.ones(len(samples.corner_samples), np.int32), self._finishes
+        finishes = self._finishes
         self._shade(
-            topology, (spans, triangle, corners), self.geometry.normals, rays, emission, self.moving_light,
-            samples.corner_samples, divisions, topology.still, MATTE if finishes is None else
+            topology, (spans, triangle, corners), self.geometry.normals, rays, self.room.exposure, self.moving_light,
+            samples.corner_samples, samples.divisions, topology.still, MATTE if finishes is None else
             finishes.arguments(camera, rays), rgb,
         )  # fmt: skip
         return rgb
@@ -287,7 +290,7 @@ class LitScene:
         seen: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]],
         normals: tuple[Floats, Floats],
         rays: NDArray[np.float64],
-        emission: Floats,
+        exposure: Floats,
         light: Floats,
         corner_samples: NDArray[np.int32],
         divisions: NDArray[np.int32],
@@ -297,7 +300,8 @@ class LitScene:
     ) -> None:
         shade_lit(
             *seen, topology.faces, topology.colors, topology.smooth, *normals, topology.texture, topology.uv,
-            *topology.pyramids, rays, emission, light, corner_samples, divisions, *first, *finish,
+            *topology.pyramids, rays, topology.emission[first[0] :], exposure, light, corner_samples, divisions,
+            *first, *finish,
             tone.table(), tone.BRIGHTEST, rgb,
         )  # fmt: skip
 

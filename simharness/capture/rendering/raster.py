@@ -96,12 +96,14 @@ def _picture(scene: _Scene, camera: Camera, color: bool, lighting: Lighting, par
     corners, seen, codes = project_vertices(
         geometry.vertices, projection_matrix(camera), NEAR, background.corners, width, height
     )
-    rays, rgb = _rays(camera), np.zeros((height, width, 3), np.uint8)
+    rays = background.rays
     sources = LitScene.of(geometry, lighting) if color else None
     if sources is not None:
         lit = sources.background(background, camera, rays)
     elif color:
         lit = _lit(background, geometry, camera, lighting)
+    else:
+        rgb = np.zeros((height, width, 3), np.uint8)
     depth, ids = background.depth.copy(), _ids(background, topology.mesh).copy()
     spans = covering_spans(codes, topology.moving_starts, height, width)
     hidden = lifted(spans, inverse_depth, triangle)
@@ -114,7 +116,7 @@ def _picture(scene: _Scene, camera: Camera, color: bool, lighting: Lighting, par
         elif color:
             rgb, moving = lit.rgb.copy(), geometry.shadows(lighting).moving
             drawn = triangle, inverse_depth, corners
-            _shade(geometry, camera, lighting, *drawn, moving, lit.shadow_place, lit.shadow_depth, first, rgb)
+            _shade(geometry, camera, rays, lighting, *drawn, moving, lit.shadow_place, lit.shadow_depth, first, rgb)
     finally:
         put_back(spans, *hidden, inverse_depth, triangle)
     return Image(rgb=rgb, depth=depth, ids=ids, parts=labels)
@@ -131,7 +133,8 @@ def _background(scene: _Scene, camera: Camera) -> Background:
         corners = rasterise(still.vertices, faces, projection, NEAR, inverse_depth, triangle, NOTHING_DRAWN, 0)
         depth, labels, ids = np.empty(shape, np.float32), scene.geometry.topology.mesh, np.empty(shape, np.int16)
         resolve(whole(*shape), inverse_depth, triangle, labels, depth, ids)
-        found = Background(inverse_depth, triangle, corners, depth, labels, ids)
+        rays = np.ascontiguousarray(np.linalg.inv(projection[:, :3]))
+        found = Background(rays, inverse_depth, triangle, corners, depth, labels, ids)
         scene.backgrounds.keep(projection, camera.size, found)
     return found
 
@@ -148,9 +151,9 @@ def _lit(background: Background, geometry: SceneGeometry, camera: Camera, lighti
     shadows, seen = geometry.shadows(lighting), (background.triangle, background.inverse_depth)
     if background.lit is None or background.lit.lighting != lighting or background.lit.light != shadows.light:
         rgb = np.empty((*background.triangle.shape, 3), np.uint8)
-        fill_empty(rgb, background.triangle < 0, lighting, _rays(camera))
-        place, depth = shadow_places(*seen, camera.center, _rays(camera), shadows.light.P, SHADOW_SIZE)
-        _shade(geometry, camera, lighting, *seen, background.corners, NO_SHADOW, place, depth, 0, rgb)
+        fill_empty(rgb, background.triangle < 0, lighting, background.rays)
+        place, depth = shadow_places(*seen, camera.center, background.rays, shadows.light.P, SHADOW_SIZE)
+        _shade(geometry, camera, background.rays, lighting, *seen, background.corners, NO_SHADOW, place, depth, 0, rgb)
         background.lit = LitBackground(lighting, shadows.light, rgb, place, depth, np.zeros((0, 5), np.int32))
     return background.lit
 
@@ -158,6 +161,7 @@ def _lit(background: Background, geometry: SceneGeometry, camera: Camera, lighti
 def _shade(
     geometry: SceneGeometry,
     camera: Camera,
+    rays: NDArray[np.float64],
     lighting: Lighting,
     triangle: NDArray[np.int32],
     inverse_depth: NDArray[np.float32],
@@ -184,7 +188,7 @@ def _shade(
         topology.uv,
         *topology.pyramids,
         camera.center,
-        _rays(camera),
+        rays,
         np.array(lighting.direction),
         np.array([lighting.key, lighting.sky, lighting.fill]),
         255 * np.sqrt(lighting.tint),  # sRGB is about the square root of linear light
@@ -199,8 +203,3 @@ def _shade(
         first_face,
         rgb,
     )
-
-
-def _rays(camera: Camera) -> NDArray[np.float64]:
-    """Return the matrix, (3, 3), such that ``center + depth * matrix @ (x, y, 1)`` is the point at a pixel."""
-    return np.ascontiguousarray(np.linalg.inv(projection_matrix(camera)[:, :3]))

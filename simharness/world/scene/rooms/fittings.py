@@ -8,6 +8,7 @@ wall nowhere.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,11 +19,13 @@ from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.materials import draw_sheet
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.kinds import ROOM_KINDS
+from simharness.world.scene.rooms.lighting import mood_of
 from simharness.world.scene.rooms.openings import Opening
 from simharness.world.scene.rooms.walls import Wall, walls_of
 
 REVEAL = 0.16  # metres: depth of the opening of a window, from the inner face of the wall to the glass
 DEEPEST = 0.09  # metres that a fitting may stand out from its wall
+_GLOW = 0.07  # radiance of white reveals and frames by the daylight from outside, as a share of that of the window
 _SOCKETS = 2.6  # metres between sockets
 _WHITE, _DARK, _STEEL = np.array([0.90, 0.90, 0.88]), np.array([0.16, 0.16, 0.17]), np.array([0.66, 0.67, 0.69])
 _LEAVES = np.array([[0.84, 0.83, 0.80], [0.62, 0.48, 0.34], [0.55, 0.60, 0.64], [0.72, 0.60, 0.44]])
@@ -30,7 +33,7 @@ _FRAMES = np.array([[0.90, 0.90, 0.88], [0.90, 0.90, 0.88], [0.36, 0.37, 0.39], 
 
 
 def make_fittings(room: Room, seed: int, openings: Sequence[Opening], solids: Sequence[Solid]) -> tuple[Solid, ...]:
-    """Return the fittings of a room as one solid without geoms; none without walls, or behind the curtains of a stage.
+    """Return the fittings of a room as solids without geoms; none without walls, or behind the curtains of a stage.
 
     Args:
         room: room with a drawn kind.
@@ -42,14 +45,14 @@ def make_fittings(room: Room, seed: int, openings: Sequence[Opening], solids: Se
         return ()
     sheet, rng = draw_sheet(seed), stream(seed, "room", "fittings")
     frame, leaf = _FRAMES[rng.integers(len(_FRAMES))], _LEAVES[rng.integers(len(_LEAVES))]
-    made = Furnishing(sheet)
+    made, frames = Furnishing(sheet), Furnishing(sheet)
     for number, wall in enumerate(walls_of(room)):
-        local = Furnishing(sheet)  # x into the room, y along the wall, z up
+        local, openings_here = Furnishing(sheet), Furnishing(sheet)  # x into the room, y along the wall, z up
         taken = _taken(wall, solids)
         for opening in openings:
             if opening.wall == wall:
                 if opening.kind == "window":
-                    _window(local, opening, frame)
+                    _window(openings_here, opening, frame)
                     _radiator(local, opening, taken)
                 else:
                     _door(local, opening, leaf)
@@ -60,8 +63,13 @@ def make_fittings(room: Room, seed: int, openings: Sequence[Opening], solids: Se
         _sockets(local, wall, taken)
         if local.parts:
             made.group(local, (*wall.left, 0.0), wall.yaw)
-    mesh = made.mesh()
-    return (Solid("room", "fittings", mesh, (), Box.around(mesh.vertices)),)
+        if openings_here.parts:
+            frames.group(openings_here, (*wall.left, 0.0), wall.yaw)
+    glow = _GLOW * np.array(mood_of(room, seed).window)
+    meshes = {"fittings": made.mesh()} if made.parts else {}
+    if frames.parts:
+        meshes["window frames"] = replace(frames.mesh(), emission=(float(glow[0]), float(glow[1]), float(glow[2])))
+    return tuple(Solid("room", name, mesh, (), Box.around(mesh.vertices)) for name, mesh in meshes.items())
 
 
 Taken = list[tuple[float, float, float, float]]  # left, right, lower and upper edge of parts of a wall
@@ -155,7 +163,7 @@ def _prints(f: Furnishing, room: Room, rng: np.random.Generator, wall: Wall, tak
     """Hang prints on a wall where it is free: each by chance, framed if it is a picture."""
     for name, width, height in ROOM_KINDS[room.kind].prints:
         chance, tries, shade = rng.uniform(), rng.uniform(size=8), rng.uniform()
-        if chance < (0.55 if name in ("whiteboard", "clock") else 0.4):
+        if chance < (0.55 if name in ("whiteboard", "clock") else 0.25):
             continue
         low = {"whiteboard": 0.95, "clock": 2.05}.get(name, 1.5 - height / 2)
         for share in tries:

@@ -27,6 +27,7 @@ WHITE = 2.5
 LOWEST = float(np.radians(-40.0))
 """Elevation of the lower edge, radians."""
 _WIDTH = 4096  # pixels around the horizon: 0.09 degrees each
+_SMOOTH = 4  # pixels of the sky along each side of one in which its radiance without clouds is computed
 _COARSER = 2  # pixels of the picture along each side of one of the sky
 _EYE = 2.0  # metres above the ground
 _SIGHT = 1500.0  # metres after which haze leaves a share of 1 / e of a colour: it makes distances felt
@@ -51,11 +52,14 @@ def panorama(seed: int, weather: Weather, ground: Vector) -> Panorama:
 def draw_panorama(seed: int, weather: Weather, ground: Vector) -> NDArray[np.uint8]:
     """Draw the picture of a panorama: see :func:`panorama`."""
     rows = round(_WIDTH / (2 * np.pi) * (np.pi / 2 - LOWEST))
-    sky, horizon = _sky(stream(seed, "room", "clouds"), weather, (rows // _COARSER, _WIDTH // _COARSER))
+    above = _WIDTH // 4 + _COARSER  # rows above the horizon, with a few below
+    sky, horizon = _sky(stream(seed, "room", "clouds"), weather, (above // _COARSER, _WIDTH // _COARSER))
     rng = stream(seed, "room", "landscape")
-    picture = cv2.resize(sky, (_WIDTH, rows), interpolation=cv2.INTER_LINEAR)
-    picture += rng.uniform(-0.5, 0.5, picture.shape[:2]).astype(np.float32)[..., None]  # no steps in smooth colours
-    view = _View(np.clip(np.round(picture), 0, 255).astype(np.uint8), weather, horizon)
+    fine: NDArray[np.float32] = np.asarray(cv2.resize(sky, (_WIDTH, above)), np.float32)
+    fine = fine + rng.uniform(0.0, 1.0, (_WIDTH, above)).astype(np.float32).T[..., None]  # no steps in smooth colours
+    picture = np.zeros((rows, _WIDTH, 3), np.uint8)
+    picture[:above] = np.clip(fine, 0, 255)
+    view = _View(picture, weather, horizon)
     _hills(view, rng)
     _ground(view, rng, ground)
     _woods(view, rng)
@@ -70,8 +74,10 @@ def draw_panorama(seed: int, weather: Weather, ground: Vector) -> NDArray[np.uin
 
 def _sky(rng: np.random.Generator, weather: Weather, shape: tuple[int, int]) -> tuple[NDArray[np.float32], Floats]:
     """Return the sky, sRGB from 0 to 255, and the mean radiance above the horizon by column, (w, 3)."""
-    ways = directions(shape, LOWEST)
-    radiance = weather.radiance(ways)
+    lowest = np.pi / 2 - shape[0] / shape[1] * 2 * np.pi
+    ways = directions(shape, lowest)
+    few = directions((shape[0] // _SMOOTH, shape[1] // _SMOOTH), lowest)
+    radiance = cv2.resize(weather.radiance(few), shape[::-1], interpolation=cv2.INTER_CUBIC)
     level = weather.level
     if weather.elevation is None:
         patches = smooth_noise(rng, shape, shape[1] // 8, across=shape[0] // 6)
@@ -84,10 +90,8 @@ def _sky(rng: np.random.Generator, weather: Weather, shape: tuple[int, int]) -> 
         near = ways @ np.array(weather.towards)
         glare = np.clip((near - _SUN) / (1 - _SUN), 0, 1) * 4.0 + 1.2 * np.exp((near - 1) / 0.004)
         radiance += glare[..., None] * np.array(weather.beam)
-    above = slice(
-        round((np.pi / 2 - np.radians(4.0)) / (np.pi / 2 - LOWEST) * shape[0]),
-    )
-    band = radiance[above.stop : above.stop + max(shape[0] // 60, 1)].mean(axis=0)
+    first = round((np.pi / 2 - np.radians(4.0)) / (np.pi / 2 - lowest) * shape[0])
+    band = radiance[first : first + max(shape[0] // 60, 1)].mean(axis=0)
     return _shown(radiance).astype(np.float32), np.repeat(band, _COARSER, axis=0)
 
 
@@ -201,9 +205,9 @@ def _ground(view: _View, rng: np.random.Generator, albedo: Vector) -> None:
     first, near = view.row(0.0), view.row(np.radians(-3.0))
     for row in range(first, near):
         far = _EYE / np.tan(max((row - first + 0.5) / view.scale, 1e-3))
-        view.picture[row] = np.repeat(
-            [view.color(albedo, 1.0, min(far, 3000.0), column) for column in range(0, _WIDTH, 128)], 128, axis=0
-        )
+        colors = [view.color(albedo, 1.0, min(far, 3000.0), column) for column in range(0, _WIDTH, 128)]
+        wrapped = np.array([colors[-1], *colors, colors[0]], np.float32)[None]
+        view.picture[row] = cv2.resize(wrapped, (_WIDTH + 256, 1))[0, 128:-128]
     view.picture[near:] = view.picture[near - 1]
     land = view.picture[first:]
     patches = smooth_noise(rng, land.shape[:2], 256, across=8) + 0.6 * smooth_noise(rng, land.shape[:2], 48, across=3)

@@ -31,7 +31,7 @@ _ZENITH_Y = np.array(
 _TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])  # of XYZ
 _LEAST = 0.02  # least sine of the elevation: the models hold above the horizon
 # Under a high sun the model is pink at the horizon, which real haze is not: there it fades to the colour of haze.
-_HAZE, _HAZY = 0.15, np.array([0.95, 1.0, 1.08])  # sine of the elevation; linear RGB
+_HAZE, _HAZY = 0.20, np.array([0.78, 1.0, 1.30])  # sine of the elevation; linear RGB
 _CEILING = 0.10  # added to the sine of the elevation: clouds near the horizon do not shrink to nothing
 _CLOUD_PIXELS = 512  # side of the picture of the clouds, which repeats
 

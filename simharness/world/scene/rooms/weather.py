@@ -64,7 +64,7 @@ class Weather:
         r, g, b = (self._total / (self._total @ _LUMINANCE) * self.diffuse).tolist()
         return r, g, b
 
-    @property
+    @cached_property
     def level(self) -> Floats:
         """Irradiance of a horizontal surface by sun and sky, linear RGB, (3,)."""
         sun = self.sun

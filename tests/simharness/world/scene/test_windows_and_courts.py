@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_renderers import camera_at
 
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.scenario.sections.room import Room
+from simharness.world.rigs.layouts import intrinsics, look_at
 from simharness.world.scene.rooms.court import make_court
 from simharness.world.scene.rooms.kinds import ROOM_KINDS, settled
 from simharness.world.scene.rooms.lighting import room_lighting
 from simharness.world.scene.rooms.lights_of_kinds import lights_of
 from simharness.world.scene.rooms.openings import draw_openings
 from simharness.world.scene.rooms.room import make_room
+
+
+def camera_at(center, aim, fov):
+    return look_at(center, aim, K=intrinsics(fov, (160, 120)), size=(160, 120))
 
 
 @pytest.mark.parametrize("kind", [name for name, kind in ROOM_KINDS.items() if kind.windows[0]])
