@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 
 import cv2
 import numpy as np
@@ -38,15 +38,18 @@ _ROOFS = np.array([[0.52, 0.30, 0.24], [0.36, 0.34, 0.34], [0.46, 0.28, 0.22], [
 _LEAVES = np.array([[0.28, 0.38, 0.18], [0.24, 0.34, 0.18], [0.34, 0.41, 0.20], [0.22, 0.32, 0.22], [0.38, 0.40, 0.22]])
 
 
-def panorama(seed: int, weather: Weather, ground: Vector) -> Panorama:
-    """Return the panorama of a scenario; it is drawn when a picture first shows it.
+@lru_cache(maxsize=2)
+def panorama(seed: int, weather: Weather, ground: Vector, shown: Vector = (1.0, 1.0, 1.0)) -> Panorama:
+    """Return the panorama of a scenario; it is drawn when a picture first shows it, and the last ones are kept.
 
     Args:
         seed: seed of the scenario.
         weather: weather.
         ground: sRGB albedo of the ground.
+        shown: factor of its radiance.
     """
-    return Panorama(partial(draw_panorama, seed, weather, ground), (WHITE,) * 3, LOWEST)
+    r, g, b = shown
+    return Panorama(partial(draw_panorama, seed, weather, ground), (WHITE * r, WHITE * g, WHITE * b), LOWEST)
 
 
 def draw_panorama(seed: int, weather: Weather, ground: Vector) -> NDArray[np.uint8]:

@@ -44,6 +44,5 @@ def view_outside(name: str, light: Lighting, seed: int, window: Vector) -> Panor
         window: radiance of the windows.
     """
     bearing = float(np.arctan2(light.direction[1], light.direction[0]))
-    shown = panorama(seed, replace(WEATHERS[name], bearing=bearing), MEADOW)
-    r, g, b = (_EXPOSED * np.array(window) * shown.emission).tolist()
-    return replace(shown, emission=(r, g, b))
+    shown = (_EXPOSED * window[0], _EXPOSED * window[1], _EXPOSED * window[2])
+    return panorama(seed, replace(WEATHERS[name], bearing=bearing), MEADOW, shown)

@@ -77,6 +77,7 @@ def test_light_outdoors_is_that_of_the_sun_in_the_bearing_of_the_closed_form():
     assert light.sources is not None
     np.testing.assert_allclose(light.sources.sun.direction, light.direction)
     assert light.panorama is not None
+    assert room_lighting(ROOM, 3) == light  # so that backgrounds of cameras are kept
     assert room_lighting(Room(walls=False), 3).panorama is None
     assert room_lighting(ROOM.model_copy(update={"light": "dim"}), 3).sources.sun is None
 
