@@ -3,7 +3,7 @@
 Numba's own cache looks at the file that a kernel is in. But compiled code also holds the kernels that it calls and the
 constants that it refers to, and when those are edited in another file, it goes on with the old ones. Here the name of
 an entry says all that the code is compiled from (:mod:`mvpose.kernel_code`), for which arguments and which processor.
-An entry is one file, written whole: processes that compile at once at worst write the same file twice.
+An entry is one file, written whole. A process that needs a kernel that another one compiles waits for its entry.
 
 Python's collector of cyclic garbage rests during compilation, which makes millions of objects and few cycles: its
 searches take an eighth of the time.
@@ -27,8 +27,10 @@ from typing import Any
 import numba
 import numpy as np
 from numba import types
+from numba.core.compiler_lock import global_compiler_lock
 
 from mvpose.kernel_code import code_digest
+from mvpose.kernel_lock import locked
 
 __all__ = ["njit"]
 
@@ -67,21 +69,29 @@ def njit(
         return lambda decorated: njit(decorated, cache=cache, borrows=borrows, **options)
     kernel = numba.njit(**{**_DEFAULTS, "_nrt": not borrows, **options})(function)
     if hasattr(kernel, "compile"):  # not with NUMBA_DISABLE_JIT
-        kernel.compile = _without_collector(kernel.compile)
+        kernel.compile = _compilation_of(kernel)
     if cache and hasattr(kernel, "_cache"):  # not with NUMBA_DISABLE_JIT, nor in a numba that keeps its cache elsewhere
         kernel._cache = KernelCache(kernel)
     return kernel
 
 
-def _without_collector(compilation: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a method of numba's dispatcher that runs without the collector of cyclic garbage."""
+def _compilation_of(kernel: Any) -> Callable[[Any], Any]:
+    """Return the method of a kernel that compiles it: without the collector of garbage, and in one process at a time.
 
-    @functools.wraps(compilation)
-    def paused(signature: Any) -> Any:
-        with _collector_paused():
-            return compilation(signature)
+    Numba's own lock comes first, as in all compilations: threads that take two locks must do so in the same order.
+    """
+    original = kernel.compile
 
-    return paused
+    @functools.wraps(original)
+    def compilation(signature: Any) -> Any:
+        if tuple(getattr(signature, "args", signature)) in kernel.overloads:
+            return original(signature)
+        kept = isinstance(kernel._cache, KernelCache)
+        with global_compiler_lock, _collector_paused():
+            with kernel._cache.compiling(signature) if kept else contextlib.nullcontext():
+                return original(signature)
+
+    return compilation
 
 
 @contextlib.contextmanager
@@ -112,6 +122,17 @@ class KernelCache:
     def cache_path(self) -> str:
         """Folder of the entries."""
         return str(self._implementation().locator.get_cache_path())
+
+    @contextlib.contextmanager
+    def compiling(self, signature: Any) -> Iterator[None]:
+        """Keep other processes from compiling the kernel for these types, or wait until another one has done so."""
+        with contextlib.ExitStack() as stack:
+            with contextlib.suppress(Exception):  # loading warns of what is wrong
+                entry = self._entry(signature)
+                if entry is not None and not entry[1].exists():
+                    self._implementation().locator.ensure_cache_path()
+                    stack.enter_context(locked(entry[1].with_suffix(".lock")))
+            yield
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         """Return the compiled code for the types of arguments, or None where it must be compiled."""
