@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mvpose import COCO17
-from mvpose.arrays import Bools, Floats
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Rig
+from simharness.detector.guess_kernels import fill_in
 
 DATA = Path(__file__).parent / "data" / "poses_in_pictures.npz"
 """Means and covariances, made by ``python -m tools.poses``."""
@@ -25,10 +25,8 @@ DATA = Path(__file__).parent / "data" / "poses_in_pictures.npz"
 BEARINGS = 12
 """Number of bearings of the camera from the trunk, in equal steps from straight ahead towards the left."""
 
-_SIZE = 2 * len(COCO17)
 _LOCALISED = 0.03  # deviation of localised joints from their true places, metres
 _PLACE = 1.0  # deviation of a person from the given centre, metres: wide, so that localised joints determine the place
-_ROWS = 1000  # poses at once: some ten megabytes
 
 
 @dataclass(frozen=True)
@@ -43,14 +41,13 @@ class PosesInPictures:
     mean: Floats
     covariance: Floats
 
-    def at(self, bearings: Floats) -> tuple[Floats, Floats]:
-        """Return mean (n, 34) and covariance (n, 34, 34) at bearings (n,), radians, by linear interpolation."""
+    def between(self, bearings: Floats) -> tuple[Integers, Floats]:
+        """Return the index of the bearing before each of n bearings, radians, and the weight of the next, (n,) each.
+
+        Means and covariances at other bearings are linear between those of the table; the next follows after the last.
+        """
         place = np.mod(bearings, 2 * np.pi) * (BEARINGS / (2 * np.pi))
-        low = place.astype(int) % BEARINGS
-        high, share = (low + 1) % BEARINGS, place - np.floor(place)
-        mean = self.mean[low] + share[:, None] * (self.mean[high] - self.mean[low])
-        between = self.covariance[high] - self.covariance[low]
-        return mean, self.covariance[low] + share[:, None, None] * between
+        return place.astype(int) % BEARINGS, place - np.floor(place)
 
 
 @cache
@@ -74,15 +71,11 @@ def guess_places(places: ArrayLike, localised: ArrayLike, *, bearings: Floats, s
         center: rough middle of each person, (n, 2) pixels; it counts only where few joints are localised.
     """
     places, localised = np.asarray(places, float), np.asarray(localised, bool)
-    result = places.copy()
-    for start in range(0, len(places), _ROWS):
-        part = slice(start, start + _ROWS)
-        relative = (places[part] - center[part, None]) / scale[part, None, None]
-        likely = _conditional_mean(relative, localised[part], bearings[part])
-        result[part] = np.where(
-            localised[part, :, None], places[part], center[part, None] + scale[part, None, None] * likely
-        )
-    return result
+    relative = (places - center[:, None]) / scale[:, None, None]
+    prior = poses_in_pictures()
+    low, share = prior.between(bearings)
+    fill_in(relative, localised, low, share, prior.mean, prior.covariance, _PLACE**2, _LOCALISED**2)
+    return np.where(localised[..., None], places, center[:, None] + scale[:, None, None] * relative)
 
 
 def pixels_per_metre(joints: Floats, rig: Rig, usable: Bools) -> Floats:
@@ -97,22 +90,3 @@ def pixels_per_metre(joints: Floats, rig: Rig, usable: Bools) -> Floats:
     depth = np.stack([(joints - camera.center) @ camera.R[2] for camera in rig], axis=1)
     mean = (depth * usable).sum(axis=-1) / usable.sum(axis=-1)
     return np.array([camera.K[0, 0] for camera in rig]) / np.maximum(mean, 1e-3)
-
-
-def _conditional_mean(places: Floats, localised: Bools, bearings: Floats) -> Floats:
-    """Return the mean of all joints given the localised ones, (n, 17, 2) metres from the centre.
-
-    Args:
-        places: joints, (n, 17, 2) metres from the centre.
-        localised: which of them are given, (n, 17).
-        bearings: bearings of the cameras, (n,) radians.
-    """
-    mean, covariance = poses_in_pictures().at(bearings)
-    given = np.repeat(localised, 2, axis=-1)
-    covariance = covariance + _PLACE**2 * np.tile(np.eye(2), (len(COCO17), len(COCO17)))
-    # Rows and columns of joints that are not given become those of the identity: they take no part.
-    among = np.where(given[:, :, None] & given[:, None], covariance, 0.0)
-    among[:, np.arange(_SIZE), np.arange(_SIZE)] += np.where(given, _LOCALISED**2, 1.0)
-    away = np.where(given, places.reshape(-1, _SIZE) - mean, 0.0)
-    weighted = np.linalg.solve(among, away[..., None])
-    return (mean + (covariance @ weighted)[..., 0]).reshape(-1, len(COCO17), 2)
