@@ -32,6 +32,7 @@ Choice = TypeVar("Choice")
 _ANY = 4  # finishes from which "any" is drawn: the first of each list
 _CELL = 1.0  # metres: approximate cell size of the grids of floor and walls
 _THICK = 0.1  # metres: thickness of floor and walls as solids, outside the room
+_LAWN = 0.3  # metres: approximate cell size of the ground around a floor outdoors
 _RIM = 0.25  # metres: approximate cell size of that ground, which fades into the background
 # Opposite walls share a tone, so that corners are visible and pictures show the direction of view.
 _TONES = {"x": (0.93, 0.97, 1.0), "y": (1.0, 0.98, 0.93)}
@@ -124,16 +125,18 @@ def _ground(room: Room, seed: int, finish: Finish) -> Solid:
 
 
 def _open_ground(x: float, y: float, finish: Finish) -> Solid:
-    """Return the ground around a floor outdoors, which goes on like the floor."""
+    """Return the ground around a floor outdoors, which goes on like the floor.
+
+    It is smooth, so that its light is computed at its vertices alone.
+    """
     columns, rows = (
-        _cut(np.concatenate([_ticks(-half - AROUND, -half, _CELL), _ticks(-half, half, _CELL),
-                             _ticks(half, half + AROUND, _CELL)]), ())
+        _cut(_ticks(-half, half, _LAWN), [side * at for side in (-1, 1) for at in _ticks(half, half + AROUND, _LAWN)])
         for half in (x, y)
-    )  # fmt: skip
+    )
     grid = np.stack([*np.meshgrid(columns, rows, indexing="ij"), np.zeros((len(columns), len(rows)))], axis=-1)
     middles = (grid[:-1, :-1, :2] + grid[1:, 1:, :2]) / 2
     beside: Bools = np.any(np.abs(middles) > (x, y), axis=-1)
-    mesh = _textured_grid(grid, grid[..., :2], finish, (1.0, 1.0, 1.0), beside)
+    mesh = replace(_textured_grid(grid, grid[..., :2], finish, (1.0, 1.0, 1.0), beside), smooth=True)
     slab = Box((0.0, 0.0, -_THICK / 2), (x + AROUND, y + AROUND, _THICK / 2))
     return Solid("room", "ground", mesh, (slab,), slab)
 

@@ -97,7 +97,7 @@ def _plants(seed: int, clear: float) -> Mesh:
         rng = stream(seed, "room", "far tree", k)
         tall, far, turn = rng.uniform(4.5, 9.0), rng.uniform(0, 1) ** 1.3 * 24.0, rng.uniform(0, 2 * np.pi)
         away = clear + 0.45 * tall + far
-        put_tree(made, rng, tall, at=(away * np.cos(turn), away * np.sin(turn)), leaves=60, rows=6, sides=9)
+        put_tree(made, rng, tall, at=(away * np.cos(turn), away * np.sin(turn)), leaves=45, rows=6, sides=9)
     for k in range(shrubs):
         rng = stream(seed, "room", "far shrub", k)
         half = (rng.uniform(0.5, 1.3), rng.uniform(0.5, 1.3), rng.uniform(0.4, 0.9))
