@@ -13,8 +13,9 @@ from simharness.capture.rendering import tone
 from simharness.capture.rendering.box_tree_kernels import build_tree, trace
 from simharness.capture.rendering.capsule_kernels import capsules
 from simharness.capture.rendering.light_kernels import direct_light
+from simharness.capture.rendering.light_samples import LightSamples
 from simharness.capture.rendering.raster import RasterRenderer
-from simharness.capture.rendering.room_light import _REFLECTED, room_light
+from simharness.capture.rendering.room_light import _REFLECTED, _SPECK, _reflected, room_light
 from simharness.capture.rendering.scene_geometry import StillGeometry
 from simharness.capture.srgb import to_linear
 from simharness.types.light_sources import AreaLight, LightSources, Sun
@@ -196,3 +197,19 @@ def test_the_tone_curve_keeps_middle_grey_and_has_a_shoulder():
     values = tone.dimming()
     assert (np.diff(values.astype(int), axis=0) >= 0).all()
     np.testing.assert_array_equal(values[-1], np.arange(256))
+
+
+def test_a_speck_far_brighter_than_all_else_brings_a_bounded_share():
+    """Its radiance counts as some times the mean; all others are as they are."""
+    count = 500
+    places, albedo = np.zeros((count, 3), np.float32), np.full((count, 3), 0.5, np.float32)
+    nothing = np.zeros((0, 3), np.int32)
+    samples = LightSamples(places, places, albedo, places[:, 0], nothing, nothing[:, 0])
+    light = np.ones((count, 3), np.float32)
+    plain = _reflected(samples, light)
+    np.testing.assert_allclose(plain, 0.5 * _REFLECTED, rtol=1e-6)
+    light[7] = 1000.0
+    bright = _reflected(samples, light)
+    np.testing.assert_array_equal(np.delete(bright, 7, axis=0), np.delete(plain, 7, axis=0))
+    mean = (plain.sum(axis=0) + 999.0 * plain[7]) / count
+    np.testing.assert_allclose(bright[7], _SPECK * mean, rtol=1e-4)
