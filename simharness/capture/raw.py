@@ -18,7 +18,7 @@ from scipy.special import ndtri
 
 from mvpose.camera import Camera
 from simharness.capture.raw_kernels import expose
-from simharness.capture.srgb import linear_table, rounded
+from simharness.types.srgb import linear_table, rounded
 
 if TYPE_CHECKING:
     from simharness.scenario.sections.cameras import Sensor

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from mvpose.camera import Camera
 from simharness.capture.raw import BLACK, WHITE, is_ideal, raw_picture
 from simharness.capture.raw_kernels import look_up
-from simharness.capture.srgb import from_linear, linear_table, rounded, to_linear
 from simharness.scenario.sections.cameras import Sensor
 from simharness.types.random_streams import stream
+from simharness.types.srgb import from_linear, linear_table, rounded, to_linear
 
 Rgb = NDArray[np.uint8]
 

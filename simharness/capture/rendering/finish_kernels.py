@@ -26,8 +26,8 @@ import numpy as np
 from mvpose.kernels import njit
 from simharness.capture.rendering.moving_light_kernels import light_at
 from simharness.capture.rendering.surface_kernels import NORMAL_X, NORMAL_Y, NORMAL_Z, PIXELS, SECOND, THIRD
-from simharness.capture.srgb import LUMINANCE
 from simharness.types.finish import Material
+from simharness.types.srgb import LUMINANCE
 
 _HEIGHT = 0.75  # share of a figure's height at which its light is taken
 _FOLD_PERIOD, _FOLD_STEPS = 0.36, 256  # metres and entries of the profile of folds

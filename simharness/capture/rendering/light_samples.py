@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simharness.capture.rendering.scene_topology import SceneTopology
-from simharness.capture.srgb import to_linear
+from simharness.types.srgb import to_linear
 
 Floats = NDArray[np.float32]
 

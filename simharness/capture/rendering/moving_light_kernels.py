@@ -14,7 +14,7 @@ import numpy as np
 
 from mvpose.kernels import njit
 from simharness.capture.rendering.capsule_kernels import enclose, hide
-from simharness.capture.srgb import LUMINANCE
+from simharness.types.srgb import LUMINANCE
 
 _CHUNK = 512  # samples processed together
 _LEVELS = 6  # heights at which the light of the room is taken for a body

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simharness.capture.rendering import tone
-from simharness.capture.srgb import from_linear, to_linear
 from simharness.types.lighting import Lighting
+from simharness.types.srgb import from_linear, to_linear
 
 _COLUMNS = 1024  # pixels that are looked up in one row: OpenCV takes no rows of whole pictures
 

@@ -17,9 +17,9 @@ from simharness.capture.rendering.box_tree_kernels import build_tree
 from simharness.capture.rendering.light_kernels import DARK, direct_light, gathered, met, probe_light
 from simharness.capture.rendering.light_samples import Floats, LightSamples, light_samples
 from simharness.capture.rendering.scene_topology import SceneTopology, same_meshes
-from simharness.capture.srgb import LUMINANCE
 from simharness.types.light_sources import LightSources
 from simharness.types.mesh import Mesh
+from simharness.types.srgb import LUMINANCE
 
 _SURFACE_RAYS, _AIR_RAYS = 36, 64
 _BOUNCES = 4

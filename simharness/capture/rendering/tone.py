@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from simharness.capture.srgb import from_linear
+from simharness.types.srgb import from_linear
 
 STEPS = 4096
 """Entries of :func:`table`."""

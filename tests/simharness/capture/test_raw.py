@@ -10,11 +10,11 @@ from mvpose.camera import Camera
 from simharness.capture.picture import scaled
 from simharness.capture.raw import BLACK, WHITE, raw_picture
 from simharness.capture.sensor import develop
-from simharness.capture.srgb import from_linear, to_linear
 from simharness.scenario.load import load
 from simharness.scenario.presets import SENSORS, summary_of
 from simharness.scenario.sections.cameras import Sensor
 from simharness.types.random_streams import stream
+from simharness.types.srgb import from_linear, to_linear
 
 CAMERA = Camera(
     np.array([[150.0, 0, 101.5], [0, 160.0, 70.25], [0, 0, 1]]), np.eye(3), np.zeros(3), size=(200, 150), name="a"

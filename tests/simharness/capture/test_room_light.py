@@ -17,9 +17,9 @@ from simharness.capture.rendering.light_samples import LightSamples
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.rendering.room_light import _REFLECTED, _SPECK, _reflected, room_light
 from simharness.capture.rendering.scene_geometry import StillGeometry
-from simharness.capture.srgb import to_linear
 from simharness.types.light_sources import AreaLight, LightSources, Sun
 from simharness.types.lighting import Lighting
+from simharness.types.srgb import to_linear
 
 PANEL = AreaLight((0.3, -0.2, 2.5), (0.0, 0.5, 0.0), (0.4, 0.0, 0.0), (2.0, 2.0, 2.0))
 SKY = LightSources(sky=(1.0, 1.0, 1.0), balance=0.0)

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
-from simharness.capture.srgb import from_linear, to_linear
 from simharness.types.light_sources import Vector
 from simharness.types.panorama import Panorama, directions
 from simharness.types.random_streams import stream
+from simharness.types.srgb import from_linear, to_linear
 from simharness.world.scene.rooms.noise import smooth_noise
 from simharness.world.scene.rooms.sky import clouds
 from simharness.world.scene.rooms.weather import Weather

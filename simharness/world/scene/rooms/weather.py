@@ -10,8 +10,8 @@ from types import MappingProxyType
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.capture.srgb import LUMINANCE
 from simharness.types.light_sources import Sun, Vector
+from simharness.types.srgb import LUMINANCE
 from simharness.world.scene.rooms.sky import clear_sky, overcast_sky
 
 _LUMINANCE = np.array(LUMINANCE)
