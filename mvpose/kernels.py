@@ -87,9 +87,9 @@ def _compilation_of(kernel: Any) -> Callable[[Any], Any]:
         if tuple(getattr(signature, "args", signature)) in kernel.overloads:
             return original(signature)
         kept = isinstance(kernel._cache, KernelCache)
-        with global_compiler_lock, _collector_paused():
-            with kernel._cache.compiling(signature) if kept else contextlib.nullcontext():
-                return original(signature)
+        alone = kernel._cache.compiling(signature) if kept else contextlib.nullcontext()
+        with global_compiler_lock, _collector_paused(), alone:
+            return original(signature)
 
     return compilation
 

@@ -1,43 +1,78 @@
-"""Compilation of the method's kernels in a second process while this one builds and films.
+"""Compilation of kernels in a second process while this one builds and films.
 
-Compilation takes a quarter of the first run after an installation. The compiled kernels are written to numba's cache on
-disk, from which the processes that estimate load them.
+Compilation takes most of the first run after an installation. The second process compiles those kernels that pictures
+need last, because this process needs them first, and then the kernels of the method. All are written to the cache on
+disk, from which the processes that film and estimate load them (:mod:`mvpose.kernels`). A process that needs a kernel
+that another one compiles waits for it.
 """
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import ClassVar
+from importlib import import_module, resources
+from typing import Any, ClassVar
 
 import numpy as np
+from numba.core.errors import NumbaError
+from numba.core.sigutils import normalize_signature
 
 from mvpose import COCO17, Camera, Detections, Pipeline, Rig
 from mvpose.pipeline import SequenceEstimator
 from mvpose.presets import NEED_DESCRIPTORS
 
+_PICTURES = "pictures"  # stands for the kernels of pictures among the names of variants
+
 
 class Compilation:
-    """Process that compiles kernels. If it fails, kernels are compiled later, when they are first used."""
+    """Process that compiles kernels. If it fails, kernels are compiled later, when they are first used.
+
+    Args:
+        variants: presets of :class:`mvpose.Pipeline`.
+        pictures: compile kernels of colour pictures of ``raster``, too.
+    """
 
     _compiled: ClassVar[set[str]] = set()
 
-    def __init__(self, variants: Iterable[str]) -> None:
-        self._variants = set(variants) - self._compiled
+    def __init__(self, variants: Iterable[str], *, pictures: bool = False) -> None:
+        self._names = {*variants, *([_PICTURES] if pictures else [])} - self._compiled
         spawn = multiprocessing.get_context("spawn")
-        self._process = spawn.Process(target=compile_kernels, args=(self._variants,), daemon=True)
+        self._process = spawn.Process(target=_compile, args=(self._names,), daemon=True)
 
     def start(self) -> None:
-        """Start the process, unless all variants have been compiled."""
-        if self._variants:
+        """Start the process, unless all has been compiled."""
+        if self._names:
             self._process.start()
 
     def wait(self) -> None:
         """Wait until all kernels are compiled."""
-        if self._variants:
+        if self._names:
             self._process.join()
-            self._compiled.update(self._variants)
+            self._compiled.update(self._names)
+
+
+def _compile(names: set[str]) -> None:
+    if _PICTURES in names:
+        for kernel, types in picture_kernels():
+            with contextlib.suppress(NumbaError):  # the list is old: the kernel is compiled when it is used
+                kernel.compile(types)
+    compile_kernels(names - {_PICTURES})
+
+
+def picture_kernels() -> Iterator[tuple[Any, tuple[Any, ...]]]:
+    """Yield kernels that pictures need last, and numba's types of their arguments.
+
+    The list is written by ``python -m tools.picture_kernels``. Kernels that are no more are left out.
+    """
+    text = resources.files("simharness.trial").joinpath("data/picture_kernels.txt").read_text(encoding="utf-8")
+    for line in text.splitlines():
+        place, _, signature = line.partition(" ")
+        module, _, name = place.rpartition(".")
+        with contextlib.suppress(ImportError, AttributeError):
+            kernel = getattr(import_module(module), name)
+            yield kernel, normalize_signature(signature)[0]
 
 
 def compile_kernels(variants: Iterable[str]) -> None:

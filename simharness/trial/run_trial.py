@@ -137,7 +137,8 @@ def run_trial(
         until: last requested stage.
         workers: number of processes that share the frames; the results do not depend on it.
         previews: frames whose colour pictures are kept in the views.
-        compile_ahead: compile the method's kernels in a second process while this one simulates.
+        compile_ahead: compile the kernels of the method, and some of pictures, in a second process while this one
+            builds and simulates.
         known: results of stages that need not run again.
         reporter: receiver of progress.
 
@@ -190,11 +191,13 @@ def _simulate(
     scenario: Scenario, stages: Stages, workers: int, previews: Collection[int], compile_ahead: bool
 ) -> tuple[Simulation, DetectedSequence, Mapping[str, Estimator]]:
     """Run the stages from the build to the detections."""
+    compilation = None
+    if compile_ahead:
+        drawn = bool(previews) and scenario.rendering.renderer in ("raster", "auto")
+        compilation = Compilation(set(scenario.method.variants) & PRESETS.keys(), pictures=drawn)
+        compilation.start()
     with stages.stage("build", 1, input_errors=True):
         trial = build_trial(scenario)
-    compilation = Compilation(trial.pipelines.keys() & PRESETS.keys()) if compile_ahead else None
-    if compilation is not None:
-        compilation.start()
     simulation = capture_trial(trial, stages, workers=workers, previews=previews)
     with stages.stage("audit", 1):
         audit(scenario, trial.scene, trial.exposures, simulation.sequence, simulation.views)

@@ -1,8 +1,10 @@
 """Compilation of kernels in a second process."""
 
 import importlib
+import inspect
 import pkgutil
 from dataclasses import replace
+from importlib import resources
 
 import numba
 import numpy as np
@@ -11,7 +13,9 @@ import pytest
 import mvpose
 from mvpose import Camera, Detections, Pipeline, Rig
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS
-from simharness.trial.kernel_compilation import Compilation, compile_kernels
+from simharness.scenario.load import load
+from simharness.trial.kernel_compilation import Compilation, compile_kernels, picture_kernels
+from simharness.trial.run_trial import run_trial
 
 
 def signatures():
@@ -49,3 +53,18 @@ def test_a_failed_compilation_does_not_end_the_run():
     compilation.wait()
     with pytest.raises(ValueError, match="unknown preset"):
         compile_kernels(["no such preset"])
+
+
+def test_kernels_of_pictures_are_compiled_for_their_arguments():
+    kernels = list(picture_kernels())
+    listed = resources.files("simharness.trial").joinpath("data/picture_kernels.txt").read_text().splitlines()
+    assert len(kernels) == len(listed) > 5, "run python -m tools.picture_kernels"
+    for kernel, types in kernels:
+        assert len(types) == len(inspect.signature(kernel.py_func).parameters), kernel.py_func.__qualname__
+
+
+@pytest.mark.slow
+def test_a_picture_needs_the_kernels_of_the_list():
+    run_trial(load("quickstart", overrides=["duration=0.1"]), until="detect", previews=[0])
+    for kernel, types in picture_kernels():
+        assert types in kernel.overloads, f"{kernel.py_func.__qualname__}: run python -m tools.picture_kernels"
