@@ -161,7 +161,7 @@ def dim(
                 pixels[blue] = shades[row | np.uint32(pixels[blue])]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _left_on_floor(
     floor: np.ndarray, rows: np.int32, columns: np.int32, size: int, work: np.ndarray, cells: np.ndarray
 ) -> None:

@@ -81,10 +81,11 @@ def _strand_tables() -> tuple[np.ndarray, np.ndarray]:
     return np.clip(wide, -1, 1).astype(np.float32), np.clip(fine, -1, 1).astype(np.float32)
 
 
-FINISHING = 9 * PIXELS
-"""Numbers of memory of :func:`finish`, float32."""
+_GRAIN_X, _GRAIN_Y, _GRAIN_Z, _TILT, _TONE, _VIEW_X, _VIEW_Y, _VIEW_Z, GLOSS, FINISHING = (
+    PIXELS * row for row in range(10)
+)
+"""Rows of memory of :func:`finish`, float32, and their end."""
 
-_GRAIN_X, _GRAIN_Y, _GRAIN_Z, _TILT, _TONE, _VIEW_X, _VIEW_Y, _VIEW_Z, _GLOSS = (PIXELS * row for row in range(9))
 _RED, _GREEN, _BLUE = LUMINANCE
 _TABLE, _SLOPES = _surface_table(), _fold_table()
 _LOCKS, _STRANDS = _strand_tables()
@@ -163,7 +164,7 @@ def figure_light(
     return result
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def finish(
     labels: np.ndarray,
     columns: np.ndarray,
@@ -182,8 +183,8 @@ def finish(
     around: float,
     work: np.ndarray,
     received: np.ndarray,
-) -> np.ndarray:
-    """Finish some pixels: multiply the received light, and return the share of it that is reflected without colour.
+) -> None:
+    """Finish some pixels: multiply the received light, and write the share of it that is reflected without colour.
 
     Args:
         labels: visible faces, (n,) int32, n at most ``PIXELS``; none is before ``first_face``.
@@ -201,11 +202,8 @@ def finish(
         grain: see :func:`grain_of`; of the moving vertices, (v, 4).
         place: see :class:`simharness.types.finish.Finish`, (v,).
         around: period of the place of hair, metres.
-        work: memory, (``FINISHING``,) float32.
+        work: memory, (``FINISHING``,) float32; the row from ``GLOSS`` on is the share that is reflected without colour.
         received: light on the pixels in rows of ``PIXELS``: red, green, blue; changed.
-
-    Returns:
-        View of ``work``, (``PIXELS``,).
     """
     _look(columns, rows, rays, work)
     per_turn, end, last = np.float32(around), 0, len(labels)
@@ -247,7 +245,7 @@ def finish(
                 at_u = np.int32(np.floor(u * np.float32(_FOLD_STEPS / _FOLD_PERIOD))) & np.int32(_FOLD_STEPS - 1)
                 work[_TILT + n] = fade * max(depth + second * depth_b + third * depth_c, _ZERO) * _SLOPES[at_u]
         if kind == _MATTE or kind == _CLOTH:
-            work[_GLOSS + start : _GLOSS + end] = _ZERO
+            work[GLOSS + start : GLOSS + end] = _ZERO
         if kind == _MATTE or (kind == _CLOTH and not ragged):
             continue
         if kind == _CLOTH:
@@ -270,10 +268,9 @@ def finish(
             lit = received[k * PIXELS + start : k * PIXELS + end]
             for n in range(len(tone)):
                 lit[n] *= tone[n]
-    return work[_GLOSS : _GLOSS + PIXELS]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _look(columns: np.ndarray, rows: np.ndarray, rays: np.ndarray, work: np.ndarray) -> None:
     """Write the unit directions from pixels to the camera, (n,) each."""
     x_of, y_of, z_of = (
@@ -291,7 +288,7 @@ def _look(columns: np.ndarray, rows: np.ndarray, rays: np.ndarray, work: np.ndar
         x_of[n], y_of[n], z_of[n] = vx * scale, vy * scale, vz * scale
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _lobe(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray, surface: np.ndarray) -> None:
     """Write the gloss of pixels of one material; ``light`` is a row of lights."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
@@ -303,7 +300,7 @@ def _lobe(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np
         work[_VIEW_X + first : _VIEW_X + last], work[_VIEW_Y + first : _VIEW_Y + last],
         work[_VIEW_Z + first : _VIEW_Z + last],
     )  # fmt: skip
-    gloss = work[_GLOSS + first : _GLOSS + last]
+    gloss = work[GLOSS + first : GLOSS + last]
     reflectance, rough = surface[0], surface[1]
     alpha = rough * rough + light[6] * _HALF
     square, share_of_lobe = alpha * alpha, reflectance / (np.float32(4.0) * (rough + _HALF))
@@ -323,7 +320,7 @@ def _lobe(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np
         gloss[n] = share * lobe + (_UNIT - share) * (plain + glance * away * away)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _tint(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray, wrap: np.float32) -> None:
     """Write to ``_TONE`` by which share there is more red light on skin: it reaches farther through than over it."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
@@ -339,7 +336,7 @@ def _tint(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np
         more[n] = min(key * (wrapped - plain) / (rest + rise * nz + key * plain + _TINY), _MOST_TINT)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _fold(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray) -> None:
     """Write to ``_TONE`` how the light changes on normals that are tilted by slopes along the grain."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
@@ -368,7 +365,7 @@ def _fold(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np
         tone[n] = (rest + rise * up + key * max(after, _ZERO) + _TINY) / was
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _strands_over(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray) -> None:
     """Write the highlight of the surface of hair, as a share of the light that ``_TONE`` has changed."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
@@ -385,7 +382,7 @@ def _strands_over(narrow: np.ndarray, work: np.ndarray, first: int, last: int, l
         work[_GRAIN_Z + first : _GRAIN_Z + last],
     )  # fmt: skip
     tilt, tone = work[_TILT + first : _TILT + last], work[_TONE + first : _TONE + last]
-    gloss = work[_GLOSS + first : _GLOSS + last]
+    gloss = work[GLOSS + first : GLOSS + last]
     for n in range(len(gloss)):
         nx, ny, nz, vx, vy, vz = normal_x[n], normal_y[n], normal_z[n], view_x[n], view_y[n], view_z[n]
         direct = key * max(nx * light_x + ny * light_y + nz * light_z, _ZERO)
@@ -413,7 +410,7 @@ def _strands_over(narrow: np.ndarray, work: np.ndarray, first: int, last: int, l
         gloss[n] = (spot + (_UNIT - share) * (_DULL + _DULL * away * away)) / tone[n]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _strands_through(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray) -> None:
     """Write to ``_TONE`` how much more light comes back in the colour of hair: by strands, and through them."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]

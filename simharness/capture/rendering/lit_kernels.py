@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.finish_kernels import FINISHING, finish
+from simharness.capture.rendering.finish_kernels import FINISHING, GLOSS, finish
 from simharness.capture.rendering.surface_kernels import BLUE, GREEN, PIXELS, RED, SECOND, THIRD, gather, memory
 
 _ZERO, _UNIT = np.float32(0.0), np.float32(1.0)
@@ -89,7 +89,7 @@ def shade_lit(
     """
     narrow, wide, exact, level = memory()
     received, index = np.zeros(_RECEIVED, np.float32), np.zeros(3 * PIXELS, np.uint32)
-    work, gloss = np.zeros(FINISHING, np.float32), np.zeros(PIXELS, np.float32)
+    work = np.zeros(FINISHING, np.float32)
     most = PIXELS + triangle.shape[1]
     labels, columns, lines = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.int32)
     top = np.float32(len(curve) - 1)
@@ -111,14 +111,14 @@ def shade_lit(
             )  # fmt: skip
             _receive(labels[chunk], narrow, emission, exposure, light, corner_samples, divisions, first_face, received)
             if len(material):
-                gloss = finish(
+                finish(
                     labels[chunk], columns[chunk], lines[chunk], first_face, faces, first_vertex, rays, narrow,
                     material, figure, lights, pixel, grain, place, around, work, received,
                 )  # fmt: skip
             for row in range(0, 3 * PIXELS, PIXELS):
                 for n in range(PIXELS):
                     dye = narrow[RED + row + n]
-                    value = received[row + n] * (dye * (dye * (dye * _CUBE + _SQUARE) + _PLAIN) + gloss[n])
+                    value = received[row + n] * (dye * (dye * (dye * _CUBE + _SQUARE) + _PLAIN) + work[GLOSS + n])
                     step = min(np.float32(math.sqrt(scale * max(value, _ZERO))), top)
                     index[row + n] = np.uint32(np.int32(step + np.float32(0.5)))
             for n in range(size):
@@ -132,7 +132,7 @@ def shade_lit(
         count -= done
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _receive(
     labels: np.ndarray,
     narrow: np.ndarray,
@@ -169,7 +169,7 @@ def _receive(
             received[row + n] = received[row + n] + second * to_second + third * to_third
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _on_lattice(
     first: int, divisions: int, second: np.float32, third: np.float32
 ) -> tuple[int, int, int, np.float32, np.float32]:

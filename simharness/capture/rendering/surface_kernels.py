@@ -53,7 +53,7 @@ def memory() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     return np.zeros(_NARROW, np.float32), np.zeros(_WIDE), np.zeros(_WHOLE, np.uint64), np.full(5, -1)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def gather(
     labels: np.ndarray,
     columns: np.ndarray,
@@ -114,7 +114,7 @@ def gather(
         narrow[BLUE + n] = narrow[_DYE + 2 * PIXELS + n] * (blue if textured else _UNIT)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _load(
     labels: np.ndarray,
     columns: np.ndarray,
@@ -171,12 +171,12 @@ def _load(
         wide[_ACROSS + n], wide[_DOWN + n] = np.float64(_STEPS * width), np.float64(_STEPS * height)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _level(n: int, narrow: np.ndarray, wide: np.ndarray, pyramid: np.ndarray) -> int:
     """Return the mipmap level whose texels are about as large as a pixel; arguments as :func:`gather`."""
     x, y = wide[_COLUMN + n], wide[_ROW + n]
     one = two = three = 0.0  # linear functions over the picture: u and v times the third, at the pixel
-    slope = np.zeros((3, 2))
+    one_x = two_x = three_x = one_y = two_y = three_y = 0.0  # and their slopes
     for k in range(3):
         b, c = _CORNERS + (k + 1) % 3 * 3 * PIXELS + n, _CORNERS + (k + 2) % 3 * 3 * PIXELS + n
         bx, by, bz, cx, cy, cz = (
@@ -186,15 +186,13 @@ def _level(n: int, narrow: np.ndarray, wide: np.ndarray, pyramid: np.ndarray) ->
         u, v = np.float64(narrow[_UV + 2 * k * PIXELS + n]), np.float64(narrow[_UV + (2 * k + 1) * PIXELS + n])
         e = ex * x + (ey * y + ez)
         one, two, three = one + u * e, two + v * e, three + e
-        slope[0, 0], slope[1, 0], slope[2, 0] = slope[0, 0] + u * ex, slope[1, 0] + v * ex, slope[2, 0] + ex
-        slope[0, 1], slope[1, 1], slope[2, 1] = slope[0, 1] + u * ey, slope[1, 1] + v * ey, slope[2, 1] + ey
+        one_x, two_x, three_x = one_x + u * ex, two_x + v * ex, three_x + ex
+        one_y, two_y, three_y = one_y + u * ey, two_y + v * ey, three_y + ey
     scale = 1.0 / three
     at_u, at_v, rows, columns = one * scale, two * scale, pyramid[0, 1], pyramid[0, 2]
-    area = 0.0
-    for k in range(2):
-        du = (slope[0, k] - at_u * slope[2, k]) * scale * columns
-        dv = (slope[1, k] - at_v * slope[2, k]) * scale * rows
-        area += 0.5 * (du * du + dv * dv)
+    ux, vx = (one_x - at_u * three_x) * scale * columns, (two_x - at_v * three_x) * scale * rows
+    uy, vy = (one_y - at_u * three_y) * scale * columns, (two_y - at_v * three_y) * scale * rows
+    area = 0.5 * (ux * ux + vx * vx) + 0.5 * (uy * uy + vy * vy)
     level = 0
     while area > 2.0 and level < len(pyramid) - 1:
         area *= 0.25
@@ -202,7 +200,7 @@ def _level(n: int, narrow: np.ndarray, wide: np.ndarray, pyramid: np.ndarray) ->
     return level
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _weigh(narrow: np.ndarray, wide: np.ndarray, whole: np.ndarray) -> None:
     """Compute weights of the corners, normals and places in the textures; arguments as :func:`gather`."""
     for n in range(PIXELS):  # vectorised by the compiler
