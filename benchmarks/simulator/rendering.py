@@ -23,8 +23,8 @@ from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build
 from simharness.world.scene.playback import Playback
 
-SIZES = {(640, 480): 9.0, (1032, 776): 20.0}  # pixels, and target milliseconds per picture
-PARALLEL_RATE = 180.0  # target pictures per second on two processes, 640 x 480
+SIZES = {(640, 480): 5.0, (1032, 776): 12.0, (1920, 1080): 30.0}  # pixels, and target milliseconds per picture
+PARALLEL_RATE = 350.0  # target pictures per second on two processes, 640 x 480
 SKINNING = 0.3  # target milliseconds per person for posing and skinning
 _PROCESSES = 2
 _BLOCK = 64  # frames

@@ -18,7 +18,7 @@ from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import Scene, build
 from simharness.world.scene.playback import Playback, simulate
 
-TARGET = 250.0  # scene frames per second with 4 people and 5 cameras
+TARGET = 1000.0  # scene frames per second with 4 people and 5 cameras
 RATE = 25.0  # frames per second
 STAGES = ("simulate", "film", "detect")
 SWEEPS: dict[str, tuple[tuple[int, int], ...]] = {

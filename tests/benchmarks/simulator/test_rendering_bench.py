@@ -33,8 +33,8 @@ def test_targets_are_compared_with_the_median():
 
 
 def test_sizes_and_targets_are_those_of_the_task():
-    assert rendering.SIZES == {(640, 480): 9.0, (1032, 776): 20.0}
-    assert rendering.PARALLEL_RATE == 180.0
+    assert rendering.SIZES == {(640, 480): 5.0, (1032, 776): 12.0, (1920, 1080): 30.0}
+    assert rendering.PARALLEL_RATE == 350.0
     staged = scenario()
     assert (staged.people.count, staged.cameras.count, staged.cameras.size) == (4, 5, (640, 480))
     assert staged.clutter.boxes + staged.clutter.shelves > 0
