@@ -28,7 +28,9 @@ def max_product(states, unary, count, graph, length, precision):
     Returns:
         Index of the chosen state of every joint, (J,); 0 for a joint without states.
     """
-    joints, most = len(count), max(count.max(), 1)
+    joints, most = len(count), 1
+    for joint in range(joints):
+        most = max(most, count[joint])
     belief, choice = np.zeros((joints, most)), np.empty((joints, most, most), np.int64)
     pairs = np.empty((joints, 2, most, most))  # terms of each joint with the joints that it is eliminated before
     for joint in range(joints):

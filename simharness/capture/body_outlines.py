@@ -173,7 +173,8 @@ def bounding_box(points, edges, cameras, first_row, last_row, out):
                 i, j = edges[e, 0], edges[e, 1]
                 if state[i] + state[j] < 2 * _IN_IMAGE:
                     _cut(i, j, local, pixel, state, c, image, box)
-        out[view] = box
+        for k in range(4):  # an assignment of arrays takes a second to compile: it brings the text of an error
+            out[view, k] = box[k]
 
 
 @njit(cache=True, fastmath={"nnan", "nsz"})  # vectorised by the compiler: least and greatest numbers, no sums

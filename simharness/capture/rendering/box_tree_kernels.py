@@ -96,10 +96,17 @@ def _cost(counts: np.ndarray, spans: np.ndarray) -> float:
     total = counts.sum()
     if total == 0:
         return 0.0
-    x = spans[:, 3].max() - spans[:, 0].min()
-    y = spans[:, 4].max() - spans[:, 1].min()
-    z = spans[:, 5].max() - spans[:, 2].min()
+    x, y, z = _extent(spans, 0), _extent(spans, 1), _extent(spans, 2)
     return total * (x * y + y * z + z * x)
+
+
+@njit(cache=True, error_model="numpy")
+def _extent(spans: np.ndarray, axis: int) -> float:
+    """Return the extent of boxes (n, 6) together along an axis."""
+    low, high = spans[0, axis], spans[0, 3 + axis]
+    for k in range(1, len(spans)):
+        low, high = min(low, spans[k, axis]), max(high, spans[k, 3 + axis])
+    return high - low
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})

@@ -32,7 +32,8 @@ def project_vertices(
     """
     n, first = len(vertices), len(drawn)
     q, seen, codes = np.empty((n, 3)), np.empty((n, 3), np.float32), np.empty(n, np.uint32)
-    q[:first] = drawn
+    for i in range(first):  # an assignment of arrays takes a second to compile: it brings the text of an error
+        q[i, 0], q[i, 1], q[i, 2] = drawn[i, 0], drawn[i, 1], drawn[i, 2]
     # Local copies: otherwise P is read again for every vertex, because q might alias it.
     p00, p01, p02, p03 = P[0, 0], P[0, 1], P[0, 2], P[0, 3]
     p10, p11, p12, p13 = P[1, 0], P[1, 1], P[1, 2], P[1, 3]
