@@ -63,9 +63,7 @@ def njit(
         borrows: the kernel works on arrays of its caller alone: it makes none and gets none from other kernels. Then it
             need not count references to them, which takes longer than to invert a 3 x 3 matrix. One that makes an array
             does not compile; one that gets an array from another kernel would never free it.
-        **options: options of ``numba.njit``. With ``forceinline=True`` a kernel becomes part of its callers. That saves
-            time in inner loops: an array is ten words, which a call passes through memory. Where ``fastmath`` permits
-            fused operations, the last digits may change.
+        **options: options of ``numba.njit``.
     """
     if function is None:
         return lambda decorated: njit(decorated, cache=cache, borrows=borrows, **options)

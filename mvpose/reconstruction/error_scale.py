@@ -116,7 +116,7 @@ def fit_variances(misfit, responsibilities, support, sigmas):
     return min(relative, _FIT_MOST), absolute
 
 
-@njit(cache=True, borrows=True, forceinline=True)
+@njit(cache=True, borrows=True)
 def observe(point, view, relative, absolute, information):
     """Write the observed information of one joint's keypoints at its estimated position, at the scale of their misfit.
 

@@ -135,7 +135,7 @@ def add_sums(sums, A, b):
             k += 1
 
 
-@njit(cache=True, borrows=True, forceinline=True, fastmath=_FASTMATH)
+@njit(cache=True, borrows=True, fastmath=_FASTMATH)
 def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper, A, b):
     """Add the rays of all views to the normal equations A (3, 3) and b (3,) of the step from the point to the joint.
 
@@ -175,7 +175,7 @@ def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper,
     return support, responsibilities, misfit
 
 
-@njit(cache=True, borrows=True, forceinline=True, fastmath=_FASTMATH)
+@njit(cache=True, borrows=True, fastmath=_FASTMATH)
 def evaluate_strongest_modes(point, origins, directions, weights, pixel, sigma, floor):
     """Return the sums of :func:`accumulate` for the strongest modes only, and the greatest squared error, m^2."""
     support, responsibilities, misfit, worst = 0.0, 0.0, 0.0, 0.0
@@ -211,7 +211,7 @@ def anchor(A, b):
         b[r] = 0.0
 
 
-@njit(cache=True, borrows=True, forceinline=True)
+@njit(cache=True, borrows=True)
 def solve(A, b, inverse, point):
     """Write the inverse of a symmetric A (3, 3) and ``inverse @ b``; return False if A is numerically singular.
 

@@ -122,7 +122,7 @@ _NEARLY_ALL = 0.8  # of the total score
 _BEYOND_CHANCE = 3.5  # views; three rays may pass one point by chance
 
 
-@njit(cache=True, borrows=True, forceinline=True)
+@njit(cache=True, borrows=True)
 def consensus(point, view, scratch):
     """Write the most likely point of one joint and return its support as :func:`settle` does.
 
@@ -168,7 +168,7 @@ def consensus(point, view, scratch):
     return settle(point, view, scratch, 1.0, _MOST_STEPS)
 
 
-@njit(cache=True, borrows=True, forceinline=True)
+@njit(cache=True, borrows=True)
 def settle(point, view, scratch, temper, steps):
     """Move a point to the nearby maximum of its likelihood by expectation maximisation.
 
@@ -196,7 +196,7 @@ def settle(point, view, scratch, temper, steps):
     return sums
 
 
-@njit(cache=True, borrows=True, forceinline=True)
+@njit(cache=True, borrows=True)
 def _all_views(point, view, scratch):
     """Write the point nearest to all rays, weighted by score; return False if fewer than two views see the joint."""
     origins, directions, weights = view[:3]

@@ -162,7 +162,7 @@ def _constrain(joints, covariance, state, state_covariance, ends, length, varian
             break
 
 
-@njit(cache=True, borrows=True, forceinline=True)
+@njit(cache=True, borrows=True)
 def _add_bones(A, b, j, joints, covariance, ends, length, variance):
     """Add the bones that end in a joint, linearised; the uncertainty of the other end adds to that of the length."""
     for k in range(len(ends)):
@@ -190,7 +190,7 @@ def _add_bones(A, b, j, joints, covariance, ends, length, variance):
         b[2] += weight * z * at
 
 
-@njit(cache=True, borrows=True, forceinline=True)
+@njit(cache=True, borrows=True)
 def _along(P, x, y, z):
     """Return the variance of a position along a unit vector."""
     return max(

@@ -101,7 +101,7 @@ class Existence:
 
     def span(self, dt: float) -> float:
         """Return the time in which people of a new track may have come, from the time since the previous pictures."""
-        return float(np.clip(dt, _SHORTEST, _LONGEST))
+        return min(max(dt, _SHORTEST), _LONGEST)
 
 
 @njit(cache=True, borrows=True)

@@ -161,7 +161,7 @@ def trunk_velocity(state, trunk):
     return common
 
 
-@njit(cache=True, borrows=True, forceinline=True)
+@njit(cache=True, borrows=True)
 def carry(state, covariance, lead):
     """Move one joint along its velocity by ``lead`` seconds, which may be negative, without process noise, in place.
 
@@ -182,7 +182,7 @@ def carry(state, covariance, lead):
             covariance[r, c] += lead * covariance[r, 3 + c]
 
 
-@njit(cache=True, borrows=True, forceinline=True)
+@njit(cache=True, borrows=True)
 def condition(state, covariance, position, inverse, posterior, scratch):
     """Condition one joint on a posterior of its position, in place.
 

@@ -61,7 +61,7 @@ def update_people(
         factor: factor of these covariances, at least 1.
     """
     m, joints = weights.shape
-    scratch, work, leads = np.empty((8, 3)), np.empty((19, 3)), np.unique(lead)
+    scratch, leads = np.empty((8, 3)), np.unique(lead)
     slowest = 0
     for j in range(joints):
         slowest = j if trunk[j] else slowest
@@ -105,7 +105,7 @@ def update_people(
                     for r in range(3):
                         states[t, j, r] -= along * common[r]
                     supports[t, j] += (
-                        _update_joint(states[t, j], covariances[t, j], view, seen, speed[j], scratch, work) / views
+                        _update_joint(states[t, j], covariances[t, j], view, seen, speed[j], scratch) / views
                     )
                     for r in range(3):
                         states[t, j, r] += along * common[r]
@@ -138,9 +138,15 @@ def _update_by_place(state, covariance, place, spread, factor):
     return True
 
 
-@njit(cache=True, borrows=True, forceinline=True)
-def _update_joint(state, covariance, view, seen, speed, scratch, work):
-    """Update one joint, in place; return the support of the rays. ``work`` (19, 3) is working memory."""
+@njit(cache=True)
+def _update_joint(state, covariance, view, seen, speed, scratch):
+    """Update one joint, in place; return the support of the rays."""
+    return _fit_joint(state, covariance, view, seen, speed, scratch, np.empty((19, 3)))
+
+
+@njit(cache=True, borrows=True)
+def _fit_joint(state, covariance, view, seen, speed, scratch, work):
+    """Update one joint as :func:`_update_joint`, with ``work`` (19, 3) as working memory."""
     origins, directions, weights, pixel, sigma, floor = view
     point, start, b, step = work[0], work[1], work[2], work[3]
     A, inverse, prior = work[4:7], work[7:10], work[10:13]
@@ -182,7 +188,7 @@ def _update_joint(state, covariance, view, seen, speed, scratch, work):
     return support
 
 
-@njit(cache=True, borrows=True, forceinline=True)
+@njit(cache=True, borrows=True)
 def _mahalanobis2(point, center, inverse):
     total = 0.0
     for r in range(3):
@@ -191,7 +197,7 @@ def _mahalanobis2(point, center, inverse):
     return max(total, 0.0)
 
 
-@njit(cache=True, borrows=True, forceinline=True)
+@njit(cache=True, borrows=True)
 def _log_posterior(point, state, prior, view):
     origins, directions, weights, pixel, sigma, floor = view
     value = log_likelihood(point, origins, directions, weights, pixel, sigma, floor)

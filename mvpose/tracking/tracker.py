@@ -229,15 +229,20 @@ class Tracker:
             *self.motion, *placed, self._bones.ends, times.elapsed, float(np.exp(-times.elapsed / _FORGETTING)),
         )  # fmt: skip
         since = self._recent.take(times.now, times.lead, times.pictures)
-        came = {"now": times.now, "span": model.existence.span(float(since.min(where=times.pictures, initial=np.inf)))}
         poses, shown_by, in_view = None, owner, ordered.view
         if newcomers or first:
-            poses = self._births.give_birth(rays, ordered, fresh, owner, **came)
+            poses = self._births.give_birth(rays, ordered, fresh, owner, now=times.now, span=self._span(times, since))
         if self._recent.wait_for(times.now, times.pictures):
-            partners, cameras = self._births.pair_with_recent(self._recent, rig, ordered, lead, owner, **came)
+            partners, cameras = self._births.pair_with_recent(
+                self._recent, rig, ordered, lead, owner, now=times.now, span=self._span(times, since)
+            )
             shown_by, in_view = np.concatenate([owner, partners]), np.concatenate([in_view, cameras])
         self._recent.add(ordered, owner < 0)
         return _Sightings(owner, shown_by, in_view, poses, since)
+
+    def _span(self, times: FrameTimes, since: Floats) -> float:
+        """Return the time in which newcomers may have come, seconds."""
+        return self.model.existence.span(float(since.min(where=times.pictures, initial=np.inf)))
 
     def _judge(
         self, rig: Rig, frame: _Frame, sightings: _Sightings, count: int, first: bool
