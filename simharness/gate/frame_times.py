@@ -105,11 +105,6 @@ def _beside_reference(
         yield detections
 
 
-def _exhaust(estimator: SequenceEstimator, rig: Rig, frames: list[Detections]) -> None:
-    for _ in estimator.track(rig, frames):
-        pass
-
-
 def _seconds(work: Callable[[], object]) -> float:
     start = time.process_time_ns()
     work()

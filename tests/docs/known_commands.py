@@ -43,6 +43,7 @@ CHECKS = (
     "simharness check ci --baseline results/baselines/ci.json --workers 2 --junit junit.xml --summary summary.md",
 )
 CHECK_OF_TRACKING = "simharness check ci_tracking --baseline results/baselines/ci_tracking.json --workers 2"
+CHECK_OF_REPAIR = "simharness check ci_repair --baseline results/baselines/ci_repair.json --workers 2"
 SHELF = (
     "simharness evaluate shelf FOLDER",
     "simharness evaluate twin shelf FOLDER",
@@ -122,6 +123,7 @@ KNOWN = {
     *PLAN,
     *CHECKS,
     CHECK_OF_TRACKING,
+    CHECK_OF_REPAIR,
     *SHELF,
     OWN_RECORDING,
     *FROM_PICTURES,

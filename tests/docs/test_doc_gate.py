@@ -10,7 +10,7 @@ import pytest
 from call_commands import done
 from doc_pages import ROOT, blocks, toml_file
 from easy_suite import EASY
-from known_commands import CHECK_OF_TRACKING, CHECKS, OWN_GATE
+from known_commands import CHECK_OF_REPAIR, CHECK_OF_TRACKING, CHECKS, OWN_GATE
 
 
 def test_the_check(easy_workplace):
@@ -22,8 +22,9 @@ def test_the_check(easy_workplace):
     assert (easy_workplace / "summary.md").read_text().startswith("## easy: no regression")
 
 
-def test_the_check_of_tracking():
-    assert "Usage" in done(CHECK_OF_TRACKING, "--help")
+def test_the_checks_of_other_suites():
+    for suite in (CHECK_OF_TRACKING, CHECK_OF_REPAIR):
+        assert "Usage" in done(suite, "--help")
 
 
 @pytest.mark.slow

@@ -48,7 +48,7 @@ def test_the_suite_of_tracking_has_enough_seeds_and_only_variants_with_memory():
     assert tests * least_corrected_p(len(study.seeds), cases=len(study.settings)) < study.gate.level
 
 
-@pytest.mark.parametrize("name", ["ci", "ci_tracking"])
+@pytest.mark.parametrize("name", ["ci", "ci_tracking", "ci_repair"])
 def test_a_committed_baseline_is_of_the_shipped_suite(name):
     root = Path(__file__).parents[3]
     study = load_study(root / "scenarios" / f"{name}.toml")
