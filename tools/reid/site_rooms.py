@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.camera import Camera, Rig
 from simharness.scenario.sections.room import Room
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.placement.free_space import FreeSpace
 from simharness.world.scene.placement.furniture import place_furniture
-from simharness.world.scene.rooms.fittings import make_fittings
+from simharness.world.scene.rooms.interior import make_interior
 from simharness.world.scene.rooms.kinds import settled
-from simharness.world.scene.rooms.lamps import make_ceiling
 from simharness.world.scene.rooms.lighting import room_lighting
-from simharness.world.scene.rooms.lights_of_kinds import lights_of, shown_lights_of
+from simharness.world.scene.rooms.lights_of_kinds import lights_of
 from simharness.world.scene.rooms.openings import draw_openings
-from simharness.world.scene.rooms.room import make_room
+from simharness.world.scene.rooms.walls import walls_of
 
 REACH = 1.5
 """Half the side of the square in which people stand, metres."""
@@ -73,23 +73,21 @@ def furnish(rng: np.random.Generator, room: Room, seed: int, cameras: Sequence[C
     is_bare, is_tinted = rng.random(2) < (_BARE, _TINTED)
     paint = rng.uniform(0.4, 1.0, (2, 3)).astype(np.float32)
     room = settled(room, seed)
-    openings = draw_openings(room, seed)
+    openings, rig = draw_openings(room, seed), Rig(cameras)
     areas = lights_of(room, seed, openings) if room.walls and not is_bare else ()
-    furniture = place_furniture(seed, _free_space(room, cameras), openings)
-    above = (make_ceiling(room), *shown_lights_of(room, seed, areas)) if areas else ()
-    shell = [_coarser(solid.mesh) for solid in make_room(room, seed, openings)]
-    if is_tinted:
-        shell = [replace(mesh, colors=mesh.colors * paint[min(m, 1)]) for m, mesh in enumerate(shell)]
-    others = (*above, *make_fittings(room, seed, openings, furniture), *furniture)
+    furniture = place_furniture(seed, _free_space(room, rig), openings)
+    solids = make_interior(room, seed, rig, openings=openings, areas=areas, objects=furniture)
+    tints = {"floor": paint[0], "ground": paint[0]} | {wall.name: paint[1] for wall in walls_of(room)}
+    tinted = [_tinted(solid, tints) if is_tinted else solid.mesh for solid in solids]
     return SiteRoom(
         room=room,
-        meshes=(*shell, *(solid.mesh for solid in others)),
+        meshes=(*tinted, *(piece.mesh for piece in furniture)),
         lighting=_varied(rng, room_lighting(room, seed, areas)),
         furniture=tuple(solid.hull for solid in furniture),
     )
 
 
-def _free_space(room: Room, cameras: Sequence[Camera]) -> FreeSpace:
+def _free_space(room: Room, rig: Rig) -> FreeSpace:
     """Return the space that furniture can use: the area in which people stand must be free and visible."""
     places = np.linspace(-REACH, REACH, 3)
     columns = np.meshgrid(places, places, np.linspace(0.1, _TALL, 6), indexing="ij")
@@ -100,17 +98,15 @@ def _free_space(room: Room, cameras: Sequence[Camera]) -> FreeSpace:
         time=np.zeros(1),
         pelvises=joints[:, :, 0],
         joints=joints,
-        rig=Rig(cameras),
+        rig=rig,
     )
 
 
-def _coarser(mesh: Mesh) -> Mesh:
-    """Halve the resolution of a mesh's texture: invisible in small pictures, and four times as fast to make."""
-    if mesh.texture is None:
-        return mesh
-    height, width = mesh.texture.shape[:2]
-    small = cv2.resize(mesh.texture, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
-    return replace(mesh, texture=small.astype(np.uint8, copy=False))
+def _tinted(solid: Solid, tints: Mapping[str, NDArray[np.float32]]) -> Mesh:
+    """Return the mesh of a solid, painted if it is a floor or a wall."""
+    if solid.name not in tints:
+        return solid.mesh
+    return replace(solid.mesh, colors=solid.mesh.colors * tints[solid.name])
 
 
 def _varied(rng: np.random.Generator, light: Lighting) -> Lighting:

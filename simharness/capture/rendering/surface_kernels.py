@@ -235,5 +235,8 @@ def _weigh(narrow: np.ndarray, wide: np.ndarray, whole: np.ndarray) -> None:
 
 def packed(picture: np.ndarray) -> np.ndarray:
     """Pack texels (m, 3) uint8 into (m,) uint64: colours 20 bits apart, so that one product weights all three."""
-    red, green, blue = picture.astype(np.uint64).T
-    return np.asarray(red | green << _LANE | blue << _TWO_LANES)
+    texels = picture[:, 2].astype(np.uint64)
+    for channel in (1, 0):
+        texels <<= _LANE
+        texels |= picture[:, channel]
+    return np.asarray(texels)

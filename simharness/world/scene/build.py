@@ -33,15 +33,12 @@ from simharness.world.scene.placement.clutter import place_clutter
 from simharness.world.scene.placement.decoys import place_decoys
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, FreeSpace
 from simharness.world.scene.placement.furniture import place_furniture
-from simharness.world.scene.rooms.court import make_court
-from simharness.world.scene.rooms.fittings import make_fittings
+from simharness.world.scene.rooms.interior import make_interior
 from simharness.world.scene.rooms.kinds import check_size, settled
-from simharness.world.scene.rooms.lamps import has_ceiling, make_ceiling
+from simharness.world.scene.rooms.lamps import has_ceiling
 from simharness.world.scene.rooms.lighting import room_lighting
-from simharness.world.scene.rooms.lights_of_kinds import lights_of, shown_lights_of
+from simharness.world.scene.rooms.lights_of_kinds import lights_of
 from simharness.world.scene.rooms.openings import draw_openings
-from simharness.world.scene.rooms.room import make_room
-from simharness.world.scene.rooms.surroundings import make_surroundings
 
 CLOCK_MARGIN = 1.0  # seconds of motion before and after the sequence: clock errors of cameras are smaller
 
@@ -126,10 +123,7 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     furniture = place_furniture(seed, replace(space, taken=props + decoys), openings)
     clutter = place_clutter(seed, scenario.clutter, replace(space, taken=props + decoys + furniture))
     objects = (*furniture, *props, *decoys, *clutter)
-    above = (make_ceiling(room), *shown_lights_of(room, seed, areas)) if areas else ()
-    above = make_surroundings(room, seed, rig) if room.kind == "outdoors" else above
-    above = (*make_court(room, seed), *above)
-    solids = (*make_room(room, seed, openings), *above, *make_fittings(room, seed, openings, objects), *objects)
+    solids = (*make_interior(room, seed, rig, openings=openings, areas=areas, objects=objects), *objects)
     check_rig(scenario, solids, rig)
     bodies = tuple(person.body for person in cast)
     model = compile_model(movers, solids)
