@@ -94,7 +94,8 @@ def see(chosen: Setting, *, seed: int = 0) -> Seen:
 
 class TestFiles:
     def test_all_that_is_promised_ships(self):
-        assert {"quickstart", "gathering", "passage", "ci", "ci_tracking", "ci_repair", "campus", "shelf", *STUDIES} <= set(SHIPPED)
+        single, suites = {"quickstart", "gathering", "passage", "campus", "shelf"}, {"ci", "ci_tracking", "ci_repair"}
+        assert single | suites | {*STUDIES} <= set(SHIPPED)
 
     @pytest.mark.parametrize("name", SHIPPED)
     def test_it_is_named_as_its_file_and_says_what_it_is_in_one_line(self, name):
