@@ -160,17 +160,18 @@ def test_training_twice_gives_the_same_network():
     from tools.reid.training import train
 
     crops = toy_crops()
-    one, two, other = (train(crops, seed=seed, epochs=2).state_dict() for seed in (1, 1, 2))
+    one, two, other = (train(crops, seed=seed, epochs=2, threads=2).state_dict() for seed in (1, 1, 2))
     assert all(torch.equal(one[key], two[key]) for key in one)
     assert not all(torch.equal(one[key], other[key]) for key in one)
 
 
-def test_training_on_uniform_colours_lowers_the_loss():
+@pytest.mark.parametrize("threads", [1, 2])
+def test_training_on_uniform_colours_lowers_the_loss(threads):
     pytest.importorskip("torch")
     from tools.reid.training import train
 
     losses = []
-    train(toy_crops(), seed=0, epochs=6, report=lambda at: losses.append(at.identities))
+    train(toy_crops(), seed=0, epochs=6, threads=threads, report=lambda at: losses.append(at.identities))
     assert losses[-1] < 0.7 * losses[0]
 
 
@@ -200,6 +201,25 @@ def test_batches_hold_several_people_of_a_group_and_several_crops_of_each():
         assert (np.unique(crops.site[batch], return_counts=True)[1] == 16).all()
     again = [batch.numpy() for batch in Batches(crops, 0).epoch(0)]
     np.testing.assert_array_equal(rows, again)
+
+
+def test_the_learners_of_all_threads_share_their_weights():
+    torch = pytest.importorskip("torch")
+    from tools.reid.network import DIMENSIONS, Network
+    from tools.reid.training import _Learner, _twin
+
+    torch.manual_seed(0)
+    network, centers = Network(), torch.nn.Parameter(torch.randn(4, DIMENSIONS))
+    crops, labels = torch.from_numpy(toy_crops().images[:8]), torch.tensor([0, 0, 1, 1, 2, 2, 3, 3])
+    one, other = (
+        _Learner(each, centers, torch.Generator().manual_seed(5)).gradients(crops, labels, False)
+        for each in (network, _twin(network))
+    )
+    for own, twin in zip(one[0], other[0], strict=True):
+        torch.testing.assert_close(own, twin)
+    twin = _twin(network)
+    assert all(own is other for own, other in zip(network.parameters(), twin.parameters(), strict=True))
+    assert not any(own is other for own, other in zip(network.buffers(), twin.buffers(), strict=True))
 
 
 def test_triplet_loss_by_hand():

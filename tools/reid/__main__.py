@@ -111,7 +111,7 @@ def _parser() -> argparse.ArgumentParser:
         "--cache",
         type=Path,
         default=Path(tempfile.gettempdir()) / "simharness-reid",
-        help="folder of the rendered crops (about 1.5 GB), used again by the same code (default: %(default)s)",
+        help="folder of the rendered crops (about 1.8 GB), used again by the same code (default: %(default)s)",
     )
     parser.add_argument(
         "--seed", type=int, default=0, help="seed of people, pictures and training (default: %(default)s)"

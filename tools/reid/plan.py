@@ -16,7 +16,7 @@ _TRAINING_LOOK_ALIKE = (0.0, 0.0, 0.0, 0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 _AT_A_SITE = 10  # training groups per site
-_AT_A_VALIDATION_SITE, _AT_A_SCENE_SITE = 5, 3  # groups per site of the affinity and of the look_alike curve
+_AT_A_VALIDATION_SITE, _AT_A_SCENE_SITE = 5, 5  # groups per site of the affinity and of the look_alike curve
 _SAMPLE = 10  # groups in the sample
 
 # In training the sensors differ by more and by less than in the evaluation, and people are occluded a little more.
@@ -38,13 +38,13 @@ class Plan:
     """
 
     seed: int = 0
-    training: int = 800
+    training: int = 1000
     validation: int = 40
     held_out: int = 75
     sites: int = 4
     curve: int = 25
     curve_size: int = 12
-    epochs: int = 28
+    epochs: int = 33
 
     @classmethod
     def quick(cls, *, seed: int = 0) -> Plan:
