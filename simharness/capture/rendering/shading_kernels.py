@@ -78,7 +78,7 @@ def shade(
         vertex_normals: unit normals of the vertices, (n, 3) float32.
         texture: index of each face's texture, -1 for none, (k,) int16.
         uv: texture coordinates of the corners, (k, 3, 2) float32; ignored if no face has a texture.
-        texels: texels of all textures at all mipmap levels, (m,) uint64, see :func:`packed`.
+        texels: texels of all textures at all mipmap levels, (m,) uint64, see :func:`.surface_kernels.packed`.
         pyramids: first texel, height and width of every level of every texture, (textures, levels, 3); each level has
             a border of one texel, copied from the opposite side.
         center: camera centre in the world, (3,).

@@ -2,7 +2,7 @@
 
 Of 14,221 tops of a fashion shop, 25 % are black, 23 % white and 13 % red (statistics of the data set of Ping et al.,
 "Fashion-AttGAN: attribute-aware fashion editing", arXiv 1904.07460). Black (with charcoal), white (with cream) and the
-reds (red, burgundy, pink) of :data:`TOPS` have these shares. The shares of the other colours, of trousers and of shoes
+reds (red, burgundy, pink) of ``TOPS`` have these shares. The shares of the other colours, of trousers and of shoes
 are an assumption: no published counts were found for them. The albedos are chosen by eye.
 """
 
