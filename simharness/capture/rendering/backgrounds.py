@@ -47,7 +47,7 @@ class Background:
     """Picture of the still meshes.
 
     Attributes:
-        rays: matrix, (3, 3), such that ``center + depth * rays @ (x, y, 1)`` is the point at a pixel.
+        to_rays: matrix, (3, 3), such that ``center + depth * to_rays @ (x, y, 1)`` is the point at a pixel.
         inverse_depth: inverse depth, 1/m, (h, w) float32; 0 without a surface.
         triangle: visible face, (h, w) int32; -1 without a surface.
         corners: homogeneous pixel coordinates of the vertices, (n, 3).
@@ -58,7 +58,7 @@ class Background:
         lit: the same in the light that was asked for last.
     """
 
-    rays: NDArray[np.float64]
+    to_rays: NDArray[np.float64]
     inverse_depth: NDArray[np.float32]
     triangle: NDArray[np.int32]
     corners: NDArray[np.float64]

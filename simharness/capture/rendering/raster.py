@@ -96,7 +96,7 @@ def _picture(scene: _Scene, camera: Camera, color: bool, lighting: Lighting, par
     corners, seen, codes = project_vertices(
         geometry.vertices, projection_matrix(camera), NEAR, background.corners, width, height
     )
-    rays = background.rays
+    rays = background.to_rays
     sources = LitScene.of(geometry, lighting) if color else None
     if sources is not None:
         lit = sources.background(background, camera, rays)
@@ -151,9 +151,11 @@ def _lit(background: Background, geometry: SceneGeometry, camera: Camera, lighti
     shadows, seen = geometry.shadows(lighting), (background.triangle, background.inverse_depth)
     if background.lit is None or background.lit.lighting != lighting or background.lit.light != shadows.light:
         rgb = np.empty((*background.triangle.shape, 3), np.uint8)
-        fill_empty(rgb, background.triangle < 0, lighting, background.rays)
-        place, depth = shadow_places(*seen, camera.center, background.rays, shadows.light.P, SHADOW_SIZE)
-        _shade(geometry, camera, background.rays, lighting, *seen, background.corners, NO_SHADOW, place, depth, 0, rgb)
+        fill_empty(rgb, background.triangle < 0, lighting, background.to_rays)
+        place, depth = shadow_places(*seen, camera.center, background.to_rays, shadows.light.P, SHADOW_SIZE)
+        _shade(
+            geometry, camera, background.to_rays, lighting, *seen, background.corners, NO_SHADOW, place, depth, 0, rgb
+        )
         background.lit = LitBackground(lighting, shadows.light, rgb, place, depth, np.zeros((0, 5), np.int32))
     return background.lit
 

@@ -57,7 +57,7 @@ class RoomView:
         state = Playback(scene).at(float(self.replay.time[self.frame]))
         solids = zip(meshes_at(scene, state)[len(scene.bodies) :], scene.solids, strict=True)
         shown = [mesh for mesh, solid in solids if solid.kind != "room" or not self._hides_room(mesh.vertices)]
-        lighting = replace(scene.lighting, background=(1.0, 1.0, 1.0), sources=None)  # it has no ceiling
+        lighting = replace(scene.lighting, background=(1.0, 1.0, 1.0), panorama=None, sources=None)  # no ceiling
         rgb = antialiased(renderer_of("raster"), scaled(self.eye, finer), shown, lighting=lighting)
         return Picture("The room", "", rgb)
 

@@ -9,7 +9,7 @@ import pytest
 from mesh_shapes import ball, sheet
 from test_renderers import camera_at
 
-from simharness.capture.rendering.finish_kernels import FINISHING, finish, grain_of
+from simharness.capture.rendering.finish_kernels import FINISHING, GLOSS, finish, grain_of
 from simharness.capture.rendering.finishes import Finishes
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.rendering.surface_kernels import NORMAL_X, NORMAL_Y, NORMAL_Z, PIXELS, memory
@@ -72,12 +72,13 @@ def finished(normal, *, light, material=Material.SKIN, slope=0.0, view=(0.0, 0.0
     x, y, z = view
     rays = np.array([[1e-9, 0, -x], [0, 1e-9, -y], [0, 0, -z]])
     received, grain = np.ones(3 * PIXELS, np.float32), np.tile(np.array([1, 0, 0, slope], np.float32), (3, 1))
-    gloss = finish(
+    work = np.zeros(FINISHING, np.float32)
+    finish(
         pixel, pixel, pixel, 0, np.array([[0, 1, 2]], np.uint32), 0, rays, narrow, np.array([material], np.int8),
         np.zeros(1, np.int16), np.array([light], np.float32), np.zeros(1, np.float32), grain, np.zeros(3, np.float32),
-        0.6, np.zeros(FINISHING, np.float32), received,
+        0.6, work, received,
     )  # fmt: skip
-    return received[::PIXELS], gloss[0]
+    return received[::PIXELS], work[GLOSS]
 
 
 def test_gloss_is_that_of_a_ggx_lobe():
