@@ -58,11 +58,17 @@ def test_the_card_belongs_to_the_model_and_its_splits_are_disjoint(content):
     assert data["held_out"]["identities"] >= 290
 
 
-def test_scores_among_held_out_people_of_a_scene(content):
-    """Rank-1 of 95 % with up to 15 % of the joints hidden, in all kinds of rooms, lights and sensors.
+@pytest.mark.xfail(strict=True, reason="missed in all kinds of rooms and sensors: rank-1 94.7 and 93.0, mAP 88.8")
+def test_scores_among_held_out_people_of_a_scene_are_those_required(content):
+    """Required: rank-1 of 95 % and mAP of 90 % with colour casts and partial occlusion."""
+    distinct = content["results"]["look_alike"]["0"]
+    assert distinct["hidden"]["0.3"]["rank1"] >= 95.0
+    assert distinct["network"]["rank1"] >= 94.0  # with up to half of the joints hidden
+    assert distinct["network"]["mAP"] >= 90.0
 
-    With up to 30 % hidden 95 % are aimed at, and mAP of 90 % with up to half: this network has 94.7 and 88.8.
-    """
+
+def test_scores_among_held_out_people_of_a_scene(content):
+    """What the network has, where it misses what is required."""
     curve = [content["results"]["look_alike"][f"{value:g}"] for value in (0.0, 0.25, 0.5, 0.75, 1.0)]
     distinct = curve[0]
     assert distinct["identities"] >= 290
@@ -123,13 +129,28 @@ def test_the_card_of_another_file_is_refused(tmp_path, content):
         card.read(model)
 
 
-@pytest.mark.slow
-def test_scores_on_newly_rendered_people():
+@pytest.fixture(scope="module")
+def new_people():
+    """Crops of people who were used neither for training nor for evaluation."""
     poses, recipe = plan_poses(UNUSED_RUN, frames=4, takes=1), Recipe(moments=1, views=4)
     people = groups("held-out", UNUSED_RUN, 10, size=4, at_a_site=10)
     crops = Crops.joined([crops_of_group(group, recipe, poses=poses) for group in people])
     assert len(crops) > 100
-    session = Session(DEFAULT)
+    return crops
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="missed in all kinds of rooms and sensors: rank-1 84.9, mAP 83.2")
+def test_scores_on_newly_rendered_people_are_those_required(new_people):
+    result = scores.score_sites(Session(DEFAULT), [new_people])
+    assert result["network"]["rank1"] >= 90.0  # about 130 queries: 95 minus two standard errors
+    assert result["network"]["mAP"] >= 85.0
+
+
+@pytest.mark.slow
+def test_scores_on_newly_rendered_people(new_people):
+    """What the network has, where it misses what is required."""
+    crops, session = new_people, Session(DEFAULT)
     result = scores.score_sites(session, [crops])
     assert result["network"]["rank1"] >= 78.0  # of forty people, about 120 queries: 85 minus two standard errors
     assert result["network"]["mAP"] >= 75.0
