@@ -12,7 +12,7 @@ pixels together: they multiply the received light, and write the share of it tha
 - Cloth that is shorter along its grain than at rest folds, so deep that its length stays (Rohmer et al., "Animation
   wrinkling", 2010): its normal is tilted by a fixed profile of folds. The surface does not move.
 
-The light around a figure is taken as one direction and an even rest: a row of :func:`figure_light`.
+The light around a figure is taken as one direction and an even rest: a row of :func:`.figure_kernels.figure_light`.
 """
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
@@ -24,17 +24,11 @@ import math
 import numpy as np
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.moving_light_kernels import light_at
 from simharness.capture.rendering.surface_kernels import NORMAL_X, NORMAL_Y, NORMAL_Z, PIXELS, SECOND, THIRD
 from simharness.types.finish import Material
-from simharness.types.srgb import LUMINANCE
 
-_HEIGHT = 0.75  # share of a figure's height at which its light is taken
 _FOLD_PERIOD, _FOLD_STEPS = 0.36, 256  # metres and entries of the profile of folds
 _HAIR_STEPS = 512
-_SLACK = 0.02  # share of its length by which cloth shortens without a fold
-_DEPTH, _DEEPEST = 1.3, 0.65  # slope of folds for each unit of shortening beyond it, and at most
-_EVER = 0.07  # slope of folds of loose cloth at rest
 _LEAST = np.float32(0.012)  # slope of folds that cannot be seen
 _ZERO, _UNIT, _HALF, _TINY = np.float32(0.0), np.float32(1.0), np.float32(0.5), np.float32(1e-6)
 _PRIMARY, _SECONDARY, _STREAKS = np.float32(0.07), np.float32(0.9), np.float32(0.22)
@@ -86,82 +80,8 @@ _GRAIN_X, _GRAIN_Y, _GRAIN_Z, _TILT, _TONE, _VIEW_X, _VIEW_Y, _VIEW_Z, GLOSS, FI
 )
 """Rows of memory of :func:`finish`, float32, and their end."""
 
-_RED, _GREEN, _BLUE = LUMINANCE
 _TABLE, _SLOPES = _surface_table(), _fold_table()
 _LOCKS, _STRANDS = _strand_tables()
-
-
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def grain_of(vertices: np.ndarray, toward: np.ndarray, rest: np.ndarray, looseness: np.ndarray) -> np.ndarray:
-    """Return the unit direction of the grain at every vertex and the slope of the folds there, (n, 4) float32.
-
-    Args:
-        vertices: positions, (n, 3) float32.
-        toward: vertex that each points to, (n,).
-        rest: distance to it at rest, metres, (n,) float32.
-        looseness: see :class:`simharness.types.finish.Finish`, (n,) float32.
-    """
-    grain = np.zeros((len(vertices), 4), np.float32)
-    for i in range(len(vertices)):
-        k = toward[i]
-        if k == i:
-            continue
-        x, y, z = vertices[k, 0] - vertices[i, 0], vertices[k, 1] - vertices[i, 1], vertices[k, 2] - vertices[i, 2]
-        length = np.float32(math.sqrt(x * x + y * y + z * z))
-        scale = _UNIT / max(length, _TINY)
-        grain[i, 0], grain[i, 1], grain[i, 2] = x * scale, y * scale, z * scale
-        if looseness[i] > _ZERO:
-            short = np.float32(_DEPTH) * max(_UNIT - length / rest[i] - np.float32(_SLACK), _ZERO)
-            grain[i, 3] = min(looseness[i] * (np.float32(_EVER) + short), np.float32(_DEEPEST))
-    return grain
-
-
-@njit(cache=True, error_model="numpy")
-def figure_light(
-    vertices: np.ndarray, spans: np.ndarray, origin: np.ndarray, step: np.ndarray, every: np.ndarray,
-    straight: np.ndarray,
-) -> np.ndarray:  # fmt: skip
-    """Return the light around figures, (meshes, 7) float32.
-
-    A row is the unit direction to the direct light, the luminance of its irradiance, that of the rest, the change of
-    the rest with the upward part of a normal, and how wide the direct light is as roughness.
-
-    Args:
-        vertices: vertices of the moving meshes, (v, 3).
-        spans: first and end of the vertices of each mesh, (meshes, 2).
-        origin: origin of the probes, (3,).
-        step: distances of the probes, (3,).
-        every: light of all sources at the probes by the six directions, (nx, ny, nz, 18).
-        straight: luminance of what comes straight from area lights and sun, (nx, ny, nz, 6).
-    """
-    result = np.zeros((len(spans), 7), np.float32)
-    column, direct, rest = np.empty(18), np.empty(6), np.empty(6)
-    for mesh in range(len(spans)):
-        low, high = np.full(3, np.inf), np.full(3, -np.inf)
-        for i in range(spans[mesh, 0], spans[mesh, 1]):
-            for c in range(3):
-                value = np.float64(vertices[i, c])
-                low[c], high[c] = min(low[c], value), max(high[c], value)
-        if not high[0] >= low[0]:
-            continue
-        x, y, z = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2] + _HEIGHT * (high[2] - low[2])
-        light_at(origin, step, every, x, y, z, column)
-        light_at(origin, step, straight, x, y, z, direct)
-        dx, dy, dz = direct[0] - direct[1], direct[2] - direct[3], direct[4] - direct[5]
-        length, whole, mean = math.sqrt(dx * dx + dy * dy + dz * dz), 1e-6, 0.0
-        scale = 1.0 / max(length, 1e-9)
-        dx, dy, dz = dx * scale, dy * scale, dz * scale
-        for axis in range(6):
-            whole += direct[axis]
-            way = (dx if axis < 2 else (dy if axis < 4 else dz)) * (1.0 - 2.0 * (axis % 2))
-            total = _RED * column[3 * axis] + _GREEN * column[3 * axis + 1] + _BLUE * column[3 * axis + 2]
-            rest[axis] = max(total - length * max(way, 0.0), 0.05 * total)
-            mean += rest[axis] / 6.0
-        rise = min(max(0.5 * (rest[4] - rest[5]), -0.9 * mean), 0.9 * mean)
-        wide = 0.5 * min(max(0.9 - 0.8 * length / whole, 0.1), 0.7)
-        result[mesh, 0], result[mesh, 1], result[mesh, 2], result[mesh, 3] = dx, dy, dz, length
-        result[mesh, 4], result[mesh, 5], result[mesh, 6] = mean, rise, wide
-    return result
 
 
 @njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
@@ -197,9 +117,9 @@ def finish(
         narrow: surfaces of the pixels, see :func:`.surface_kernels.gather`.
         material: material of the moving faces, (m,) int8.
         figure: mesh of the moving faces, (m,) int16.
-        lights: light around the meshes, see :func:`figure_light`, (meshes, 7).
+        lights: light around the meshes, see :func:`.figure_kernels.figure_light`, (meshes, 7).
         pixel: size of a pixel at each mesh, metres, (meshes,) float32.
-        grain: see :func:`grain_of`; of the moving vertices, (v, 4).
+        grain: see :func:`.figure_kernels.grain_of`; of the moving vertices, (v, 4).
         place: see :class:`simharness.types.finish.Finish`, (v,).
         around: period of the place of hair, metres.
         work: memory, (``FINISHING``,) float32; the row from ``GLOSS`` on is the share that is reflected without colour.
@@ -251,8 +171,7 @@ def finish(
         if kind == _CLOTH:
             _fold(narrow, work, start, end, lights[m])
         elif kind == _HAIR:
-            _strands_through(narrow, work, start, end, lights[m])
-            _strands_over(narrow, work, start, end, lights[m])
+            _strands(narrow, work, start, end, lights[m])
         else:
             _lobe(narrow, work, start, end, lights[m], _TABLE[kind])
             if _TABLE[kind, 2] > _ZERO:
@@ -366,8 +285,12 @@ def _fold(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np
 
 
 @njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _strands_over(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray) -> None:
-    """Write the highlight of the surface of hair, as a share of the light that ``_TONE`` has changed."""
+def _strands(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray) -> None:
+    """Write how hair shines.
+
+    To ``_TONE`` how much more light comes back in the colour of hair, by strands and through them; to ``GLOSS`` the
+    highlight of their surface, as a share of the light so changed.
+    """
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
     normal_x, normal_y, normal_z = (
         narrow[NORMAL_X + first : NORMAL_X + last], narrow[NORMAL_Y + first : NORMAL_Y + last],
@@ -391,57 +314,33 @@ def _strands_over(narrow: np.ndarray, work: np.ndarray, first: int, last: int, l
         gx, gy, gz = grain_x[n], grain_y[n], grain_z[n]
         along = nx * gx + ny * gy + nz * gz
         square = max(gx * gx + gy * gy + gz * gz - along * along, _LEAST)
-        ahead = nx * hx + ny * hy + nz * hz
-        over = (gx * hx + gy * hy + gz * hz - along * ahead) / np.float32(math.sqrt(square))
-        lean = _RAGGED * tilt[n] + _SHIFT
-        over -= lean * ahead
-        sine = _UNIT - over * over / ((_UNIT + lean * lean) * max(hx * hx + hy * hy + hz * hz, _LEAST))
-        sine = max(sine, _ZERO)
-        sine *= sine
-        sine *= sine
-        sine *= sine
-        sine *= sine
+        ahead, half = nx * hx + ny * hy + nz * hz, max(hx * hx + hy * hy + hz * hz, _LEAST)
+        across = (gx * hx + gy * hy + gz * hz - along * ahead) / np.float32(math.sqrt(square))
+        # Where hair has no direction, as at its edges, it has no highlight.
+        lit, known = _UNIT + _STREAKS * tilt[n], min(np.float32(4.0) * square, _UNIT)
+        through = _spot(across, ahead, half, _RAGGED * tilt[n] - np.float32(1.5) * _SHIFT)
+        tone[n] = lit * (_UNIT + _SECONDARY * known * share * through * through)
+        over = _spot(across, ahead, half, _RAGGED * tilt[n] + _SHIFT)
+        over *= over
+        over *= over
         away = _UNIT - min(max(nx * vx + ny * vy + nz * vz, _ZERO), _UNIT)
         away *= away
-        lit = _UNIT + _STREAKS * tilt[n]
-        # Where hair has no direction, as at its edges, it has no highlight.
-        known = min(np.float32(4.0) * square, _UNIT)
-        spot = lit * known * share * _PRIMARY * sine * sine
+        spot = lit * known * share * _PRIMARY * over * over
         gloss[n] = (spot + (_UNIT - share) * (_DULL + _DULL * away * away)) / tone[n]
 
 
-@njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _strands_through(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray) -> None:
-    """Write to ``_TONE`` how much more light comes back in the colour of hair: by strands, and through them."""
-    light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
-    normal_x, normal_y, normal_z = (
-        narrow[NORMAL_X + first : NORMAL_X + last], narrow[NORMAL_Y + first : NORMAL_Y + last],
-        narrow[NORMAL_Z + first : NORMAL_Z + last],
-    )  # fmt: skip
-    view_x, view_y, view_z = (
-        work[_VIEW_X + first : _VIEW_X + last], work[_VIEW_Y + first : _VIEW_Y + last],
-        work[_VIEW_Z + first : _VIEW_Z + last],
-    )  # fmt: skip
-    grain_x, grain_y, grain_z = (
-        work[_GRAIN_X + first : _GRAIN_X + last], work[_GRAIN_Y + first : _GRAIN_Y + last],
-        work[_GRAIN_Z + first : _GRAIN_Z + last],
-    )  # fmt: skip
-    tilt, tone = work[_TILT + first : _TILT + last], work[_TONE + first : _TONE + last]
-    for n in range(len(tone)):
-        nx, ny, nz, vx, vy, vz = normal_x[n], normal_y[n], normal_z[n], view_x[n], view_y[n], view_z[n]
-        direct = key * max(nx * light_x + ny * light_y + nz * light_z, _ZERO)
-        share = direct / (rest + rise * nz + direct + _TINY)
-        hx, hy, hz = vx + light_x, vy + light_y, vz + light_z
-        gx, gy, gz = grain_x[n], grain_y[n], grain_z[n]
-        along = nx * gx + ny * gy + nz * gz
-        square = max(gx * gx + gy * gy + gz * gz - along * along, _LEAST)
-        ahead = nx * hx + ny * hy + nz * hz
-        over = (gx * hx + gy * hy + gz * hz - along * ahead) / np.float32(math.sqrt(square))
-        lean = _RAGGED * tilt[n] - np.float32(1.5) * _SHIFT
-        over -= lean * ahead
-        sine = _UNIT - over * over / ((_UNIT + lean * lean) * max(hx * hx + hy * hy + hz * hz, _LEAST))
-        sine = max(sine, _ZERO)
-        sine *= sine
-        sine *= sine
-        known = min(np.float32(4.0) * square, _UNIT)
-        tone[n] = (_UNIT + _STREAKS * tilt[n]) * (_UNIT + _SECONDARY * known * share * sine * sine)
+@njit(cache=True, borrows=True, inline="always", error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+def _spot(across: np.float32, ahead: np.float32, half: np.float32, lean: np.float32) -> np.float32:
+    """Return the eighth power of the sine of the angle between a strand that leans and the half vector.
+
+    Args:
+        across: part of the half vector along the strand.
+        ahead: part of it along the normal.
+        half: its squared length.
+        lean: slope of the strand.
+    """
+    across -= lean * ahead
+    sine = max(_UNIT - across * across / ((_UNIT + lean * lean) * half), _ZERO)
+    sine *= sine
+    sine *= sine
+    return sine

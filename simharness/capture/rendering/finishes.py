@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.camera import Camera
-from simharness.capture.rendering.finish_kernels import figure_light, grain_of
+from simharness.capture.rendering.figure_kernels import figure_light, grain_of
 from simharness.capture.rendering.room_light import Probes
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
@@ -75,7 +75,7 @@ class PosedFinishes:
 
     Attributes:
         finishes: what does not change.
-        lights: light around the meshes, see :func:`.finish_kernels.figure_light`, (meshes, 7).
+        lights: light around the meshes, see :func:`.figure_kernels.figure_light`, (meshes, 7).
         grain: direction of the grain and slope of folds at the vertices, (v, 4).
         middles: middles of the meshes, (meshes, 3).
     """

@@ -69,7 +69,7 @@ MISSED = pytest.mark.xfail(strict=True, reason="the model has no differences bet
 
 
 def levels(*missed):
-    """Return the measured values of look_alike; where the model misses its tolerance, the tests are expected to fail."""
+    """Return the measured values of look_alike; where the model misses, tests are expected to fail."""
     return [pytest.param(each, marks=MISSED if each in missed else ()) for each in ("0", "0.25", "0.5", "0.75", "1")]
 
 
