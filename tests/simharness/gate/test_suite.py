@@ -9,7 +9,7 @@ from suites import SMALL, remember_scenes
 from trials import Recorder
 
 from mvpose.presets import TRACKING
-from simharness.gate import suite
+from simharness.gate import frame_times, suite
 from simharness.gate.baseline import FRAMES, GATED, KEPT, TIME
 from simharness.gate.frame_times import relative_times
 from simharness.gate.reference_kernel import reference_work
@@ -80,10 +80,17 @@ def test_times_are_in_units_of_the_reference_on_any_machine(study):
 
 
 class BusyInOrder(Busy):
-    """The same with memory: it answers for all frames together, after the last one."""
+    """The same with memory: it answers for all frames together, after the last one.
+
+    Attributes:
+        calls: number of sequences that were tracked.
+    """
+
+    calls = 0
 
     def track(self, rig, frames):
         taken = list(frames)
+        self.calls += 1
         for _ in taken:
             self.estimate(rig, None)
         yield from taken
@@ -94,6 +101,16 @@ def test_times_of_variants_with_memory_are_in_units_of_the_reference(study):
     times = relative_times(detected, {"one": BusyInOrder(1), "three": BusyInOrder(3)}, repetitions=5)
     assert times["one"] == pytest.approx(1.0, rel=0.25)
     assert times["three"] == pytest.approx(3.0, rel=0.25)
+
+
+@pytest.mark.parametrize(("long", "runs"), [(0.0, 1), (1e9, 3)])
+def test_a_sequence_that_takes_long_is_timed_once(study, monkeypatch, long, runs):
+    monkeypatch.setattr(frame_times, "LONG", long)
+    detected = run_trial(study.at(study.settings[0], 0), until="detect").detected
+    busy = BusyInOrder(2)
+    times = relative_times(detected, {"busy": busy}, repetitions=3)
+    assert busy.calls == runs
+    assert times["busy"] == pytest.approx(2.0, rel=0.5)
 
 
 class TestFingerprint:

@@ -209,6 +209,24 @@ def test_a_frame_takes_the_time_until_the_next_is_taken():
     assert max(seconds) < 0.05
 
 
+class Reader:
+    """Tracker that reads the whole recording, then takes a known time."""
+
+    def estimate(self, rig, detections):
+        raise NotImplementedError
+
+    def track(self, rig, frames):
+        count = len(list(frames))
+        time.sleep(0.05)
+        yield from [Estimate.of_joints([])] * count
+
+
+def test_the_time_after_the_last_frame_is_shared_by_the_frames_that_waited_for_it():
+    seconds = [each.timings["total"] for each in track_frames(Reader(), RIG, [SEEN] * 5)]
+    assert sum(seconds) >= 0.05
+    np.testing.assert_allclose(seconds, 0.01, rtol=0.5)
+
+
 def test_an_error_of_a_preset_names_the_frame():
     frames = [Detections.empty(), Detections.empty(SHELF14)]
     with pytest.raises(RunError, match=r"^frame 1: ValueError: a tracker serves one rig and one skeleton"):
