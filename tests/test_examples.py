@@ -17,8 +17,8 @@ from simharness.study import runner
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 
 
-def test_there_are_five_examples():
-    assert len(EXAMPLES) >= 5
+def test_there_are_eight_examples():
+    assert len(EXAMPLES) >= 8
 
 
 @pytest.mark.slow

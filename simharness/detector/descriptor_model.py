@@ -106,7 +106,7 @@ class DescriptorModel:
         """Return the model fitted to measured distances: ``distances`` of a card (``tools.reid.metrics``).
 
         Least squares over the mean cosines of all bins, each weighted by its share of the pairs of its kind, and over
-        the standard deviations of the cosines of one person's pairs.
+        the standard deviations of the cosines of each kind's pairs.
         """
         edges = np.array(distances["hidden_share_of_the_joints_of_the_worse_crop"])
         turns = _waves(np.deg2rad(distances["view_difference_degrees"]))
@@ -129,8 +129,14 @@ class DescriptorModel:
         free = (1 - others["cosine"] ** 2) / _cosine_deviation(others, distances["quantiles"])
         dimensions = int(np.clip(round(free**2), _FEWEST, _MOST))
         spread = np.array(
-            [_cosine_deviation(measured[level]["same"]["all"], distances["quantiles"]) for level in levels]
+            [
+                _cosine_deviation(measured[level][kind]["all"], distances["quantiles"])
+                for level in levels
+                for kind in ("same", "other")
+            ]
         )
+        share = np.array([weight * (d == k) * (same == one) for k in range(len(levels)) for one in (True, False)])
+        share /= share.sum(axis=1, keepdims=True)
 
         def unpack(x: Floats) -> tuple[Floats, Floats, Floats, float, float]:
             shares = (1 / (1 + np.exp(-x[: 4 * len(levels)]))).reshape(4, -1)
@@ -147,11 +153,8 @@ class DescriptorModel:
             mean = kept + common * lost[d, h] * (lost @ better)[d, h]
             # Law of total variance: within bins from uneven noise and few dimensions, and between bins.
             variance = signal**2 * (twice[d, h] * (twice @ better)[d, h]) - kept**2 + (1 - mean**2) ** 2 / dimensions
-            share = weight * same / len(levels)
-            total = np.array([(share * (d == k)).sum() for k in range(len(levels))])
-            center = np.array([(share * (d == k) * mean).sum() for k in range(len(levels))]) / total
-            second = np.array([(share * (d == k) * (variance + mean**2)).sum() for k in range(len(levels))]) / total
-            return np.concatenate([np.sqrt(weight) * (mean - cosine), np.sqrt(second - center**2) - spread])
+            deviation = np.sqrt(share @ (variance + mean**2) - (share @ mean) ** 2)
+            return np.concatenate([np.sqrt(weight) * (mean - cosine), deviation - spread])
 
         none, up = np.zeros(len(levels)), np.linspace(-2, 2, len(levels))
         start = np.concatenate([none + 1.5, none, up, none])
