@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import simharness
-from mvpose import Detections, Pipeline
+from mvpose import Detections
 from mvpose.formats.calibration.panoptic import read_calibration
 from mvpose.formats.openpose import read_frame
 from mvpose.recording import People
@@ -30,7 +30,7 @@ def estimate(folder: Path, name: str) -> People:
         for files in zip(*views, strict=True):
             yield read_frame(list(files))
 
-    tracker = Tracker(Pipeline.preset("full"), model=TrackingModel(period=PERIOD))
+    tracker = Tracker(model=TrackingModel(period=PERIOD))
     return People.of_estimates(track(tracker, rig, frames(), lag=0.5), period=PERIOD)
 
 

@@ -26,17 +26,17 @@ cameras.count = 2
 """
 
 
-def require(**limits: float) -> None:
-    """Assert limits of mean scores over all conditions and seeds of the suite."""
+def require(*, pcp: float) -> None:
+    """Assert limits of mean scores over all conditions and seeds: PCP and recall in percent, false people per frame."""
     with TemporaryDirectory() as folder:
         suite = Path(folder) / "our-hall.toml"
         suite.write_text(SUITE)
-        assert_robust(suite, variant="full", **limits)
+        assert_robust(suite, variant="full", pcp=pcp, recall=80, ghosts=1.0)
 
 
 def test_people_are_found_in_our_hall() -> None:
-    """PCP and recall in percent, false people per frame."""
-    require(pcp=75, recall=80, ghosts=1.0)
+    """As built, after a camera was bumped, and with two cameras left."""
+    require(pcp=75)
 
 
 def main() -> None:
