@@ -44,7 +44,7 @@ class Plan:
     sites: int = 4
     curve: int = 25
     curve_size: int = 12
-    epochs: int = 60
+    epochs: int = 33
 
     @classmethod
     def quick(cls, *, seed: int = 0) -> Plan:

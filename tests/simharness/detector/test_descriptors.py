@@ -65,7 +65,7 @@ def as_measured(card, kind):
     return draw
 
 
-MISSED = pytest.mark.xfail(strict=True, reason="the model has no differences between sites, some lit by a few spots")
+MISSED = pytest.mark.xfail(strict=True, reason="two harmonics of the bearing are too smooth between 0 and 60 degrees")
 
 
 def levels(*missed):
@@ -82,7 +82,7 @@ def test_distances_have_the_mean_and_spread_of_the_network(model, card, level):
         assert drawn[kind].std() == pytest.approx(measured["deviation"], abs=0.025)
 
 
-@pytest.mark.parametrize("level", levels("0.25", "0.75", "1"))
+@pytest.mark.parametrize("level", levels())
 def test_distances_have_the_quantiles_of_the_network(model, card, level):
     drawn = groups(model, float(level), as_measured(card, "same"))
     for kind in ("same", "other"):
