@@ -10,7 +10,7 @@ from mvpose.cli import detect, doctor, estimate, repair, view
 
 app = typer.Typer(
     name="mvpose",
-    help="Multi-person 3D pose from calibrated cameras: from the files of a recording to tracked people.",
+    help="Make 3D poses of several people from recordings of calibrated cameras, and check the calibration.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode="rich",
@@ -38,7 +38,7 @@ def options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Multi-person 3D pose from calibrated cameras: from the files of a recording to tracked people."""
+    """Make 3D poses of several people from recordings of calibrated cameras, and check the calibration."""
 
 
 estimate.add_to(app)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Videos = Annotated[
     list[Path],
     typer.Argument(
-        help="For each camera a video or a folder of pictures; or a folder that holds these.", metavar="VIDEO"
+        help="For each camera a video or a folder of pictures; or one folder that holds them all.", metavar="VIDEO"
     ),
 ]
 
@@ -47,11 +47,16 @@ class Networks:
         ),
     ] = None
     detector_kind: Annotated[
-        str | None, typer.Option(metavar="KIND", help="yolox, rtmdet, rtmo or yolo, where the file does not show it.")
+        str | None,
+        typer.Option(
+            metavar="KIND", help="Kind of the detector, if its file does not show it: yolox, rtmdet, rtmo or yolo."
+        ),
     ] = None
-    min_score: Annotated[float, typer.Option(metavar="P", help="Least score of a person.", min=0.0, max=1.0)] = 0.3
-    provider: Annotated[str, typer.Option(metavar="NAME", help="cpu, cuda or auto.")] = "auto"
-    threads: Annotated[int, typer.Option(metavar="N", help="Threads of the networks.", min=1)] = 1
+    min_score: Annotated[
+        float, typer.Option(metavar="P", help="People with a lower score are left out.", min=0.0, max=1.0)
+    ] = 0.3
+    provider: Annotated[str, typer.Option(metavar="NAME", help="Where the networks run: cpu, cuda or auto.")] = "auto"
+    threads: Annotated[int, typer.Option(metavar="N", help="Threads of the networks on the CPU.", min=1)] = 1
 
 
 _LEFT = "detections that are complete are kept, and another run goes on from there"
@@ -70,7 +75,10 @@ def detect(
     *,
     networks: Networks,
 ) -> None:
-    """Detect people in videos by networks in ONNX files. An interrupted run goes on where it stopped."""
+    """Detect people and their joints in videos with networks (ONNX), and write 2D detections.
+
+    An interrupted run continues where it stopped.
+    """
     with exit_on_error(left=_LEFT):
         from mvpose.cli.camera_pictures import open_videos
 
@@ -82,7 +90,11 @@ def detect(
 
 @grouped(without=["times", "skeleton", "pictures"])
 def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: Networks, choices: Choices) -> None:
-    """Detect people in videos and estimate them in 3D; detections are kept in FOLDER-detections."""
+    """Make tracked people of videos: detect, then estimate.
+
+    The detections are kept in FOLDER-detections, so that a second run does not
+    detect again.
+    """
     with exit_on_error(left=_LEFT):
         from mvpose.cli.camera_pictures import assigned, check_lengths, check_sizes, common_rate, open_videos
         from mvpose.formats.calibration.registry import read_calibration

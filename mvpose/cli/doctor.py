@@ -28,14 +28,18 @@ def add_to(app: typer.Typer) -> None:
 def doctor(
     calibration: Calibration,
     detections: DetectionPaths,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the diagnosis as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Folder for a page with drawings, doctor.html.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder for a page with drawings, doctor.html, and its numbers."),
     ] = None,
     *,
     choices: Choices,
 ) -> None:
-    """Say what is wrong with a calibration, from the people in the pictures. Exit code 1 where there are faults."""
+    """Find what is wrong with a calibration, from the people in the pictures.
+
+    Prints a verdict and what mends each fault. Exit code 1 where there are faults.
+    """
     with exit_on_error():
         from mvpose.cli.output_folder import check_writable
 

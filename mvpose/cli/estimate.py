@@ -29,35 +29,50 @@ class Wanted:
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]
     method: Annotated[
         str,
-        typer.Option(metavar="NAME", help="Method: track, track-fast, or full and fast, without identities."),
+        typer.Option(
+            metavar="NAME", help="track or track-fast, which follow people; full or fast, without identities."
+        ),
     ] = "track"
     formats: Annotated[
-        str, typer.Option("--format", metavar="NAME,...", help="Formats beside poses.parquet and people.json.")
+        str,
+        typer.Option(
+            "--format",
+            metavar="NAME,...",
+            help="Formats beside poses.parquet and people.json: trc, c3d, csv, panoptic, bvh, gltf, lengths, rrd.",
+        ),
     ] = "trc,json"
     files_up: Annotated[
         str | None,
         typer.Option(
-            metavar="AXIS", help="Axis that points up in the files of --format, y or z, if not the usual one."
+            metavar="AXIS",
+            help="Axis that points up in the files of --format, y or z. [dim]\\[default: that of each format][/]",
         ),
     ] = None
-    together: Annotated[bool, typer.Option("--together", help="One C3D file for all people, with prefixes.")] = False
+    together: Annotated[bool, typer.Option("--together", help="One C3D file for all people; labels have a prefix.")] = (
+        False
+    )
     lag: Annotated[
-        float, typer.Option(metavar="S", help="Seconds of later frames that an estimate uses; inf for all.")
+        float, typer.Option(metavar="S", help="Seconds of later frames that track and track-fast may use; inf: all.")
     ] = 0.2
-    page: Annotated[bool, typer.Option("--page/--no-page", help="Write recording.html, a page of the result.")] = True
+    page: Annotated[bool, typer.Option("--page/--no-page", help="Write recording.html, a page about the result.")] = (
+        True
+    )
     pictures: Annotated[
         list[Path] | None,
         typer.Option(
             metavar="VIDEO",
-            help="Videos or folders of pictures of the cameras, or a folder that holds them, for the page. Repeatable.",
+            help="Videos or folders of pictures of the cameras, or a folder with them, for page and films. Repeatable.",
         ),
     ] = None
     films: Annotated[
-        bool, typer.Option("--films/--no-films", help="Write a film of each camera's pictures with the people in it.")
+        bool,
+        typer.Option(
+            "--films/--no-films", help="Write a film of each camera with the people drawn in, where there are pictures."
+        ),
     ] = True
     doctor: Annotated[
         bool,
-        typer.Option("--doctor/--no-doctor", help="Examine the calibration by some frames."),
+        typer.Option("--doctor/--no-doctor", help="Let the doctor examine the calibration, with 100 frames."),
     ] = True
     trust: Annotated[
         bool, typer.Option("--trust", help="Write people even if calibration and detections contradict each other.")
@@ -82,7 +97,7 @@ class Wanted:
 
 @grouped()
 def estimate(calibration: Calibration, detections: DetectionPaths, *, wanted: Wanted, choices: Choices) -> None:
-    """Estimate the people of a recording in 3D, and write them for other programs."""
+    """Make tracked people in 3D of a calibration and 2D detections, in files for other programs."""
     with exit_on_error():
         estimate_into(calibration, detections, choices, wanted)
 

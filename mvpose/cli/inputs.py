@@ -85,13 +85,15 @@ class Choices:
         str | None, typer.Option(metavar="NAME,...", help="Cameras of the calibration to use. [dim]\\[default: all][/]")
     ] = None
     frames: Annotated[
-        str | None, typer.Option(metavar="FIRST:LAST", help="Frames to use, by the numbers in the files.")
+        str | None,
+        typer.Option(metavar="FIRST:LAST", help="Frames to use, by the numbers in the files: [cyan]0:500[/]."),
     ] = None
     skeleton: Annotated[
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Skeleton of the detections: coco17, body25, halpe26, wholebody133 ..., or a TOML file.",
+            help="Skeleton of the detections, if their number of joints does not show it: coco17, body25, halpe26, "
+            "wholebody133 ..., or a TOML file.",
         ),
     ] = None
     joints: Annotated[

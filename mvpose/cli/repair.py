@@ -31,20 +31,26 @@ def repair(
     detections: DetectionPaths,
     out: Annotated[Path, typer.Option(metavar="NEW", help="The new calibration, in the format of the old one.")],
     free: Annotated[
-        str, typer.Option(metavar="NAME,...", help="What may change: extrinsics, focal, center.")
+        str,
+        typer.Option(metavar="NAME,...", help="What may change: extrinsics (position and direction), focal, center."),
     ] = "extrinsics",
     new_times: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write the times of the pictures with mended clocks, for --times."),
+        typer.Option(
+            metavar="FILE",
+            help="Also write the times of the pictures with corrected clocks, for --times of other commands.",
+        ),
     ] = None,
     rig_size: Annotated[
         str,
-        typer.Option(metavar="NAME", help="Size of the rig by: calibration, people (bone lengths), both."),
+        typer.Option(
+            metavar="NAME", help="What decides the size of the rig: calibration, people (their bone lengths) or both."
+        ),
     ] = "calibration",
     *,
     choices: Choices,
 ) -> None:
-    """Mend a calibration by the people in the pictures, and write it in the format in which it came."""
+    """Correct a calibration from the people in the pictures, and write it in the format of the old one."""
     with exit_on_error():
         from mvpose.cli.output_folder import check_new
 

@@ -18,10 +18,12 @@ def add_to(app: typer.Typer) -> None:
 
 
 def view(
-    folder: Annotated[Path, typer.Argument(help="Folder of results of [cyan]mvpose estimate[/].", metavar="FOLDER")],
+    folder: Annotated[
+        Path, typer.Argument(help="Folder that [cyan]mvpose[/] wrote: of estimate, run or doctor.", metavar="FOLDER")
+    ],
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
 ) -> None:
-    """Show the page of a result: print where it is, and open it in a browser."""
+    """Open the page of a result in a browser, and print its path."""
     with exit_on_error():
         page = next((folder / name for name in _PAGES if (folder / name).is_file()), None)
         if page is None:

@@ -8,7 +8,7 @@ import typer
 
 app = typer.Typer(
     name="simharness",
-    help="Film simulated people with simulated cameras, and find where a multi-view pose method breaks.",
+    help="Simulate people in front of calibrated cameras, and find where a method for their 3D poses breaks.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode="rich",
@@ -31,4 +31,4 @@ def options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Film simulated people with simulated cameras, and find where a multi-view pose method breaks."""
+    """Simulate people in front of calibrated cameras, and find where a method for their 3D poses breaks."""

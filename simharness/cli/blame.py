@@ -26,14 +26,19 @@ def blame(
     seeds: Annotated[int, typer.Option(metavar="N", min=1, help="Number of seeds.")] = 10,
     variant: Annotated[
         str | None,
-        typer.Option(metavar="VARIANT", help="A preset of mvpose.Pipeline, instead of the first of the file."),
+        typer.Option(
+            metavar="VARIANT", help="A preset such as [cyan]fast[/], instead of the scenario's first variant."
+        ),
     ] = None,
     score: Annotated[
         str, typer.Option(metavar="SCORE", help="Score to explain: [cyan]pcp[/], [cyan]recall[/], [cyan]mpjpe_mm[/].")
     ] = "pcp",
     cause: Annotated[
         list[str] | None,
-        typer.Option(metavar="CAUSE", help="Only this cause; repeatable. [dim]\\[default: all][/]"),
+        typer.Option(
+            metavar="CAUSE",
+            help="Only this cause: [cyan]swaps[/], [cyan]noise[/]. Repeatable. [dim]\\[default: all][/]",
+        ),
     ] = None,
     workers: Annotated[
         int,
@@ -43,9 +48,9 @@ def blame(
 ) -> None:
     """Find what cost a scenario its score, and what to mend first.
 
-    Causes are mended one by one and together on the same draws: errors of
-    the detector, what hides people, calibration, clocks, matching, and one
-    camera too few. Each gets its share of the lost score.
+    The scenario is simulated again with causes removed ("mended"), one by one
+    and together: errors of the detector, what hides people, calibration,
+    clocks, matching, and one camera too few. Each gets its share of the loss.
     """
     with exit_on_error():
         from simharness.runtime.progress import reporter

@@ -34,7 +34,11 @@ def check(
     ],
     baseline: Annotated[
         Path,
-        typer.Option(metavar="FILE", help="Scores of the accepted version of the method.", dir_okay=False),
+        typer.Option(
+            metavar="FILE",
+            help="Committed scores to compare with: [cyan]results/baselines/ci.json[/]; --update-baseline writes it.",
+            dir_okay=False,
+        ),
     ],
     junit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write a JUnit report (XML) to this file.", dir_okay=False)
@@ -43,20 +47,24 @@ def check(
         Path | None, typer.Option(metavar="FILE", help="Write a summary (Markdown) to this file.", dir_okay=False)
     ] = None,
     update: Annotated[
-        bool, typer.Option("--update-baseline", help="Write a new baseline instead of comparing with it.")
+        bool,
+        typer.Option(
+            "--update-baseline",
+            help="Measure the suite and write the file of --baseline, instead of comparing with it.",
+        ),
     ] = False,
     accept_better: Annotated[
         bool, typer.Option("--accept-better", help="Let improvements beyond their bounds pass in this run.")
     ] = False,
     workers: Annotated[int, typer.Option(metavar="N", min=1, max=1024, help="Processes that share the trials.")] = 1,
 ) -> None:
-    r"""Run a suite and exit with code 1 where it differs from the baseline.
+    r"""Gate for CI: run a suite, compare it with a baseline, and exit with code 1 where it got worse.
 
-    A regression is a significant loss in a score that is larger than its
-    tolerance, section \[gate] of the suite, or a growth of the time per frame,
-    relative to a reference kernel. An improvement larger than its bound fails
-    as well until it is accepted, because the suite may have become easier.
-    Trials that could not be run also fail the check.
+    Worse is a significant loss in a score that is larger than its tolerance
+    (section \[gate] of the suite), or a growth of the time per frame relative
+    to a reference kernel. An improvement larger than its bound fails as well
+    until it is accepted, because the suite may have become easier. Trials that
+    could not be run also fail the check.
     """
     with exit_on_error():
         from simharness.gate.baseline import check_place

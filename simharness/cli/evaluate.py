@@ -26,11 +26,11 @@ class HeadMapping(enum.StrEnum):
     Y2019 = "2019"
 
 
-app = recording_group("Score the method on a recording, or compare recordings with simulation.")
+app = recording_group("Score methods on a recording with truth, or compare a recording with simulation.")
 
 Head = Annotated[
     HeadMapping,
-    typer.Option(help="Rule that converts the head from COCO-17 to the 14 joints; it changes PCP by one point."),
+    typer.Option(help="Rule that makes the head of Shelf's 14 joints from COCO-17; it changes PCP by one point."),
 ]
 SummaryFile = Annotated[
     Path | None,
@@ -48,7 +48,7 @@ def evaluate_recording(
         list[str] | None,
         typer.Option(
             metavar="VARIANT",
-            help="A preset of mvpose.Pipeline, or a user-defined estimator, FILE.py:NAME. Repeatable. "
+            help="A preset such as [cyan]track[/], or your own method as FILE.py:NAME. Repeatable. "
             "[dim]\\[default: full][/]",
         ),
     ] = None,
@@ -61,7 +61,7 @@ def evaluate_recording(
         ),
     ] = 0.2,
 ) -> None:
-    """A recording (the word [cyan]recording[/] may be left out): PCP of its actors, and errors that PCP ignores."""
+    """Score methods on a recording; the word [cyan]recording[/] may be left out."""
     with exit_on_error():
         start = perf_counter()
         from mvpose.presets import NEED_DESCRIPTORS, without_repair
@@ -113,7 +113,7 @@ def evaluate_poses(
         ),
     ] = None,
 ) -> None:
-    """Tracked people in files against the truth of a recording, such as an export: PCP, MPJPE, recall, identities."""
+    """Score the results of [cyan]mvpose estimate[/] or [cyan]mvpose run[/] against the truth of a recording."""
     with exit_on_error():
         start = perf_counter()
         from mvpose.formats.people_table import read_people
@@ -140,7 +140,7 @@ def twin(
     ] = 10,
     json_file: JsonFile = None,
 ) -> None:
-    """A recording and its simulated twin: PCP of variants in reality and in simulation, with intervals."""
+    """Compare a recording with simulated copies of it (twins): PCP of four variants, with intervals."""
     with exit_on_error():
         start = perf_counter()
         from simharness.cli.evaluation_tables import print_twin_comparison
@@ -167,7 +167,7 @@ def evaluate_seeds(
     seeds: Annotated[int, typer.Option(metavar="N", min=2, max=10_000, help="Number of seeds.")] = 10,
     json_file: JsonFile = None,
 ) -> None:
-    """A scenario at many seeds: PCP of its variants, of all people and of each person, with intervals."""
+    """Score a scenario at many seeds by the protocol of the data sets: PCP of all people and of each person."""
     with exit_on_error():
         start = perf_counter()
         from simharness.cli.evaluation_tables import print_seed_evaluation

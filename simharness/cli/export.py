@@ -19,17 +19,20 @@ def add_to(app: typer.Typer) -> None:
 def export(
     scenario: ScenarioFile,
     folder: Annotated[
-        Path, typer.Argument(help="Parent folder of the folder NAME of the sequence.", metavar="FOLDER")
+        Path,
+        typer.Argument(
+            help="Folder in which the sequence gets a folder with the name of the scenario.", metavar="FOLDER"
+        ),
     ] = Path("results/exports"),
     overrides: Overrides = None,
     seed: Seed = None,
-    every: Annotated[int, typer.Option(metavar="N", help="Write one frame of N.")] = 1,
+    every: Annotated[int, typer.Option(metavar="N", help="Write every Nth frame only.")] = 1,
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Write the pictures.")] = True,
 ) -> None:
-    """Write a scenario as a CMU Panoptic sequence: pictures, true poses, calibration; and OpenPose detections.
+    """Write a scenario as a benchmark in the layout of CMU Panoptic: pictures, truth, calibration, detections.
 
-    It appears, when it is complete, in FOLDER/NAME and replaces an earlier
-    export there; manifest.json describes it.
+    The detections are OpenPose files. The sequence appears in FOLDER/NAME when
+    it is complete, and replaces an earlier export; manifest.json describes it.
     """
     with exit_on_error():
         from simharness.runtime.progress import reporter

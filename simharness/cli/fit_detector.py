@@ -25,14 +25,16 @@ def fit_detector(
     ] = None,
     figure: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Plot the measurement and its simulated twin (PNG).", dir_okay=False),
+        typer.Option(
+            metavar="FILE", help="Plot the measured errors and those of a simulated twin (PNG).", dir_okay=False
+        ),
     ] = None,
     json_file: Annotated[
         Path | None,
         typer.Option("--json", metavar="FILE", help="Write all numbers to this file.", dir_okay=False),
     ] = None,
 ) -> None:
-    """Measure the detector of a recording and write a profile with its errors."""
+    """Measure the errors of the detector of a recording, and write a detector profile with them."""
     with exit_on_error():
         from simharness.reality.detector_fit.fit import fit, write_profile
         from simharness.reality.detector_fit.plot import plot_comparison

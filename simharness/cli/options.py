@@ -18,29 +18,33 @@ ScenarioFile = Annotated[
 RecordingFile = Annotated[
     Path,
     typer.Argument(
-        help="A description of a recording (TOML), a folder with recording.toml, or the name of a shipped description: "
-        "[cyan]shelf[/].",
+        help="A recording with truth: its description (TOML), a folder with recording.toml, or the name of a shipped "
+        "description: [cyan]shelf[/].",
         metavar="RECORDING",
     ),
 ]
 RecordingFolder = Annotated[
     Path | None,
     typer.Argument(
-        help="Folder in which the files of the recording lie; by default that of the description.", metavar="FOLDER"
+        help="Folder with the files of the recording. [dim]\\[default: that of the description][/]", metavar="FOLDER"
     ),
 ]
 Overrides = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."),
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Change a key of the scenario: [cyan]people.count=6[/]. Repeatable."
+    ),
 ]
-Seed = Annotated[int | None, typer.Option(metavar="N", help="Replace the scenario's seed.")]
+Seed = Annotated[
+    int | None, typer.Option(metavar="N", help="Seed of all random draws, instead of the scenario's: another scene.")
+]
 BlameSeeds = Annotated[
     int,
     typer.Option(
         "--blame",
         metavar="N",
         min=0,
-        help="Also find what cost the score and what to mend first, at N seeds; see [cyan]simharness blame[/].",
+        help="Also find what cost the score, at N seeds, as [cyan]simharness blame[/] does; 0: do not.",
     ),
 ]
 JsonFile = Annotated[

@@ -29,17 +29,24 @@ def plan(
     ],
     cameras: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Number of cameras, those that hang already included; instead of the file's."),
+        typer.Option(metavar="N", help="Number of cameras, with those that hang already; instead of the file's."),
     ] = None,
     lens: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="A lens of the file to choose from. Repeatable.")
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="A lens of the room file that may be used. Repeatable. [dim]\\[default: all][/]"
+        ),
     ] = None,
     people: Annotated[int | None, typer.Option(metavar="N", help="Number of people, instead of the file's.")] = None,
     detector: Annotated[
         str | None, typer.Option(metavar="PROFILE", help="Detector profile, instead of the file's.")
     ] = None,
     objective: Annotated[
-        str | None, typer.Option(metavar="KIND", help="[cyan]share[/], [cyan]mean[/] or [cyan]worst[/].")
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help="What is maximised: [cyan]share[/], [cyan]mean[/] or [cyan]worst[/]; instead of the file's.",
+        ),
     ] = None,
     failing: Annotated[
         int | None, typer.Option(metavar="K", help="Number of cameras that may fail, instead of the file's.")
@@ -57,15 +64,18 @@ def plan(
     preview: Annotated[
         bool, typer.Option("--preview", help="Only draw the room and the places for cameras: preview.html.")
     ] = False,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Parent of the folder NAME.", file_okay=False)] = Path(
-        "results/plans"
-    ),
+    out: Annotated[
+        Path,
+        typer.Option(
+            metavar="FOLDER", help="Folder in which the plan gets a folder with the name of the room.", file_okay=False
+        ),
+    ] = Path("results/plans"),
 ) -> None:
-    """Plan where the cameras of a room should hang.
+    """Find the best places for the cameras of a room.
 
-    The folder holds planned.toml (a rig for scenarios, and for rehearse),
-    plan.html for people and plan.json for programs.
-    An interrupted plan goes on where it stopped.
+    The result is a folder with planned.toml (a rig for scenarios, and for
+    rehearse), plan.html for people, and plan.json for programs. An interrupted
+    plan continues where it stopped.
     """
     with exit_on_error():
         from simharness.planning.room_file import read_room

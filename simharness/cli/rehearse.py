@@ -79,15 +79,15 @@ def rehearse(
         ),
     ] = None,
     target: Annotated[
-        str, typer.Option(metavar="PCP,MM", help="What a place must reach: PCP and joint error.")
+        str, typer.Option(metavar="PCP,MM", help="What a place must reach: PCP, and joint error in mm.")
     ] = "95,40",
     size: Annotated[
         str,
         typer.Option(metavar="WxH", help="Size of the pictures, pixels, where the calibration does not state it."),
     ] = "",
-    subsets: Annotated[bool, typer.Option("--subsets", help="Score all sets of two cameras and more.")] = False,
-    scenes: Annotated[int, typer.Option(metavar="N", min=2, max=1000, help="Simulated scenes.")] = 16,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of everything.")] = 0,
+    subsets: Annotated[bool, typer.Option("--subsets", help="Also score every set of two cameras and more.")] = False,
+    scenes: Annotated[int, typer.Option(metavar="N", min=2, max=1000, help="Number of simulated scenes.")] = 16,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of all draws.")] = 0,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -101,10 +101,10 @@ def rehearse(
         typer.Option(metavar="N", min=1, help="Processes; the results stay the same. [dim]\\[default: all cores][/]"),
     ] = None,
 ) -> None:
-    """Rehearse a rig before its cameras hang: where it is good, what each camera is worth, what one more would bring.
+    """Predict what a rig will give before its cameras hang: maps of the floor, the worth of each camera, one more.
 
-    A fast layer draws maps of the floor and compares cameras; scenes of the
-    simulator show what the method makes of people who walk there.
+    A fast approximation makes the maps and compares cameras; simulated scenes
+    show how well the method estimates people who walk there.
     """
     with exit_on_error():
         start = perf_counter()

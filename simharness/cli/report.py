@@ -35,7 +35,7 @@ def report(
         list[str] | None,
         typer.Option(
             metavar="SCORE=VALUE",
-            help="Report where a score passes a value. Repeatable. [dim]\\[default: pcp=90, precision=90][/]",
+            help="Report where a score passes this value. Repeatable. [dim]\\[default: pcp=90, precision=90][/]",
         ),
     ] = None,
     rerun: Annotated[
@@ -56,11 +56,13 @@ def report(
     ] = None,
     trial: Annotated[
         str | None,
-        typer.Option(metavar="ID", help="With --rerun: this trial, by its first digits, instead of the worst."),
+        typer.Option(
+            metavar="ID", help="With --rerun: this trial (column trial of trials.parquet; first digits are enough)."
+        ),
     ] = None,
     blame: BlameSeeds = 0,
 ) -> None:
-    """Write the report of a study: scores, curves, failures, the worst frames in pictures and in 3D.
+    """Write the report of a finished study again: scores, curves, failures, the worst frames.
 
     The trials of the worst frames are run again to make their pictures.
     """

@@ -32,15 +32,16 @@ def run(
         int,
         typer.Option(metavar="N", min=1, max=1024, help="Processes that share the frames; the results stay the same."),
     ] = 1,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Parent of the result folder.", file_okay=False)] = Path(
-        "results/runs"
-    ),
+    out: Annotated[
+        Path,
+        typer.Option(metavar="FOLDER", help="Folder in which the result folder NAME-HASH appears.", file_okay=False),
+    ] = Path("results/runs"),
     blame: BlameSeeds = 0,
 ) -> None:
     """Run a scenario: simulate, film, detect, estimate, score, report.
 
-    The results appear, when they are complete, in a folder NAME-HASH:
-    report.html for people, other files for programs.
+    Prints a table of scores and the path of the report, a page for the
+    browser. Files for programs are beside it.
     """
     with exit_on_error():
         from simharness.runtime.progress import reporter
@@ -76,22 +77,27 @@ def render(
         str,
         typer.Option(
             metavar="LAYERS",
-            help="Draw [cyan]truth,detections,estimates[/], or some of them.",
+            help="Draw [cyan]truth,detections,estimates[/], or some of them, into the pictures.",
         ),
     ] = "",
     also: Annotated[
         str,
         typer.Option(metavar="CHANNELS", help="Also write [cyan]depth,ids,parts[/], or some of them."),
     ] = "",
-    every: Annotated[int, typer.Option(metavar="N", help="Render one frame of N.")] = 1,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Parent of the folder NAME.", file_okay=False)] = Path(
-        "results/renders"
-    ),
+    every: Annotated[int, typer.Option(metavar="N", help="Render every Nth frame only.")] = 1,
+    out: Annotated[
+        Path,
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder in which the pictures get a folder with the name of the scenario.",
+            file_okay=False,
+        ),
+    ] = Path("results/renders"),
 ) -> None:
     """Render the pictures of all cameras of a scenario, and a mosaic of them.
 
-    They appear, when they are complete, in FOLDER/NAME: CAMERA/0000.png, ...
-    or CAMERA.mp4, and mosaic.
+    The files appear in FOLDER/NAME when they are complete: CAMERA/0000.png, ...
+    or CAMERA.mp4, and a mosaic of all cameras.
     """
     with exit_on_error():
         from simharness.runtime.progress import reporter

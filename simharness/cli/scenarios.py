@@ -26,7 +26,7 @@ def add_to(app: typer.Typer) -> None:
 
 
 def scenarios() -> None:
-    """List the shipped scenarios, and the rigs, sensor and detector profiles with which a scenario may begin."""
+    """List the shipped scenarios, and the rigs and the sensor and detector profiles for your own."""
     with exit_on_error():
         from simharness.scenario.presets import PROFILES, RIGS, SENSORS, summary_of
         from simharness.scenario.resolution import read_plan
@@ -56,7 +56,7 @@ def show(
     overrides: Overrides = None,
     seed: Seed = None,
 ) -> None:
-    """Print a scenario as TOML with all its defaults; of a study its factors, its number of trials and its base."""
+    """Print a scenario with all keys, defaults and descriptions, and what it needs; of a study also its trials."""
     with exit_on_error():
         from simharness.scenario.outline import outline
         from simharness.scenario.size import MOST_TRIALS
@@ -89,7 +89,8 @@ def _needs(plan: Plan) -> str:
 
 def schema(
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write it to this file instead of printing it.", dir_okay=False)
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the schema to this file instead of printing it.", dir_okay=False),
     ] = None,
 ) -> None:
     """Print the JSON schema of scenario files, with which editors complete and validate them."""

@@ -42,7 +42,9 @@ def study(
     ] = None,
     variant: Annotated[
         list[str] | None,
-        typer.Option(metavar="VARIANT", help="A preset of mvpose.Pipeline, instead of the file's. Repeatable."),
+        typer.Option(
+            metavar="VARIANT", help="A preset such as [cyan]fast[/], instead of the file's variants. Repeatable."
+        ),
     ] = None,
     workers: Annotated[
         int,
@@ -52,23 +54,28 @@ def study(
         str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: [cyan]tcp://host:8786[/].")
     ] = None,
     shard: Annotated[
-        str | None, typer.Option(metavar="I/N", help="Run only the I-th of N parts into the store; see [cyan]merge[/].")
+        str | None,
+        typer.Option(
+            metavar="I/N",
+            help="Run only part I of N, for several machines: [cyan]1/3[/]; then [cyan]merge[/] their stores.",
+        ),
     ] = None,
     store: Annotated[
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="Folder of finished trials. [dim]\\[default: store, in --out][/]",
+            help="Folder of finished trials, which are not run again. [dim]\\[default: store, in --out][/]",
             file_okay=False,
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Parent of the result folder.", file_okay=False)] = Path(
-        "results/studies"
-    ),
+    out: Annotated[
+        Path,
+        typer.Option(metavar="FOLDER", help="Folder in which the study gets a folder with its name.", file_okay=False),
+    ] = Path("results/studies"),
     blame: BlameSeeds = 0,
-    yes: Annotated[bool, typer.Option("--yes", help="Run a study of more than 10,000 trials.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Run even a study of more than 10,000 trials.")] = False,
 ) -> None:
-    """Run a study: every setting of a scenario file's sweep at every seed.
+    """Run a study: a scenario with every combination of its swept values, at every seed.
 
     Finished trials are stored and not run again, so that an interrupted study
     resumes where it stopped. The results appear, when all trials are finished,
@@ -111,7 +118,7 @@ def merge(
     stores: Annotated[list[Path], typer.Argument(help="Stores of finished trials.", metavar="STORE...")],
     into: Annotated[Path, typer.Option(metavar="STORE", help="The store to which they are copied.", file_okay=False)],
 ) -> None:
-    """Copy the finished trials of several stores into one: of the parts of a study (--shard) on several machines."""
+    """Merge the stores of a study that ran in parts (study --shard) on several machines."""
     with exit_on_error(), _stopping():
         from simharness.study.merge import merge as merge_stores
 

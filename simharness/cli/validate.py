@@ -35,7 +35,9 @@ def validate(
         int | None,
         typer.Option(metavar="N", min=2, help=f"Number of twins. [dim]\\[default: {_TWINS}, quick {_QUICK_TWINS}][/]"),
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="A third of the frames, for a first look.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A third of the frames and four twins, for a first look.")
+    ] = False,
     fit_on: Annotated[
         Path | None,
         typer.Option(metavar="RECORDING", help="Fit the detector to another recording, and predict this one."),
@@ -57,11 +59,11 @@ def validate(
         typer.Option(metavar="N", min=1, help="Processes; the results stay the same. [dim]\\[default: all cores][/]"),
     ] = None,
 ) -> None:
-    """Compare a recording with its simulated twins, and fail where a prediction is wrong.
+    """Test whether simulation predicts a recording, and exit with code 1 where it does not.
 
-    Fits a detector to the recording, simulates twins of it, and scores the method
-    on both: all cameras and all subsets of them, with and without added errors, by
-    both head rules. Exit code 1 where a bound is exceeded.
+    Fits a detector to the recording, simulates copies of the recording (twins),
+    and scores the method on both: all cameras and all subsets of them, with and
+    without added errors, by both rules for the head.
     """
     with exit_on_error():
         start = perf_counter()

@@ -93,6 +93,7 @@ MVPOSE = (  # run by tests/mvpose/cli
     "mvpose repair CALIBRATION DETECTIONS --out NEW",
     "mvpose detect VIDEO... --detector det.onnx --pose pose.onnx --out FOLDER",
     "mvpose run CALIBRATION VIDEO... --detector det.onnx --pose pose.onnx --out results",
+    "mvpose view results",
 )
 SHELL = (". .venv/bin/activate",)
 MODULES = tuple(
