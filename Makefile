@@ -75,12 +75,12 @@ results-time: $(RUN)
 	$(BIN)/python -m benchmarks.method --only published reid curve --json results/time/bench.json
 	$(BIN)/python -m benchmarks.simulator.plot results/time/bench.json results/time
 
-# The picture in the README: a frame of a run, and the curve of the study of views.
+# The picture in the README: a frame of a run, and the curve of the study of crowds.
 .PHONY: results-overview
-results-overview: results-views
+results-overview: results-crowd
 	rm -rf results/runs/overview
 	$(BIN)/simharness run scenarios/overview.toml --out results/runs/overview
-	$(BIN)/python -m tools.readme_picture.picture results/runs/overview/overview-* results/views/digest.json results/overview.svg
+	$(BIN)/python -m tools.readme_picture.picture results/runs/overview/overview-* results/crowd/digest.json results/overview.svg
 
 $(VENV):
 	$(PYTHON) -m venv $(VENV)

@@ -24,7 +24,7 @@ from tools.readme_picture.breaking_chart import VARIANTS, breaking_chart
 from tools.readme_picture.picture import Tile, joined, main, overview
 
 RESULTS = shipped_folder().parent / "results"
-DIGEST = json.loads((RESULTS / "views" / "digest.json").read_text(encoding="utf-8"))
+DIGEST = json.loads((RESULTS / "crowd" / "digest.json").read_text(encoding="utf-8"))
 SMALL = ["duration=0.4", "rate=5.0", "people.count=3", "cameras.size=[160,160]", 'method.variants=["full"]']
 FRAME, VIEWS = 1, (4, 3, 2)
 SVG = "{http://www.w3.org/2000/svg}"
@@ -258,14 +258,14 @@ class TestScore:
             (point,) = (
                 each
                 for each in DIGEST["breaking"]
-                if each["variant"] == variant and (each["factor"], each["score"]) == ("cameras.count", "pcp")
+                if each["variant"] == variant and (each["factor"], each["score"]) == ("people.count", "pcp")
             )
             (curve,) = classed(panel(drawn, "score"), "g", "curve", variant)
             (ring,) = classed(curve, "circle", "breaks")
             place = [float(ring.get("cx")), float(ring.get("cy"))]
             np.testing.assert_allclose(place, [x(point["value"]), y(point["threshold"])], atol=0.11)
             label = "".join(curve.find(f"{SVG}text").itertext())
-            assert label == f"{variant} breaks below {point['value']:.1f}"
+            assert label == f"{variant} breaks above {point['value']:.1f}"
 
     def test_a_study_of_one_seed_has_no_intervals_and_one_that_holds_does_not_break(self):
         digest = json.loads(json.dumps(DIGEST))
@@ -295,18 +295,18 @@ class TestFile:
 
     def test_the_command_writes_what_is_drawn(self, folder, record, tmp_path):
         out = tmp_path / "overview.svg"
-        digest = RESULTS / "views" / "digest.json"
+        digest = RESULTS / "crowd" / "digest.json"
         assert main([str(folder), str(digest), str(out), "--frame", str(FRAME), "--views", "4,3,2"]) == 0
         assert out.read_text(encoding="utf-8") == overview(record, DIGEST, frame=FRAME, views=VIEWS)
 
     @pytest.mark.parametrize(
         ("options", "digest", "message"),
         [
-            (["--frame", "2"], "views", "--frame 2: the run has frames 0 to 1"),
-            (["--views", "0,1"], "views", "--views 0,1: expected three different views of 0 to 4"),
-            (["--views", "0,1,1"], "views", "--views 0,1,1: expected three different"),
-            (["--views", "0,1,5"], "views", "--views 0,1,5: expected three different"),
-            ([], "crowd", "no pcp of full, no-3dps, no-matching against cameras.count"),
+            (["--frame", "2"], "crowd", "--frame 2: the run has frames 0 to 1"),
+            (["--views", "0,1"], "crowd", "--views 0,1: expected three different views of 0 to 4"),
+            (["--views", "0,1,1"], "crowd", "--views 0,1,1: expected three different"),
+            (["--views", "0,1,5"], "crowd", "--views 0,1,5: expected three different"),
+            ([], "views", "no pcp of full, no-3dps, no-matching against people.count"),
             ([], "none", "No such file"),
         ],
     )

@@ -1,4 +1,4 @@
-"""Chart of breaking points: PCP of the variants against the number of cameras, from the digest of a study."""
+"""Chart of breaking points: PCP of the variants against the number of people, from the digest of a study."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mvpose.report.svg_plots import VARIANT_COLORS
 
 Point = tuple[float, float]
 
-FACTOR, SCORE = "cameras.count", "pcp"
+FACTOR, SCORE = "people.count", "pcp"
 """Factor and score of the chart."""
 
 VARIANTS = ("full", "no-3dps", "no-matching")
@@ -30,14 +30,14 @@ def breaking_chart(digest: Mapping[str, Any], *, at: tuple[float, float, float, 
         Values for the template: axes with ticks, and for each variant points, paths and a label.
 
     Raises:
-        ValueError: the study does not sweep ``cameras.count``, or lacks a variant.
+        ValueError: the study does not sweep ``people.count``, or lacks a variant.
     """
     empty: dict[str, Any] = {"values": [], "scores": {}}
     factor = next((each for each in digest.get("factors", ()) if each["key"] == FACTOR), empty)
     if missing := [variant for variant in VARIANTS if variant not in factor["scores"]]:
         raise ValueError(
             f"the digest has no {SCORE} of {', '.join(missing)} against {FACTOR}; expected the digest.json of a study "
-            f"that sweeps {FACTOR}, such as results/views/digest.json"
+            f"that sweeps {FACTOR}, such as results/crowd/digest.json"
         )
     left, top, width, height = at
     values = factor["values"]
@@ -60,7 +60,7 @@ def breaking_chart(digest: Mapping[str, Any], *, at: tuple[float, float, float, 
         lows = [(x(value), y(low)) for value, _, low, _ in line]
         highs = [(x(value), y(high)) for value, _, _, high in line]
         point = breaking[variant]["value"]
-        key = (left + 0.38 * width, top + height * (0.5 + 0.2 * row))
+        key = (left + 0.04 * width, top + height * (0.5 + 0.2 * row))
         curves.append(
             {
                 "variant": variant,
@@ -71,7 +71,7 @@ def breaking_chart(digest: Mapping[str, Any], *, at: tuple[float, float, float, 
                 "band": path([*lows, *reversed(highs)]) + "Z",
                 "breaks": None if point is None else x(point),
                 "key": f"M{key[0]:.1f} {key[1]:.1f}h28",
-                "label": _WITHOUT_POINT[breaking[variant]["why"]] if point is None else f"breaks below {point:.1f}",
+                "label": _WITHOUT_POINT[breaking[variant]["why"]] if point is None else f"breaks above {point:.1f}",
                 "label_at": (round(key[0] + 42, 1), round(key[1] + 8, 1)),
             }
         )

@@ -1,8 +1,8 @@
 """Overview picture of the README: ``python -m tools.readme_picture.picture RUN DIGEST PICTURE.svg``.
 
 Five panels: a rendered picture, its simulated detections, the detections that the method matches to one person, the
-reconstructed people, and the score against the number of cameras. The first four panels show a frame of a run, the last
-one shows the digest of a study that sweeps ``cameras.count``. Everything is drawn from these outputs.
+reconstructed people, and the score against the number of people. The first four panels show a frame of a run, the last
+one shows the digest of a study that sweeps ``people.count``. Everything is drawn from these outputs.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def overview(record: Record, digest: Mapping[str, Any], *, frame: int, views: Se
 
     Args:
         record: the run; its first variant is drawn.
-        digest: contents of the ``digest.json`` of a study that sweeps ``cameras.count``.
+        digest: contents of the ``digest.json`` of a study that sweeps ``people.count``.
         frame: frame of the run.
         views: three views of the rig; the panel of the detector shows the first.
 
