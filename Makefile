@@ -35,7 +35,7 @@ wheels: $(VENV)
 	$(BIN)/python -m pip wheel --disable-pip-version-check --quiet --no-deps --wheel-dir dist ./mvpose .
 	rm -rf build/lib build/bdist.* mvpose/build
 
-# Two and a half hours on two cores. Finished trials are kept: it can be stopped, and runs only what the code has changed.
+# An hour and a half on two cores. Finished trials are kept: it can be stopped, and runs only what the code has changed.
 results: $(STUDIES:%=results-%) results-paper results-time results-overview
 
 results-%: $(RUN)
