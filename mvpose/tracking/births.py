@@ -30,6 +30,7 @@ class Births:
         returns: how lost people come back.
         motion: motion of people.
         of_joints: motion of their joints.
+        newcomers: standard deviation of a velocity component of people who have just come, (J,), m/s.
         bones: bones of the skeleton.
         cameras: number of cameras.
     """
@@ -42,11 +43,13 @@ class Births:
         returns: Reappearance,
         motion: Motion,
         of_joints: JointMotion,
+        newcomers: Floats,
         bones: BonePrior,
         cameras: int,
     ) -> None:
         self._population, self._pipeline, self._returns = population, pipeline, returns
-        self._motion, self._of_joints, self._bones, self._cameras = motion, of_joints, bones, cameras
+        self._motion, self._of_joints, self._speed = motion, of_joints, newcomers
+        self._bones, self._cameras = bones, cameras
 
     def give_birth(
         self,
@@ -76,13 +79,13 @@ class Births:
         if not len(poses.joints):
             return poses
         if moved_for > 0.0:
-            moved = (moved_for * self._of_joints.speed) ** 2
+            moved = (moved_for * self._speed) ** 2
             poses = poses._replace(covariance=poses.covariance + moved[:, None, None] * np.eye(3))
         people = self._population
         tracks, count = people.tracks, len(poses.joints)
         new = ~repeats(poses.joints, tracks.state)
         born = Tracks.born(
-            poses, ids=np.zeros(count, np.int64), time=now, span=span, speed=self._of_joints.speed,
+            poses, ids=np.zeros(count, np.int64), time=now, span=span, speed=self._speed,
             bones=self._bones, cameras=self._cameras, dimensions=tracks.looks.shape[1],
         )  # fmt: skip
         witnesses = np.zeros(count, np.int64)

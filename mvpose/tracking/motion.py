@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mvpose.arrays import Bools, Floats
-from mvpose.checks import seal
+from mvpose.checks import check_numbers, seal
 from mvpose.kernels import njit
 from mvpose.skeleton import Skeleton
 
@@ -28,7 +28,8 @@ class JointMotion(NamedTuple):
     """Motion model of the J joints of a skeleton.
 
     Attributes:
-        speed: standard deviation of a component of the velocity, (J,), m/s.
+        speed: standard deviation of a component of the velocity, (J,), m/s; relative to the trunk for joints outside
+            of it.
         time: time after which the velocity is correlated by 1/e, (J,), seconds.
         trunk: whether the joint belongs to the trunk, (J,).
     """
@@ -49,10 +50,14 @@ class Motion:
     (same source), at 1.3 m/s (RMS), and a quarter of a period later the velocity is another: 0.15 s. Elbows, knees and
     the head lie between.
 
+    How fast somebody is who has just come is not known: if walking and running at 3 m/s (Novacheck, "The biomechanics
+    of running", Gait and Posture 7, 1998) are equally likely, it is 1.64 m/s (RMS) along each axis.
+
     Attributes:
         trunk: standard deviation of a velocity component (m/s) and correlation time (s) of shoulders and hips.
         middle: the same, of elbows, knees and the joints of the head relative to the trunk.
         extremities: the same, of wrists and ankles.
+        newcomer: standard deviation of a velocity component of the trunk of people who have just come, m/s.
 
     Raises:
         ValueError: a value that is not above 0 and finite.
@@ -61,8 +66,10 @@ class Motion:
     trunk: tuple[float, float] = (1.0, 1.6)
     middle: tuple[float, float] = (0.8, 0.3)
     extremities: tuple[float, float] = (1.3, 0.15)
+    newcomer: float = 1.64
 
     def __post_init__(self) -> None:
+        check_numbers(self, "the motion model", positive=("newcomer",))
         for name in ("trunk", "middle", "extremities"):
             speed, time = getattr(self, name)
             if not (0.0 < speed < np.inf and 0.0 < time < np.inf):
@@ -73,6 +80,14 @@ class Motion:
     def of_joints(self, skeleton: Skeleton) -> JointMotion:
         """Return the motion model of the joints of a skeleton."""
         return _of_joints(self, skeleton)
+
+    def of_newcomers(self, skeleton: Skeleton) -> Floats:
+        """Return the standard deviation of a velocity component of people who have just come, (J,), m/s.
+
+        Joints outside of the trunk are carried along by it.
+        """
+        joints = self.of_joints(skeleton)
+        return np.where(joints.trunk, self.newcomer, np.hypot(self.newcomer, joints.speed))
 
 
 @cache

@@ -357,7 +357,7 @@ class Tracker:
         self._sigmas = self.model.noise.sigmas(skeleton)
         self._births = Births(
             self._people, self.pipeline, returns=self.model.reappearance, motion=self.model.motion,
-            of_joints=self.motion, bones=bones, cameras=len(rig),
+            of_joints=self.motion, newcomers=self.model.motion.of_newcomers(skeleton), bones=bones, cameras=len(rig),
         )  # fmt: skip
 
     def _at_once(self, ordered: Detections, rays: Rays, labels: Integers, groups: Integers) -> Rays:

@@ -88,9 +88,20 @@ def test_both_sides_move_alike(skeleton):
     assert trunk.any()
 
 
+@pytest.mark.parametrize("skeleton", [COCO17, SHELF14, PANOPTIC19])
+def test_joints_are_carried_along_by_the_trunk(skeleton):
+    """Independent velocities of the trunk and of a joint relative to it: their variances add up."""
+    motion = Motion(newcomer=1.7)
+    joints = motion.of_joints(skeleton)
+    expected = np.sqrt(np.where(joints.trunk, 0.0, joints.speed**2) + 1.7**2)
+    np.testing.assert_allclose(motion.of_newcomers(skeleton), expected)
+
+
 def test_bad_settings_are_refused():
     with pytest.raises(ValueError, match="trunk"):
         Motion(trunk=(0.0, 0.8))
+    with pytest.raises(ValueError, match="newcomer of the motion model must be above 0"):
+        Motion(newcomer=0.0)
 
 
 @given(st.floats(-0.5, 0.5), st.integers(0, 1000))

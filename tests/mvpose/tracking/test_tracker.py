@@ -103,6 +103,17 @@ def test_who_walks_in_is_reported_within_a_fifth_of_a_second():
     assert people[13:] == [3] * 7
 
 
+@pytest.mark.parametrize("speed", [1.5, 2.5, 3.0])
+def test_who_runs_is_followed_from_the_first_of_few_frames(speed):
+    """Five frames a second, in which a runner gets on by 0.6 m."""
+    paths = [(-0.6 * speed, -0.5, speed, 0.3), (0.5, 0.6 * speed, 0.2, -speed)]
+    rig, frames, truth = film(paths, np.arange(7) * 0.2)
+    tracker = Tracker(model=TrackingModel(period=0.2))
+    found = identities([tracker.estimate(rig, each) for each in frames], truth)
+    assert (found >= 0).all()
+    assert (found == found[0]).all()
+
+
 def test_who_leaves_is_reported_for_less_than_half_a_second():
     rig, frames, _ = film(PATHS, np.arange(40) / RATE, hidden=lambda frame, _, person: person == 2 and frame >= 15)
     people = [len(each) for each in _run(rig, frames)]
