@@ -92,7 +92,7 @@ def test_an_evaluation_says_where_it_comes_from(name):
     assert not lacking, f"results/{name} lacks {lacking}: results/README.md has the command that makes it again"
     program, command, what, subject, *words = shlex.split(told["command"])
     assert (program, command) == ("simharness", "evaluate")
-    assert told["digests"].keys() >= {"simulation", "method"}
+    assert told["digests"].keys() == {"simulation", "method", "scores", "failures"}
     assert told["seconds"] > 0
     given = list(pairwise([what, subject, *words]))
     if what == "shelf":
