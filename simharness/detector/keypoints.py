@@ -26,6 +26,7 @@ from simharness.detector.draws import KeyedDraws
 from simharness.detector.error_classes import MIRROR, PAIRED
 from simharness.detector.error_draws import ErrorDraws
 from simharness.detector.guesses import guess_places, pixels_per_metre
+from simharness.detector.jitter_distance import jitter_distance
 from simharness.detector.reported import ReportedJoints, last_pixels
 from simharness.detector.scatter import Scatter
 from simharness.detector.steps import Context, StepStage, step
@@ -139,6 +140,10 @@ class _KeypointErrors:
         self._reported = ReportedJoints(target, conditions, joints, rig, config, self._errors)
         self._scatter = Scatter(config, correlation, draws)
         self._jitter = np.array(config.jitter.by_joint())
+        self._jitter_mean = np.array(config.jitter_mean.by_joint())
+        self._by_occlusion = np.ones((4, len(self._jitter)))
+        self._by_occlusion[SELF_OCCLUDED] = config.self_occluded.by_joint()
+        self._by_occlusion[OCCLUDED] = config.occluded.by_joint()
         self._stray = np.array(config.stray.by_joint())
         some = config.miss_some or config.miss
         self._miss = np.array([shares.by_joint() for shares in (config.miss, some, config.miss_few or some)])
@@ -165,11 +170,8 @@ class _KeypointErrors:
         off = jitter | miss
         if off.any():
             direction, far = self._places(person, off)
-            reach = np.where(
-                miss[off],
-                MISS_FROM + (config.reach - MISS_FROM) * far,
-                GOOD_BELOW + (MISS_FROM - GOOD_BELOW) * far,
-            )
+            mean = self._jitter_mean[np.nonzero(off)[-1]]
+            reach = np.where(miss[off], MISS_FROM + (config.reach - MISS_FROM) * far, jitter_distance(far, mean))
             found[off] = true[off] + (unit[off] * reach)[:, None] * direction
             stray = miss & self._errors.occurs("stray", person, self._stray)
             if stray.any():
@@ -195,9 +197,7 @@ class _KeypointErrors:
     def _harder(self, person: int) -> Floats:
         """Return the factors of the rates of jitter and miss, (T, V, J)."""
         config, conditions = self._config, self._conditions
-        by_occlusion = np.ones(4)
-        by_occlusion[[SELF_OCCLUDED, OCCLUDED]] = config.self_occluded, config.occluded
-        harder = by_occlusion[conditions.occlusion[:, :, person]]
+        harder = self._by_occlusion[conditions.occlusion[:, :, person], np.arange(self._by_occlusion.shape[1])]
         size = np.sqrt(np.maximum(conditions.area[:, :, person], 1.0))
         small = np.clip((_SMALL / size) ** config.small, 1.0, _HARDEST) if config.small else np.ones(size.shape)
         return harder * np.where(conditions.cut[:, :, person], config.truncated * small, small)[..., None]

@@ -150,8 +150,9 @@ def _drawn(context: Context, outer: OuterTruth, anchors: Integers, who: int) -> 
     config, correlation = context.config.keypoints, context.config.correlation
     occlusion = occlusion_classes(outer.views.visibility[:, :, who])
     axes = image_axes(context.sequence.joints.mean(axis=2), context.rig)[:, :, who]
-    sigma = np.array(config.scatter.by_joint())[anchors[:, 0]]
-    scatter = Scatter(config, correlation, context.draws).of_joints(f"outer joints {who}", sigma, occlusion, axes)
+    scatter = Scatter(config, correlation, context.draws).of_joints(
+        f"outer joints {who}", anchors[:, 0], occlusion, axes
+    )
     by_occlusion = config.drop.visible, config.drop.self_occluded, config.drop.occluded
     table = np.array([shares.by_joint() for shares in by_occlusion])[:, anchors[:, 0]]
     share = table[np.where(occlusion == OUTSIDE, VISIBLE, occlusion), np.arange(len(anchors))]

@@ -41,25 +41,32 @@ class Scatter:
             occlusion: occlusion classes of the person's joints, (T, V, 17).
             axes: right and down in the pictures as directions in the world, (T, V, 2, 3).
         """
-        sigma = np.array(self.config.scatter.by_joint())
-        return self.of_joints(person, sigma, occlusion, axes, near=_near_joints(self.correlation.scatter_near))
+        near = _near_joints(self.correlation.scatter_near)
+        return self.of_joints(person, np.arange(len(_BONES_APART)), occlusion, axes, near=near)
 
     def of_joints(
-        self, key: Key, sigma: Floats, occlusion: NDArray[np.int8], axes: Floats, *, near: Floats | None = None
+        self,
+        key: Key,
+        joints: NDArray[np.int64],
+        occlusion: NDArray[np.int8],
+        axes: Floats,
+        *,
+        near: Floats | None = None,
     ) -> Floats:
         """Return the displacements of J joints of a person, (T, V, J, 2) units: Gaussian, truncated at 1.14.
 
         Args:
             key: name of the joints and of the person.
-            sigma: deviations of visible joints, (J,) units.
+            joints: joints of COCO-17 whose deviations they have, (J,).
             occlusion: occlusion classes of the joints, (T, V, J).
             axes: right and down in the pictures as directions in the world, (T, V, 2, 3).
             near: factor (J, J) that correlates the joints of one picture; None: independent joints.
         """
+        sigma = np.array(self.config.scatter.by_joint())[joints]
         if not sigma.any():
             return np.zeros((*occlusion.shape, 2))
-        if self.config.scatter_hidden != 1.0:
-            sigma = np.where(occlusion == VISIBLE, sigma, self.config.scatter_hidden * sigma)
+        hidden = np.array(self.config.scatter_hidden.by_joint())[joints]
+        sigma = np.where(occlusion == VISIBLE, sigma, hidden * sigma)
         return _truncated(self._normal(key, occlusion.shape, axes, near), np.maximum(sigma, 1e-9))
 
     def _normal(self, person: Key, shape: tuple[int, ...], axes: Floats, near: Floats | None) -> Floats:

@@ -111,7 +111,7 @@ class FastLayer:
         seen = seen_joints(views)
         keypoints = self.detector.keypoints
         usual = np.array(keypoints.scatter.by_joint()) * oks_units(views.boxes[:, 0])
-        deviation = usual * np.where(views.visibility[:, 0] == VISIBLE, 1.0, keypoints.scatter_hidden)
+        deviation = usual * np.where(views.visibility[:, 0] == VISIBLE, 1.0, keypoints.scatter_hidden.by_joint())
         return CameraTerms(camera, self.scenes, seen, block, np.maximum(deviation, _LEAST_DEVIATION))
 
     def predict(self, terms: Sequence[CameraTerms], *, variant: str = "") -> Prediction:

@@ -62,7 +62,7 @@ class SightingOdds:
         state, bins, joints = views.visibility[:, 0], _bins(views), np.arange(17)
         keypoints = self.detector.keypoints
         usual = np.array(keypoints.scatter.by_joint()) * oks_units(views.boxes[:, 0])
-        deviation = np.maximum(usual * np.where(state == 0, 1.0, keypoints.scatter_hidden), _LEAST)
+        deviation = np.maximum(usual * np.where(state == 0, 1.0, keypoints.scatter_hidden.by_joint()), _LEAST)
         pictured = views.boxes[:, 0, :, 2:].min(axis=-1, keepdims=True) > 0  # nobody else is ever reported
         right, false = (np.where(pictured, odds[joints, state, bins], 0.0) for odds in (self.right, self.false))
         return right, false, deviation

@@ -8,7 +8,7 @@ recording that is to be scored as a real one needs a truth with the same errors;
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -140,6 +140,11 @@ class AnnotationFit:
     annotation: AnnotationModel
     bias: Floats
     compared: Floats
+
+    @property
+    def of_detected(self) -> AnnotationModel:
+        """Errors of the truth relative to the joints as the detector finds them, which have its bias."""
+        return replace(self.annotation, shift=self.annotation.shift - _per_joint(self.bias))
 
     def summary(self) -> dict[str, Any]:
         """Return all numbers ready for JSON, metres and seconds."""

@@ -61,7 +61,8 @@ class Film:
     People who are absent in a frame are outside of all pictures there.
 
     Attributes:
-        sequence: true poses of everyone and who is present in each frame, with the floor at z = 0.
+        sequence: true poses of everyone and who is present in each frame, with the floor at z = 0. The limbs are where
+            the recording's detector found them, which is not where annotators would place them.
         views: truth in the pictures.
         rig: the cameras, with the floor at z = 0.
         floor: height of the recording's floor, metres.
@@ -80,10 +81,13 @@ class Film:
     def detected(self, config: Detector, *, seed: int) -> list[Detections]:
         """Return the detections of a simulated detector in each frame.
 
+        The limbs are where the recording's detector found them, so that its bias of limbs is not added once more.
+
         Args:
             config: parameters of the detector.
             seed: seed of its draws.
         """
+        config = config.model_copy(update={"bias": config.bias.of_face()})
         return [each.detections for each in detect(self.sequence, self.views, self.rig, config, seed=seed)]
 
 

@@ -34,7 +34,7 @@ class TwinModel:
         recording: the real recording: its rig, its frames, and which actors are annotated in which of them.
         people: who is where in the recording.
         detector: fitted detector.
-        annotation: fitted annotation.
+        annotation: fitted annotation, relative to the joints as the detector finds them: the films show these.
         films: re-enactments that exist already, of seeds 0, 1, ...
     """
 
@@ -47,7 +47,7 @@ class TwinModel:
     @classmethod
     def of(cls, recording: AnnotatedRecording, fitted: Fit) -> Self:
         """Return the model of twins of a recording, with its own fit."""
-        return cls(recording, fitted.people, fitted.profile, fitted.annotation.annotation, (fitted.film,))
+        return cls(recording, fitted.people, fitted.profile, fitted.annotation.of_detected, (fitted.film,))
 
 
 def simulate_twins(model: TwinModel, *, count: int, reporter: Reporter | None = None) -> list[AnnotatedRecording]:
@@ -74,7 +74,7 @@ def detected_twin(model: TwinModel, filmed: Film, *, seed: int) -> AnnotatedReco
     recording = model.recording
     joints = np.full((len(recording), recording.people, len(COCO17), 3), np.nan)
     shown, face = filmed.joints, slice(0, LIMB_JOINTS[0])
-    # Annotated heads are fitted to the detected face; the bias of limbs is part of the fitted shifts.
+    # Annotated heads are fitted to the detected face; limbs of the film are the detected ones already.
     shown[:, :, face] += world_offsets(shown, model.detector.bias)[:, :, face]
     for person, actor in enumerate(model.people.actor):
         if actor >= 0:

@@ -16,7 +16,7 @@ from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints
 from simharness.reality.detector_fit.tetrachoric import correlation_grid, joint_probability
 from simharness.reality.people_tracks import LIMB_JOINTS
 from simharness.scenario.sections.detector import BEARINGS, KIND_OF_JOINT, KINDS, Keypoints
-from simharness.types.truth import MISS_FROM, KeypointError
+from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError
 
 FrameSums = dict[str, Floats]
 
@@ -62,6 +62,7 @@ def frame_sums(labels: LabelledJoints) -> FrameSums:
         **_sizes(labels),
         **_misses(labels),
         **_scatter(labels),
+        **_jitters(labels),
         **_dependence(labels),
         **_scores(labels),
         **_people(labels),
@@ -206,6 +207,14 @@ def _scatter(labels: LabelledJoints) -> FrameSums:
         "scatter.hidden_n": _by_kind(good & (labels.occlusion != VISIBLE)),
         "scatter.hidden_square": _by_kind(square * (labels.occlusion != VISIBLE)),
     }
+
+
+def _jitters(labels: LabelledJoints) -> FrameSums:
+    """Return the number of jitters, and the sum of their distances as shares of the way from 1.14 to 2.35, (T, 9)."""
+    jitter = labels.taken["jitter"]
+    away = np.where(jitter, np.hypot(labels.residual[..., 0], labels.residual[..., 1]), GOOD_BELOW)
+    way = np.clip((away - GOOD_BELOW) / (MISS_FROM - GOOD_BELOW), 0.0, 1.0)
+    return {"jitter.n": _by_kind(jitter), "jitter.way": _by_kind(way)}
 
 
 def _later(offset: Floats, good: Bools, lag: int, labels: LabelledJoints) -> tuple[Floats, Floats]:

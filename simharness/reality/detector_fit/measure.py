@@ -33,6 +33,13 @@ _COUNTED = {
 """Sums that count the observations behind a parameter; the others are measured on all joints in the picture."""
 
 _OCCLUSIONS = ("visible", "self_occluded", "occluded")
+_COUNTED_BY_KIND: Mapping[str, tuple[str, int | None]] = {
+    "self_occluded": ("n.miss", _OCCLUSIONS.index("self_occluded")),
+    "occluded": ("n.miss", _OCCLUSIONS.index("occluded")),
+    "scatter_hidden": ("scatter.hidden_n", None),
+    "jitter_mean": ("jitter.n", None),
+}
+"""Sums that count the joints of a kind behind a parameter, and their occlusion class; None: all."""
 
 
 @dataclass(frozen=True)
@@ -197,6 +204,10 @@ def _count(key: str, sums: FrameSums) -> int:
     if rest[0] in CLASSES and kind is not None:
         n = sums[f"n.{rest[0]}"][..., kind].sum(axis=0)
         return int(n[_OCCLUSIONS.index(rest[1])] if rest[1] in _OCCLUSIONS else n.sum())
+    if rest[0] in _COUNTED_BY_KIND and kind is not None:
+        name, occlusion = _COUNTED_BY_KIND[rest[0]]
+        joints = sums[name] if occlusion is None else sums[name][:, occlusion]
+        return int(joints[..., kind].sum())
     if section == "scores":
         scores = sums["scores"] if kind is None else sums["scores"][..., kind, :]
         return int((scores[:, :, SCORED.index(rest[0])] if rest[0] in SCORED else scores).sum())

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import expit, logit, ndtr
 
 from mvpose.arrays import Floats
-from simharness.detector.conditions import OCCLUDED, SELF_OCCLUDED
+from simharness.detector.conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.frame_sums import BORDER, LOGITS, SCORED, TERCILES, FrameSums, lags
 from simharness.reality.detector_fit.joint_labels import CLASSES
@@ -30,8 +30,10 @@ _WIDEST = 3.0  # units: such a scatter is flat within 1.14, and wider ones are i
 _MIN_ERRORS = 200  # errors needed to estimate their correlations
 _ROUNDS = 4
 _PRIOR = 20.0  # joints
+_PRIOR_ERRORS = 3.0
 _MIN_HIDDEN = 20  # joints of a kind needed to say something about the kind
 _MIN_OUTSIDE = 50  # joints outside of the image needed to see how far the detector reports them
+_HIDDEN = ((SELF_OCCLUDED, "self_occluded"), (OCCLUDED, "occluded"))
 _SEPARATED = 1.0  # deviations between scores of good keypoints and misses from which mixtures can be separated
 
 
@@ -63,7 +65,9 @@ def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> 
             result["keypoints.border"] = _border(sums)
         shown, square = (sums[f"scatter.{key}"] - sums[f"scatter.hidden_{key}"] for key in ("n", "square"))
         _put_by_kind(result, "keypoints.scatter", _sigma(square / shown))
-        result |= _hidden_scatter(sums) | _face(sums)
+        _put_by_kind(result, "keypoints.scatter_hidden", _hidden_scatter(sums))
+        _put_by_kind(result, "keypoints.jitter_mean", _jitter_mean(sums))
+        result |= _face(sums)
         beyond = sums["miss.beyond"] / sums["miss.n"]
         box, box_beyond = sums["miss.box"] / sums["miss.n"], sums["miss.box_beyond"] / sums["miss.n"]
         stray = np.clip(beyond / (box_beyond + beyond * (1 - box)), 0.0, 1.0)
@@ -97,15 +101,31 @@ def _occlusion_factors(n: dict[str, Floats], k: dict[str, Floats], share: dict[s
     observed, expected = np.zeros(()), np.zeros(())
     for key in ("miss", "jitter"):
         wrong = np.where(n[key] > 0, k[key] / n[key], 0.0)
-        observed = observed + (n[key] * wrong).sum(axis=2)
-        expected = expected + (n[key] * wrong[:, :1]).sum(axis=2)
-    factor = np.maximum(observed / expected, 1.0)  # (R, 3), 1 for visible joints
-    known = np.where(np.isfinite(factor), factor, 1.0)
+        observed = observed + n[key] * wrong
+        expected = expected + n[key] * wrong[:, :1]
+    factor = _factors(observed, expected)
+    factor[:, VISIBLE] = 1.0
     result: dict[str, Floats] = {}
     for key in ("miss", "jitter"):
-        mean = np.einsum("rc,rck->rk", known, n[key]) / n[key].sum(axis=1)
+        mean = (factor * n[key]).sum(axis=1) / n[key].sum(axis=1)
         _put_by_kind(result, f"keypoints.{key}", share[key] / mean)
-    return result | {"keypoints.self_occluded": factor[:, SELF_OCCLUDED], "keypoints.occluded": factor[:, OCCLUDED]}
+    for index, name in _HIDDEN:
+        _put_by_kind(result, f"keypoints.{name}", factor[:, index])
+    return result
+
+
+def _factors(observed: Floats, expected: Floats) -> Floats:
+    """Return by which factors errors are more frequent than expected, by kind of joint, (..., 9), 1 or more.
+
+    Kinds with few errors take from the others: each counts as _PRIOR_ERRORS more, at the factor of all.
+
+    Args:
+        observed: errors of joints in some state, (..., 9).
+        expected: errors that there would be, were those joints visible, (..., 9).
+    """
+    pooled = observed.sum(axis=-1, keepdims=True) / expected.sum(axis=-1, keepdims=True)
+    pooled = np.where(np.isfinite(pooled), np.maximum(pooled, 1.0), 1.0)
+    return np.asarray(np.maximum((observed + _PRIOR_ERRORS) / (expected + _PRIOR_ERRORS / pooled), 1.0))
 
 
 def _guesses(n: dict[str, Floats], k: dict[str, Floats], sums: FrameSums) -> dict[str, Floats]:
@@ -123,14 +143,13 @@ def _guesses(n: dict[str, Floats], k: dict[str, Floats], sums: FrameSums) -> dic
     for key in ("miss", "jitter"):
         _put_by_kind(result, f"keypoints.{key}", np.clip(k[key][:, 0] / n[key][:, 0], 0.0, 1.0))
     # Kinds that are never hidden in this way count as the others.
-    for index, name in ((SELF_OCCLUDED, "self_occluded"), (OCCLUDED, "occluded")):
+    usual = np.nan_to_num(k["jitter"][:, 0] / n["jitter"][:, 0])
+    for index, name in _HIDDEN:
         wrong, reported = k["miss"][:, index], n["miss"][:, index]
         pooled = wrong.sum(axis=1, keepdims=True) / reported.sum(axis=1, keepdims=True)
         share = np.where(reported >= _MIN_HIDDEN, wrong / reported, np.nan_to_num(pooled))
         _put_by_kind(result, f"keypoints.guess.{name}", np.clip(share, 0.0, 1.0))
-        jitter, left = k["jitter"][:, index].sum(axis=1), n["jitter"][:, index].sum(axis=1)
-        usual = k["jitter"][:, 0].sum(axis=1) / n["jitter"][:, 0].sum(axis=1)
-        result[f"keypoints.{name}"] = np.maximum(np.nan_to_num(jitter / left / usual, nan=1.0, posinf=1.0), 1.0)
+        _put_by_kind(result, f"keypoints.{name}", _factors(k["jitter"][:, index], n["jitter"][:, index] * usual))
     outside = sums["outside.n"].sum(axis=1, keepdims=True)
     share = np.broadcast_to(sums["outside.k"].sum(axis=1, keepdims=True) / outside, sums["outside.n"].shape)
     _put_by_kind(result, "keypoints.guess.outside", np.where(outside >= _MIN_HIDDEN, share, np.nan))
@@ -156,12 +175,26 @@ def _sigma(square: Floats) -> Floats:
     return np.where(np.isfinite(square), np.interp(square, np.append(0.0, left), np.append(0.0, sigma)), np.nan)
 
 
-def _hidden_scatter(sums: FrameSums) -> dict[str, Floats]:
-    """Return the factor of the scatter of good keypoints whose joint is not visible."""
+def _hidden_scatter(sums: FrameSums) -> Floats:
+    """Return the factor of the scatter of good keypoints whose joint is not visible, by kind, (R, 9).
+
+    Kinds of which too few are hidden have that of the others.
+    """
     hidden_n, hidden = sums["scatter.hidden_n"], sums["scatter.hidden_square"]
     shown = (sums["scatter.square"] - hidden) / (sums["scatter.n"] - hidden_n)
     ratio = _sigma(hidden / hidden_n) / _sigma(shown)
-    return {"keypoints.scatter_hidden": _averaged(ratio, np.where(np.isfinite(ratio), hidden_n, 0.0))}
+    pooled = _averaged(ratio, np.where(np.isfinite(ratio), hidden_n, 0.0))[:, None]
+    return np.where(np.isfinite(ratio) & (hidden_n >= _MIN_HIDDEN), ratio, pooled)
+
+
+def _jitter_mean(sums: FrameSums) -> Floats:
+    """Return the mean distance of jitters as a share of the way from 1.14 to 2.35, by kind, (R, 9).
+
+    Kinds with few jitters take from the others: each counts as _PRIOR joints more, at the mean of all.
+    """
+    n, way = sums["jitter.n"], sums["jitter.way"]
+    pooled = way.sum(axis=1, keepdims=True) / n.sum(axis=1, keepdims=True)
+    return np.asarray((way + _PRIOR * np.nan_to_num(pooled, nan=0.5)) / (n + _PRIOR))
 
 
 def _border(sums: FrameSums) -> Floats:

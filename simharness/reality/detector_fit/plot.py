@@ -44,7 +44,11 @@ _PANELS: tuple[tuple[str, str, tuple[str, ...], float], ...] = (
     ("keypoints.miss", "miss, of visible joints, %", KINDS, 100),
     ("keypoints.inversion", "inversion, %", KINDS, 100),
     ("keypoints.swap", "swap, %", KINDS, 100),
+    ("keypoints.jitter_mean", "mean distance of jitters, % of the way from 1.14 to 2.35 units", KINDS, 100),
     ("keypoints.scatter", "scatter of good keypoints, units", KINDS, 1),
+    ("keypoints.scatter_hidden", "factor of scatter, not visible", KINDS, 1),
+    ("keypoints.self_occluded", "factor of misses and jitter, self-occluded", KINDS, 1),
+    ("keypoints.occluded", "factor of misses and jitter, occluded", KINDS, 1),
     ("keypoints.face.ears", "ears not reported, by bearing of the camera to their side, %", _BINS, 100),
     ("keypoints.face.nose", "nose not reported, by bearing of the camera, %", _BINS, 100),
     ("scores.joint", "score, relative to elbows", KINDS, 1),
@@ -71,8 +75,8 @@ def plot_comparison(measurements: Sequence[MeasuredDetector], path: str | Path) 
         ValueError: the file cannot be written.
     """
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(15, 10), layout="constrained", dpi=110)
-        axes = figure.subplots(4, 3).ravel()
+        figure = Figure(figsize=(19, 10), layout="constrained", dpi=110)
+        axes = figure.subplots(4, 4).ravel()
         for ax, (key, title, kinds, scale) in zip(axes, _PANELS, strict=False):
             _draw(ax, measurements, [f"{key}.{kind}" for kind in kinds], scale=scale)
             ax.set_title(title)
@@ -110,5 +114,7 @@ def _draw(ax: Axes, measurements: Sequence[MeasuredDetector], keys: Sequence[str
     ax.tick_params(axis="x", length=0)
     if keys[0].startswith("scores.joint"):
         ax.set_ylim(0.7, 1.1)
+    elif "occluded" in keys[0] and "drop" not in keys[0]:
+        ax.set_yscale("log")
     elif all(measurement[key].low >= 0 for measurement in measurements for key in keys if measurement[key].known):
         ax.set_ylim(bottom=0)

@@ -10,17 +10,26 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.reality.detector_fit.measure import MeasuredDetector, MeasuredValue
-from simharness.scenario.sections.detector import KINDS, Detector
+from simharness.scenario.sections.detector import KINDS, LARGEST_MULTIPLE, Detector
 
 _FACE_DROPS = ("keypoints.drop.visible", "keypoints.drop.self_occluded")
+
+_MOST = {
+    "keypoints.jitter": 1.0,
+    "keypoints.miss": 1.0,
+    "keypoints.self_occluded": LARGEST_MULTIPLE,
+    "keypoints.occluded": LARGEST_MULTIPLE,
+}
+"""Largest value that a profile may hold, by the beginning of the keys."""
 
 _NOTES: Mapping[str, str] = {
     "keypoints": (
         "Shares of the visible joints that the classes before left, against the consensus of the other views. "
         "Visibility is that of bodies that re-enact the people; joints hidden by furniture count as visible. "
         "miss_some, miss_few and swap_crowded: not measured, as the rates without them. small and truncated: not "
-        "measured. reach: by definition; misses well beyond it are in stray. Scatter, jitter, misses and their factors "
-        "are calibrated: with these values simulated detections measure as the recorded ones."
+        "measured. reach: by definition; misses well beyond it are in stray. jitter_mean: as a share of the way from "
+        "1.14 to 2.35 units. Scatter, jitter, misses and their factors are calibrated: with these values simulated "
+        "detections measure as the recorded ones."
     ),
     "keypoints.drop": "Shares of the joints in the picture that are not reported; bottom-up: whose parent is reported.",
     "keypoints.face": "Shares not reported at bearings of 0, 30, ..., 330 degrees from straight ahead to their side.",
@@ -127,9 +136,9 @@ def _put(tree: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _rounded(key: str, value: float) -> float:
-    """Round to four decimal places, finer than any interval; shares that a factor raised above 1 become 1."""
-    most = 1.0 if key.startswith(("keypoints.jitter", "keypoints.miss")) else float("inf")
-    return round(float(min(value, most)), 4)
+    """Round to four decimal places, finer than any interval; values that the calibration raised too far are bounded."""
+    bound = next((most for start, most in _MOST.items() if key.startswith(start)), float("inf"))
+    return round(float(min(value, bound)), 4)
 
 
 def _wrapped(text: str) -> list[str]:

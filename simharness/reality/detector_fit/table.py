@@ -26,10 +26,7 @@ _OTHERS = {
         ("correlation.scatter_noise", "share of scatter drawn anew in each frame"),
         ("correlation.scatter_near", "correlation of the scatter of neighbouring joints"),
         ("correlation.scatter_views", "share of scatter that views have in common"),
-        ("keypoints.scatter_hidden", "factor of scatter, not visible"),
         ("keypoints.border", "reach beyond the border of the image, units"),
-        ("keypoints.self_occluded", "factor of misses and jitter, self-occluded"),
-        ("keypoints.occluded", "factor of misses and jitter, occluded"),
         ("keypoints.stray.elbows", "share of misses of limbs anywhere on the box"),
     ),
     "Scores": (
@@ -68,15 +65,16 @@ def print_measurement(measurement: MeasuredDetector, console: Console) -> None:
     )
     notes = Text(
         "Each share is of the joints that the classes to its left leave. Good: within 1.14 of OKS sigma x sqrt(area); "
-        "jitter: up to 2.35; miss: beyond; inversions and swaps only where distinguishable from both. Errors are "
-        "measured against the consensus of the other views; what all views share cannot be seen. Visibility is that of "
-        "bodies that re-enact the people.",
+        "jitter: up to 2.35 (at: mean, % of the way between); miss: beyond; inversions and swaps only where "
+        "distinguishable from both. Errors are measured against the consensus of the other views; what all views share "
+        "cannot be seen. Visibility is that of bodies that re-enact the people.",
         style="dim",
     )
     blocks: list[RenderableType] = [
         headline,
         _classes(measurement, intervals=console.width >= _WIDE),
         _drops(measurement),
+        _hidden(measurement),
         _face(measurement),
         _sizes(measurement),
     ]
@@ -119,12 +117,14 @@ def print_agreement(real: MeasuredDetector, simulated: MeasuredDetector, console
 def _classes(measurement: MeasuredDetector, *, intervals: bool) -> Table:
     """Return the table of error classes; in narrow terminals without intervals, which are in the JSON."""
     classes = ("drop", "swap", "inversion", "miss", "jitter")
-    table = _table("Classes of errors, %, and scatter of good keypoints, units", "joint", "n", *classes, "scatter")
+    title = "Classes of errors, %, and scatter of good keypoints, units"
+    table = _table(title, "joint", "n", *classes, "jitter at", "scatter")
     for kind in KINDS:
         cells = [_cell(measurement[f"share.{key}.{kind}"], 1, scale=100, interval=intervals) for key in classes]
         n = measurement[f"share.drop.{kind}"].count
         scatter = _cell(measurement[f"keypoints.scatter.{kind}"], 2, interval=intervals)
-        table.add_row(kind, str(n), *cells, scatter)
+        way = _cell(measurement[f"keypoints.jitter_mean.{kind}"], 0, scale=100, interval=intervals)
+        table.add_row(kind, str(n), *cells, way, scatter)
     return table
 
 
@@ -134,6 +134,15 @@ def _drops(measurement: MeasuredDetector) -> Table:
         table.add_row(
             kind, *(_cell(measurement[f"keypoints.drop.{occlusion}.{kind}"], 1, scale=100) for occlusion in _OCCLUSIONS)
         )
+    return table
+
+
+def _hidden(measurement: MeasuredDetector) -> Table:
+    """Return the table of factors of hidden joints by their kind."""
+    columns = {"self_occluded": "errors, self-occluded", "occluded": "errors, occluded", "scatter_hidden": "scatter"}
+    table = _table("Factors on misses, jitter and scatter of joints that are not visible", "joint", *columns.values())
+    for kind in KINDS:
+        table.add_row(kind, *(_cell(measurement[f"keypoints.{key}.{kind}"], 1) for key in columns))
     return table
 
 

@@ -99,7 +99,7 @@ def predict_halves(
         model = replace(
             TwinModel.of(parts[which], fits[which]),
             detector=other.profile,
-            annotation=other.annotation.annotation,
+            annotation=other.annotation.of_detected,
         )
         twins = simulate_twins(model, count=count, reporter=reporter)
         compared = validate(

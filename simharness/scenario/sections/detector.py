@@ -25,6 +25,10 @@ KIND_OF_JOINT = (0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8)
 BEARINGS = tuple(range(0, 360, 30))
 """Bearings at which the shares of :class:`Face` are given, degrees."""
 
+LARGEST_MULTIPLE = 1000.0
+"""Largest factor of hidden joints: hidden hips of a real detector err a few hundred times as often as visible ones."""
+
+Multiple = Annotated[float, Field(ge=0.0, le=LARGEST_MULTIPLE)]
 ByBearing = Annotated[tuple[Share, ...], Field(min_length=len(BEARINGS), max_length=len(BEARINGS))]
 ByHiddenShare = Annotated[tuple[Share, ...], Field(min_length=5, max_length=5)]
 Metres = Annotated[float, Field(ge=-1.0, le=1.0)]  # in the frame of a body
@@ -77,6 +81,34 @@ class Amounts(_ByJoint):
     ankles: Factor = 0.0
 
 
+class Factors(_ByJoint):
+    """Factor for each kind of joint; 1 changes nothing."""
+
+    nose: Multiple = 1.0
+    eyes: Multiple = 1.0
+    ears: Multiple = 1.0
+    shoulders: Multiple = 1.0
+    elbows: Multiple = 1.0
+    wrists: Multiple = 1.0
+    hips: Multiple = 1.0
+    knees: Multiple = 1.0
+    ankles: Multiple = 1.0
+
+
+class Means(_ByJoint):
+    """Mean for each kind of joint of something between 0 and 1; 0.5: all values are equally likely."""
+
+    nose: Share = 0.5
+    eyes: Share = 0.5
+    ears: Share = 0.5
+    shoulders: Share = 0.5
+    elbows: Share = 0.5
+    wrists: Share = 0.5
+    hips: Share = 0.5
+    knees: Share = 0.5
+    ankles: Share = 0.5
+
+
 class Bias(Section):
     """Systematic offset of the detector's joints from the anatomical ones: forward, outward, up, metres, body frame.
 
@@ -96,6 +128,10 @@ class Bias(Section):
     def by_joint(self) -> tuple[Offset, ...]:
         """Return the offset of each joint of COCO-17, (17, 3)."""
         return tuple(getattr(self, KINDS[kind]) for kind in KIND_OF_JOINT)
+
+    def of_face(self) -> Bias:
+        """Return the bias of nose, eyes and ears alone."""
+        return Bias(nose=self.nose, eyes=self.eyes, ears=self.ears)
 
 
 class Drop(Section):
@@ -143,6 +179,7 @@ class Keypoints(Section):
     quality: Factor = Field(1.0, description="factor on the shares of jitter, miss, inversion and swap")
     scatter: Amounts = Amounts()  # standard deviation of good keypoints, in units; truncated at 1.14
     jitter: Shares = Shares()  # 1.14 to 2.35 units off
+    jitter_mean: Means = Means()  # mean distance of jitters, as a share of the way from 1.14 to 2.35
     miss: Shares = Shares()  # 2.35 to `reach` units off
     miss_some: Shares | None = None  # the same for people with 6 to 10 visible joints; absent: as miss
     miss_few: Shares | None = None  # the same for at most 5 visible joints; absent: as miss_some
@@ -157,10 +194,8 @@ class Keypoints(Section):
     )
     reach: float = Field(4.29, ge=2.35, le=20.0, description="largest distance of misses, units")
     stray: Shares = Shares()  # share of misses that lie anywhere in the person's box
-    self_occluded: Factor = Field(1.0, description="factor on jitter and miss of self-occluded joints")
-    occluded: Factor = Field(
-        1.0, description="factor on jitter and miss of joints hidden by another person or an object"
-    )
+    self_occluded: Factors = Factors()  # on jitter and miss of self-occluded joints
+    occluded: Factors = Factors()  # on jitter and miss of joints hidden by another person or an object
     truncated: Factor = Field(1.0, description="factor on jitter and miss of people cut by the image border")
     small: float = Field(
         0.0,
@@ -168,7 +203,7 @@ class Keypoints(Section):
         le=10.0,
         description="growth of jitter and miss for small people: (64 px / sqrt(area)) to this power",
     )
-    scatter_hidden: Factor = Field(1.0, description="factor on scatter of joints that are not visible")
+    scatter_hidden: Factors = Factors()  # on scatter of joints that are not visible
 
 
 class Correlation(Section):

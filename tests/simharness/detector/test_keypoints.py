@@ -163,6 +163,14 @@ def test_distances_and_places_of_errors():
     np.testing.assert_allclose(found.pixels[swapped], close.views.pixels[:, :, ::-1][swapped])
 
 
+def test_jitters_of_each_kind_have_their_mean_distance():
+    where = world(frames=1500)
+    way = (units(where, find(where, jitter=1.0, jitter_mean={"hips": 0.2})) - GOOD_BELOW) / (MISS_FROM - GOOD_BELOW)
+    hips = [COCO17.index("left_hip"), COCO17.index("right_hip")]
+    assert way[..., hips].mean() == pytest.approx(0.2, abs=0.01)
+    assert np.delete(way, hips, axis=-1).mean() == pytest.approx(0.5, abs=0.01)
+
+
 def test_strays_land_on_the_box():
     where = world(frames=200)
     found = find(where, miss=1.0, stray=1.0)
@@ -193,6 +201,16 @@ def test_quality_multiplies_all_rates_and_only_adds_errors():
 def test_hidden_joints_have_more_errors(parameter, make):
     error = find(make(), miss=0.1, **{parameter: 3.0}).error
     assert within((error == KeypointError.MISS).sum(), error.size, 0.3)
+
+
+@pytest.mark.parametrize("parameter", ["self_occluded", "occluded"])
+def test_factors_of_hidden_joints_by_kind(parameter):
+    hidden = Visibility.SELF_OCCLUDED if parameter == "self_occluded" else Visibility.OCCLUDED_BY_PERSON
+    seen = np.where(np.arange(17) < 13, hidden, Visibility.VISIBLE) * np.ones((300, 3, 2, 17), int)
+    error = find(world(frames=300, visibility=seen), miss=0.1, **{parameter: {"wrists": 4.0, "knees": 4.0}}).error
+    miss = error == KeypointError.MISS
+    for joints, share in (([9, 10], 0.4), ([7, 8, 11, 12], 0.1), ([13, 14], 0.1)):  # hidden, hidden, visible knees
+        assert within(miss[..., joints].sum(), miss[..., joints].size, share)
 
 
 def test_truncated_and_small_people_have_more_errors():

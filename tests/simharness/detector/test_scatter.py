@@ -71,3 +71,13 @@ def test_hidden_joints_have_their_own_scatter():
     np.testing.assert_array_equal(more.pixels[..., :9, :], plain.pixels[..., :9, :])
     exact = find(where, scatter=0.2, scatter_hidden=0.0)
     np.testing.assert_allclose(exact.pixels[..., 9:, :], where.views.pixels[..., 9:, :], atol=1e-6)
+
+
+def test_hidden_joints_of_each_kind_have_their_scatter():
+    where = standing(2000, visibility=np.full(17, Visibility.SELF_OCCLUDED))
+    unit = Conditions.of(where.views).unit[..., None]
+    found, usual = (find(where, scatter=0.2, scatter_hidden=hidden) for hidden in ({"hips": 2.0}, {}))
+    off, plain = ((each.pixels - where.views.pixels) / unit for each in (found, usual))
+    hips = [11, 12]
+    assert off[..., hips, :].std() / plain[..., hips, :].std() == pytest.approx(2.0, rel=0.05)
+    np.testing.assert_array_equal(np.delete(off, hips, axis=-2), np.delete(plain, hips, axis=-2))

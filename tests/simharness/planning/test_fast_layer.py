@@ -11,7 +11,7 @@ from simharness.planning.joint_error import covariance, expected_distance, infor
 from simharness.planning.standing_people import APART, bearings_of, pose_pool, standing_scenes
 from simharness.planning.visibility import see, seen_joints
 from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.detector import Correlation, Detector
+from simharness.scenario.sections.detector import Correlation, Detector, Factors
 from simharness.types.views import Visibility
 from simharness.world.rigs.layouts import look_at
 
@@ -275,7 +275,7 @@ class TestSightings:
         profile = read_profile("typical")
         scatter_only = profile.model_copy(
             update={
-                "keypoints": profile.keypoints.model_copy(update={"quality": 0.0, "scatter_hidden": 1.0}),
+                "keypoints": profile.keypoints.model_copy(update={"quality": 0.0, "scatter_hidden": Factors()}),
                 "boxes": PERFECT.boxes,
                 "phantoms": PERFECT.phantoms,
             }

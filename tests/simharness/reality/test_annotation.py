@@ -142,6 +142,12 @@ class TestFitted:
         assert np.sqrt((away**2).mean()) < 0.008
         assert np.abs(away).max() < 0.025
 
+    def test_errors_relative_to_detected_joints_have_the_bias(self, fitted):
+        expected = offset_in_body(fitted.annotation, fitted.bias)
+        assert np.abs(expected - fitted.annotation.shift[:, LIMBS]).max() > 0.02
+        np.testing.assert_allclose(fitted.of_detected.shift[:, LIMBS], expected, atol=1e-12)
+        np.testing.assert_array_equal(fitted.of_detected.shift[:, 12:], fitted.annotation.shift[:, 12:])
+
     def test_shifts_of_actors_are_recovered_up_to_what_they_share(self, known, fitted):
         _, annotation = known
         found, true = (each.shift[:, LIMBS] for each in (fitted.annotation, annotation))

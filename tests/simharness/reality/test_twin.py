@@ -14,7 +14,7 @@ from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS
 from simharness.reality.seed_evaluation import PcpInterval
 from simharness.reality.twin import TwinModel, detected_twin, simulate_twins
 from simharness.reality.twin_comparison import TwinComparison, compare
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import Bias, Detector
 
 DETECTOR = Detector.model_validate(
     {"name": "known", "kind": "bottom-up", "keypoints": {"scatter": 0.3}, "boxes": {"missed": 0.1}}
@@ -74,6 +74,16 @@ class TestTwin:
             for parent, joint in ((7, 9), (8, 10), (13, 15), (14, 16)):  # bottom-up
                 assert not (missing[:, parent] & ~missing[:, joint]).any()
 
+    def test_the_bias_of_limbs_is_in_the_film_already(self, model, twin):
+        """Bodies re-enact joints as detected: hips that the detector raises are raised in the film."""
+        bias = Bias(hips=(0.0, 0.01, 0.05), ankles=(0.0, 0.0, 0.03))
+        biased = detected_twin(
+            replace(model, detector=DETECTOR.model_copy(update={"bias": bias})), model.films[0], seed=0
+        )
+        np.testing.assert_array_equal(biased.truth, twin.truth)
+        for one, same in zip(twin.detections, biased.detections, strict=True):
+            np.testing.assert_array_equal(one.keypoints, same.keypoints)
+
     def test_it_is_that_of_its_seed(self, model, twin):
         again, other = (detected_twin(model, model.films[0], seed=seed) for seed in (0, 1))
         np.testing.assert_array_equal(again.truth, twin.truth)
@@ -123,9 +133,11 @@ def test_a_twin_measures_as_its_recording(filmed):
     assert len(different) <= 0.2 * compared, different
     hips = [each.annotation.bias[6, 2] for each in (fitted, again)]
     assert hips == pytest.approx([0.03, 0.03], abs=0.015)
-    limbs = [each.people.joints[..., LIMB_JOINTS, :] for each in (fitted, again)]
     order = [list(again.people.actor).index(actor) for actor in fitted.people.actor]
-    assert np.nanmedian(np.linalg.norm(limbs[1][:, order] - limbs[0], axis=-1)) < 0.04
+    before, after = fitted.people.joints, again.people.joints[:, order]
+    assert np.nanmedian(np.linalg.norm((after - before)[..., LIMB_JOINTS, :], axis=-1)) < 0.04
+    raised = (after - before)[..., 11:13, 2] - (after - before)[..., 5:7, 2]  # hips, relative to the shoulders
+    assert abs(np.nanmedian(raised)) < 0.012
 
 
 class TestComparison:

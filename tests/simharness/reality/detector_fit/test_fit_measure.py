@@ -54,6 +54,15 @@ GUESSING = {
 }
 """Joints that a top-down detector guesses."""
 
+BY_KIND = {
+    "kind": "bottom-up",
+    "keypoints": {
+        "scatter": 0.3, "jitter": 0.05, "jitter_mean": {"hips": 0.2, "shoulders": 0.2},
+        "self_occluded": {"wrists": 5.0, "elbows": 5.0}, "scatter_hidden": {"hips": 2.0, "shoulders": 2.0},
+    },
+}  # fmt: skip
+"""Hidden joints whose errors differ with the kind of joint."""
+
 LASTING = {
     "keypoints": {"scatter": 0.3, "miss": 0.05, "drop": {"visible": 0.1, "self_occluded": 0.1, "occluded": 0.1}},
     "correlation": {"life": 0.2, "views": 0.3, "gross_views": 0.4, "limb": 0.4, "scatter_life": 0.3},
@@ -184,8 +193,10 @@ class TestDrops:
     def test_scatter_of_hidden_joints(self, dropping, erring):
         """A factor of 1.5; capsules take some visible joints for hidden ones, so less is seen."""
         assert mean(dropping, "keypoints.scatter") == pytest.approx(0.3, abs=0.03)
-        assert 1.1 < dropping["keypoints.scatter_hidden"].low < dropping["keypoints.scatter_hidden"].high < 1.6
-        assert erring["keypoints.scatter_hidden"].value == pytest.approx(1.0, abs=0.05)
+        assert 1.15 < mean(dropping, "keypoints.scatter_hidden") < 1.5
+        for kind in LIMB_KINDS:
+            assert dropping[f"keypoints.scatter_hidden.{kind}"].low > 1.0
+        assert mean(erring, "keypoints.scatter_hidden") == pytest.approx(1.0, abs=0.05)
 
 
 class TestClasses:
@@ -207,7 +218,21 @@ class TestClasses:
         [("keypoints.self_occluded", 1.5, 0.2), ("keypoints.occluded", 2.0, 0.25)],
     )
     def test_factors_of_hidden_joints(self, erring, key, expected, within):
-        assert erring[key].value == pytest.approx(expected, abs=within)
+        assert mean(erring, key) == pytest.approx(expected, abs=within)
+
+    def test_hidden_joints_of_each_kind(self, filmed):
+        """They differ as they should, but less: some visible joints are taken for hidden ones. Calibration mends it."""
+        found = point_estimates(filmed.sample(staged=True, **BY_KIND))
+
+        def of(key, *kinds):
+            return np.mean([found[f"keypoints.{key}.{kind}"] for kind in kinds])
+
+        assert 3.5 < of("self_occluded", "wrists", "elbows") < 5.5
+        assert of("self_occluded", "knees", "ankles") == pytest.approx(1.1, abs=0.3)
+        assert 1.3 < of("scatter_hidden", "shoulders", "hips") < 2.0
+        assert of("scatter_hidden", "elbows", "wrists", "knees", "ankles") == pytest.approx(1.0, abs=0.1)
+        assert 0.15 < of("jitter_mean", "shoulders", "hips") < 0.38
+        assert of("jitter_mean", "elbows", "wrists", "knees", "ankles") == pytest.approx(0.5, abs=0.06)
 
     def test_nothing_is_dropped(self, erring):
         for occlusion in ("visible", "self_occluded", "occluded"):

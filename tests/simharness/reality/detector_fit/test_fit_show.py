@@ -34,7 +34,7 @@ def test_the_table_has_every_kind_of_joint_with_its_interval(measured):
     row = next(line for line in classes.splitlines() if line.startswith("wrists"))
     assert f"{100 * value.value:.1f}  {100 * value.low:.1f}–{100 * value.high:.1f}" in row
     nose = next(line for line in classes.splitlines() if line.startswith("nose"))
-    assert nose.count("–") == 6  # five intervals, and inversions, which are unknown
+    assert nose.count("–") == 7  # six intervals, and inversions, which are unknown
     assert "-0 " not in text
 
 
