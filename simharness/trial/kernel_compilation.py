@@ -1,9 +1,10 @@
 """Compilation of kernels in a second process while this one builds and films.
 
 Compilation takes most of the first run after an installation. The second process compiles those kernels that pictures
-need last, because this process needs them first, and then the kernels of the method. All are written to the cache on
-disk, from which the processes that film and estimate load them (:mod:`mvpose.kernels`). A process that needs a kernel
-that another one compiles waits for it.
+need last, because this process needs them first, and then those of the method in the order of its stages. When this
+process has nothing else to do, it begins with the last stage, reconstruction, which takes as long as the others. All
+are written to the cache on disk, from which the processes that film and estimate load them (:mod:`mvpose.kernels`). A
+process that needs a kernel that another one compiles waits for it.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ from numba.core.errors import NumbaError
 from numba.core.sigutils import normalize_signature
 
 from mvpose import COCO17, Camera, Detections, Pipeline, Rig
+from mvpose.estimate import Matching
 from mvpose.pipeline import SequenceEstimator
 from mvpose.presets import NEED_DESCRIPTORS
+from mvpose.rays import ordered_rays
 
 _PICTURES = "pictures"  # stands for the kernels of pictures among the names of variants
 
@@ -47,8 +50,10 @@ class Compilation:
             self._process.start()
 
     def wait(self) -> None:
-        """Wait until all kernels are compiled."""
+        """Compile the last stage of the method, and wait until all other kernels are compiled."""
         if self._names:
+            with contextlib.suppress(ValueError):  # no preset: its kernels are compiled when they are used
+                compile_reconstruction(self._names - {_PICTURES})
             self._process.join()
             self._compiled.update(self._names)
 
@@ -76,14 +81,8 @@ def picture_kernels() -> Iterator[tuple[Any, tuple[Any, ...]]]:
 
 
 def compile_kernels(variants: Iterable[str]) -> None:
-    """Compile the kernels of presets of :class:`mvpose.Pipeline`, or load them from the cache.
-
-    The input is one simple person seen by two cameras: the least that runs through every stage.
-    """
-    K = np.array([[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]])
-    rig = Rig([Camera(K, np.eye(3), np.array([x, 0.0, 3.0]), size=(640, 480)) for x in (-0.5, 0.5)])
-    body = np.column_stack([np.zeros(len(COCO17)), np.linspace(-0.8, 0.8, len(COCO17)), np.zeros(len(COCO17))])
-    bare = Detections.from_keypoints([0, 1], rig.project(body), np.ones((2, len(COCO17))))
+    """Compile the kernels of presets of :class:`mvpose.Pipeline`, or load them from the cache."""
+    rig, bare = _seen_person()
     described = replace(bare, descriptors=np.ones((2, 8)))
     for variant in variants:
         for detections in (described,) if variant in NEED_DESCRIPTORS else (bare, described):
@@ -93,6 +92,27 @@ def compile_kernels(variants: Iterable[str]) -> None:
             if isinstance(estimator, SequenceEstimator):
                 for _ in estimator.track(rig, _coming_and_going(detections)):
                     pass
+
+
+def compile_reconstruction(variants: Iterable[str]) -> None:
+    """Compile the kernels of the last stage of presets of :class:`mvpose.Pipeline`, or load them from the cache.
+
+    Presets without separate stages are left out.
+    """
+    rig, detections = _seen_person()
+    _, rays = ordered_rays(rig, detections)
+    for variant in variants:
+        estimator = Pipeline.preset(variant)
+        if isinstance(estimator, Pipeline):
+            estimator.reconstruction(rays, Matching(np.zeros(2, np.int64)).labels, COCO17)
+
+
+def _seen_person() -> tuple[Rig, Detections]:
+    """Return one simple person seen by two cameras: the least that runs through every stage."""
+    K = np.array([[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]])
+    rig = Rig([Camera(K, np.eye(3), np.array([x, 0.0, 3.0]), size=(640, 480)) for x in (-0.5, 0.5)])
+    body = np.column_stack([np.zeros(len(COCO17)), np.linspace(-0.8, 0.8, len(COCO17)), np.zeros(len(COCO17))])
+    return rig, Detections.from_keypoints([0, 1], rig.project(body), np.ones((2, len(COCO17))))
 
 
 def _coming_and_going(detections: Detections) -> Iterator[Detections]:

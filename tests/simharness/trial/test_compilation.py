@@ -3,8 +3,11 @@
 import importlib
 import inspect
 import pkgutil
+import subprocess
+import sys
 from dataclasses import replace
 from importlib import resources
+from pathlib import Path
 
 import numba
 import numpy as np
@@ -45,6 +48,26 @@ def test_a_real_frame_compiles_nothing_more():
         if variant not in NEED_DESCRIPTORS:
             Pipeline.preset(variant).estimate(rig, seen)
     assert signatures() == before
+
+
+RECONSTRUCTION = """
+import test_compilation
+from simharness.trial.kernel_compilation import compile_kernels, compile_reconstruction
+
+def of_reconstruction():
+    return {key: each for key, each in test_compilation.signatures().items() if "reconstruction" in key[0]}
+
+compile_reconstruction(["full", "track"])
+compiled = of_reconstruction()
+compile_kernels(["full"])
+assert compiled == of_reconstruction(), "the method needs other kernels, or for other arguments"
+assert ("mvpose.reconstruction.pictorial", "_structures") in compiled
+"""
+
+
+def test_reconstruction_alone_is_compiled_for_what_the_method_gives_it():
+    """In a process of its own, in which nothing is compiled yet."""
+    subprocess.run([sys.executable, "-c", RECONSTRUCTION], check=True, cwd=Path(__file__).parent)
 
 
 def test_a_failed_compilation_does_not_end_the_run():
