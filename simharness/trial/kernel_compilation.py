@@ -23,7 +23,7 @@ from numba.core.sigutils import normalize_signature
 from mvpose import COCO17, Camera, Detections, Pipeline, Rig
 from mvpose.estimate import Matching
 from mvpose.pipeline import SequenceEstimator
-from mvpose.presets import NEED_DESCRIPTORS
+from mvpose.presets import NEED_DESCRIPTORS, PRESETS
 from mvpose.rays import ordered_rays
 
 _PICTURES = "pictures"  # stands for the kernels of pictures among the names of variants
@@ -52,8 +52,7 @@ class Compilation:
     def wait(self) -> None:
         """Compile the last stage of the method, and wait until all other kernels are compiled."""
         if self._names:
-            with contextlib.suppress(ValueError):  # no preset: its kernels are compiled when they are used
-                compile_reconstruction(self._names - {_PICTURES})
+            compile_reconstruction(self._names & PRESETS.keys())
             self._process.join()
             self._compiled.update(self._names)
 
