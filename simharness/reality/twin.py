@@ -16,7 +16,7 @@ from simharness.detector.bias import world_offsets
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation import AnnotationModel
 from simharness.reality.detector_fit.fit import Fit
-from simharness.reality.people_tracks import LIMB_JOINTS, TrackedPeople
+from simharness.reality.people_tracks import TrackedPeople
 from simharness.reality.reenactment import Film, cut_takes, film
 from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.detector import Detector
@@ -73,9 +73,8 @@ def detected_twin(model: TwinModel, filmed: Film, *, seed: int) -> AnnotatedReco
     """Return the twin of a recording from its film: detections and annotation are drawn from the seed."""
     recording = model.recording
     joints = np.full((len(recording), recording.people, len(COCO17), 3), np.nan)
-    shown, face = filmed.joints, slice(0, LIMB_JOINTS[0])
     # Annotated heads are fitted to the detected face; limbs of the film are the detected ones already.
-    shown[:, :, face] += world_offsets(shown, model.detector.bias)[:, :, face]
+    shown = filmed.joints + world_offsets(filmed.joints, model.detector.bias.of_face())
     for person, actor in enumerate(model.people.actor):
         if actor >= 0:
             joints[:, actor] = shown[:, person]
