@@ -46,7 +46,8 @@ def test_calibrated_parameters_of_hidden_joints_are_nearer_to_the_true_ones(film
     measured = measure(filmed.sample(staged=True, kind="bottom-up", keypoints=errors), resamples=10)
 
     def simulate(values):
-        return [filmed.sample(seed=5, staged=True, **settings(measured.with_values(values), name="fitted"))]
+        fitted = settings(measured.with_values(values), name="fitted")
+        return [filmed.sample(seed=seed, staged=True, **fitted) for seed in (5, 6)]
 
     real = {key: each.value for key, each in measured.values.items()}
     calibrated = calibrate(real, simulate)
@@ -55,7 +56,7 @@ def test_calibrated_parameters_of_hidden_joints_are_nearer_to_the_true_ones(film
         before, after = (
             np.abs(np.log([values[f"{key}.{kind}"] for kind in kinds] / wanted)).mean() for values in (real, calibrated)
         )
-        assert after < 0.85 * before, (key, before, after)
+        assert after < 0.75 * before, (key, before, after)
 
 
 def test_a_simulation_that_measures_alike_changes_nothing(filmed):

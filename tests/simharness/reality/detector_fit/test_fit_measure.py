@@ -194,8 +194,9 @@ class TestDrops:
         """A factor of 1.5; capsules take some visible joints for hidden ones, so less is seen."""
         assert mean(dropping, "keypoints.scatter") == pytest.approx(0.3, abs=0.03)
         assert 1.15 < mean(dropping, "keypoints.scatter_hidden") < 1.5
-        for kind in LIMB_KINDS:
-            assert dropping[f"keypoints.scatter_hidden.{kind}"].low > 1.0
+        values = [dropping[f"keypoints.scatter_hidden.{kind}"] for kind in LIMB_KINDS]
+        assert 1.1 < np.mean([each.low for each in values]) < np.mean([each.high for each in values]) < 1.6
+        assert min(each.low for each in values) > 1.0
         assert mean(erring, "keypoints.scatter_hidden") == pytest.approx(1.0, abs=0.05)
 
 
