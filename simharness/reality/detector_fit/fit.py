@@ -22,7 +22,7 @@ from simharness.reality.reenactment import Film, film
 from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, Detector
 
 _TWINS = 2  # simulated in each round of the calibration
-_FEWEST = 100  # joints behind a value that is calibrated
+_FEWEST = 100  # joints behind a value that is calibrated: Shelf has 130 reported shoulders that others hide
 
 
 @dataclass(frozen=True)
