@@ -9,9 +9,12 @@ from contextlib import contextmanager
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextToPath
 
 Color = str
 
@@ -23,8 +26,7 @@ _STANDALONE_PAPER = "#ffffff"
 
 SIZE = (5.2, 3.1)  # inches of 72 px: small, so that the letters stay readable on a phone
 _LEGEND_SIZES = (8.5, 8.0, 7.5)  # points, from the usual to the smallest
-_LEGEND_LEFT = 32.0  # points: what stands to the left of the axes
-_LETTER, _HANDLE = 0.53, 3.1  # width of a letter, and of a mark with its gaps, as shares of the font size
+_MARK, _MARK_GAP, _COLUMN_GAP, _EDGE_GAP = 1.1, 0.8, 1.2, 0.6  # widths in a legend, as shares of the font size
 _SHEET_GAP = 14.0  # points between the plots of a sheet, and around them
 _SHEET_SCALE = 1.3  # plots have the width of a phone; a sheet is shown on wider screens
 
@@ -96,39 +98,54 @@ def _inline(svg: str) -> str:
 
 
 def legend_above(axes: Axes, *, columns: int | None = None) -> None:
-    """Draw the legend above the axes, where it hides no data; nothing where no line has a label.
+    """Draw the legend above the plot, from its left edge, where it hides no data; nothing where no line has a label.
 
-    It has one row where that fits, if need be in smaller letters, and else as many columns as fit.
+    It has one row where that fits, if need be in smaller letters, and else as many columns as fit. It is a legend of
+    the figure: one of the axes would make axes of a fixed aspect smaller until they are as wide as the legend.
 
     Args:
         axes: the plot.
         columns: most columns; None: all labels.
     """
-    names = axes.get_legend_handles_labels()[1]
+    handles, names = axes.get_legend_handles_labels()
     if names:
         figure = axes.get_figure(root=True)
         assert figure is not None
-        fitting, size = _fitting_columns([len(name) for name in names], 72 * figure.get_figwidth() - _LEGEND_LEFT)
-        axes.legend(
-            loc="lower left",
-            bbox_to_anchor=(0, 1.0),
+        fitting, size = _fitting_columns([_text_width(name) for name in names], 72 * figure.get_figwidth())
+        figure.legend(
+            handles,
+            names,
+            loc="outside upper left",
             ncols=min(fitting, columns or fitting),
             fontsize=size,
             labelcolor=INK,
-            handlelength=1.1,
-            columnspacing=1.2,
-            borderaxespad=0.2,
+            handlelength=_MARK,
+            handletextpad=_MARK_GAP,
+            columnspacing=_COLUMN_GAP,
+            borderpad=_EDGE_GAP / 2,
+            borderaxespad=_EDGE_GAP / 2,
         )
 
 
-def _fitting_columns(letters: Sequence[int], width: float) -> tuple[int, float]:
-    """Return the most columns of labels with so many letters that fit into a width in points, and their font size."""
-    for count in range(len(letters), 0, -1):
-        for size in _LEGEND_SIZES if count == len(letters) else _LEGEND_SIZES[:1]:
-            rows = -(-len(letters) // count)  # labels fill one column after the other
-            widest = [max(letters[k : k + rows]) for k in range(0, len(letters), rows)]
-            if sum(widest) * _LETTER * size + len(widest) * _HANDLE * size <= width:
-                return count, size
+def _text_width(text: str) -> float:
+    """Return the width of a text in Matplotlib's own font, which is wider than those of most pages, in font sizes."""
+    width, _, _ = TextToPath().get_text_width_height_descent(text, FontProperties(size=100), ismath=False)
+    return float(width) / 100
+
+
+def _fitting_columns(texts: Sequence[float], width: float) -> tuple[int, float]:
+    """Return the most columns of labels that fit into a width in points, and their font size.
+
+    Args:
+        texts: widths of the labels, as shares of the font size.
+        width: width of the plot, points.
+    """
+    for rows in range(1, len(texts) + 1):
+        columns = -(-len(texts) // rows)  # labels fill one column after the other
+        widest = [each.max() + _MARK + _MARK_GAP for each in np.array_split(texts, columns)]
+        for size in _LEGEND_SIZES if rows == 1 else _LEGEND_SIZES[:1]:
+            if (sum(widest) + (columns - 1) * _COLUMN_GAP + 2 * _EDGE_GAP) * size <= width:
+                return columns, size
     return 1, _LEGEND_SIZES[0]
 
 

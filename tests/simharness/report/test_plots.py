@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from mvpose.report.svg_plots import STAGE_COLORS, _fitting_columns
+from mvpose.report.svg_plots import STAGE_COLORS
 from simharness.report.run import plots
 from simharness.report.study import plots as study_plots
 from simharness.scenario.sections.scenario import Cameras
@@ -167,12 +167,3 @@ def test_a_wide_interval_does_not_flatten_the_curve_and_is_marked_where_it_is_cu
     assert with_wide > 0.45 * span  # of the height that the curve has without the wide interval
     marks = [len(re.findall(rf'<use[^>]*style="[^"]*fill: {color}', svg)) for svg in (plain, cut)]
     assert marks == [3, 4]  # a dot for each value, and the arrow at the lower end of the wide interval
-
-
-@pytest.mark.parametrize("letters", [[4, 5], [7, 13, 15, 14, 7], [30] * 4, [90]])
-def test_a_legend_has_one_row_where_it_fits(letters):
-    count, size = _fitting_columns(letters, 340.0)
-    assert 1 <= count <= len(letters)
-    assert 7.5 <= size <= 8.5
-    if sum(letters) * 0.53 * 7.5 + len(letters) * 3.1 * 7.5 <= 340.0:
-        assert count == len(letters)
