@@ -210,7 +210,7 @@ def _evidence(
         lines.append(f"people are {ratio:.2f} times as large as adults ({bones} bones)")
     lines.append(
         "median distance of keypoints from the people as seen by the other cameras: "
-        + ", ".join(f"{name} {value:.1f} px" for name, value in zip(names, residuals, strict=True))
+        + ", ".join(f"{value:.1f} px ({name})" for name, value in zip(names, residuals, strict=True))
     )
     lines.append(
         f"errors of keypoints are {result.equations.scale:.2f} of the error model, {result.quadratic.temper:.1f} of "
