@@ -110,7 +110,9 @@ class _Description:
     def _code(self, code: types.CodeType) -> object:
         described = tuple(self.of(each) for each in code.co_consts)
         names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
-        arguments = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags
+        # Not the flags: numba overwrites them in a profiled thread, and of two functions that differ in flags alone it
+        # compiles at most one (no keyword arguments of any name).
+        arguments = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount
         return code.co_code, code.co_exceptiontable, described, names, arguments
 
     def _module(self, module: types.ModuleType, attributes: tuple[str, ...]) -> object:

@@ -1,5 +1,6 @@
 """Cache of compiled kernels: never stale, never damaged, shared by processes, and free of old entries."""
 
+import cProfile
 import gc
 import importlib
 import json
@@ -147,6 +148,22 @@ def compiled_again(toy):
     module = toy.start()
     module.outer(5.0)
     return compiled(module.outer)
+
+
+def test_a_profiler_changes_no_entry(toy):
+    """In a profiled thread numba writes into the code objects of the kernels that are called."""
+    toy.start().outer(5.0)
+    entries = toy.entries
+    for _ in range(2):
+        with cProfile.Profile():
+            profiled = toy.start().outer
+            profiled(5.0)  # loads it
+            profiled(5.0)  # calls it
+        assert not compiled(profiled)
+        profiled(np.float32(5.0))  # one more entry of the same code
+        entries = sorted({*entries, *toy.entries})
+        assert toy.entries == entries
+    assert len(entries) > 3
 
 
 def test_options_of_a_callee_are_seen(toy):
