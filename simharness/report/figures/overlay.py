@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Self
 
@@ -219,8 +219,9 @@ def readable_on(color: Color) -> Color:
     return INK if np.dot(color, (0.299, 0.587, 0.114)) > 150 else PAPER
 
 
+@lru_cache(maxsize=512)  # the frames of a film have the same titles
 def text_mask(text: str, size: float) -> NDArray[np.float32]:
-    """Return the coverage, 0 to 1, of a line of text ``size`` pixels high, (h, w); h depends on the size alone."""
+    """Return the coverage, 0 to 1, of a line of text ``size`` pixels high, (h, w), read-only; h is that of the size."""
     font = _font(max(6, round(size)))
     *_, bottom = font.getbbox("Åg" + text)
     glyphs, (x, y) = font.getmask2(text, mode="L")  # type: ignore[union-attr]
@@ -229,6 +230,7 @@ def text_mask(text: str, size: float) -> NDArray[np.float32]:
     if glyphs.size[0] and glyphs.size[1]:
         drawn = np.array(glyphs, np.float32).reshape(glyphs.size[::-1])[: mask.shape[0] - y]
         mask[y : y + drawn.shape[0], x : x + drawn.shape[1]] = drawn / 255
+    mask.setflags(write=False)
     return mask
 
 

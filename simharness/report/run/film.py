@@ -66,7 +66,10 @@ def make_film(
     """
     frames = sorted(previews)
     views = np.unique(np.linspace(0, len(record.rig) - 1, min(len(record.rig), _MAX_VIEWS)).astype(int)).tolist()
-    sheets = [_sheet(previews[frame], record, exposures, frame, views, variant) for frame in frames]
+    height, width = previews[frames[0]][views[0]].shape[:2]
+    entries = [entry for entry in legend_entries(record.scenario) if entry[0] == "limbs"]
+    explained = legend(entries, size=(width, height), title="Legend")
+    sheets = [_sheet(previews[frame], record, exposures, frame, views, variant, explained) for frame in frames]
     step = float(record.time[frames[1]] - record.time[frames[0]]) if len(frames) > 1 else 1.0
     mp4 = encode_mp4(sheets, rate=max(1.0 / step, _LEAST_RATE))
     if mp4 is None:
@@ -83,6 +86,7 @@ def _sheet(
     frame: int,
     views: Sequence[int],
     variant: str,
+    explained: Rgb,
 ) -> Rgb:
     tiles = []
     for view in views:
@@ -99,9 +103,7 @@ def _sheet(
             )
         )
     titles = [record.rig[view].name for view in views]
-    entries = [entry for entry in legend_entries(record.scenario) if entry[0] == "limbs"]
-    height, width = pictures[views[0]].shape[:2]
-    return mosaic([*tiles, legend(entries, size=(width, height), title="Legend")], [*titles, ""])
+    return mosaic([*tiles, explained], [*titles, ""])
 
 
 def encode_mp4(pictures: Sequence[Rgb], *, rate: float) -> bytes | None:
