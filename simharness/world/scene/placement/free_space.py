@@ -97,7 +97,11 @@ def _comes_near(hull: Box, tree: cKDTree, margin: float) -> bool:
 def _thinned(points: Floats) -> Floats:
     """Return floor positions (n, 2) of points (..., 3), one per cell; all points are within a cell diagonal of one."""
     places = points[..., :2].reshape(-1, 2)
-    _, first = np.unique(np.floor(places / _CELL).astype(int), axis=0, return_index=True)
+    if not len(places):
+        return places
+    row, column = np.floor(places / _CELL).astype(np.int64).T
+    width = column.max() - column.min() + 1
+    _, first = np.unique(row * width + (column - column.min()), return_index=True)  # faster than of pairs
     return places[first]
 
 
