@@ -19,6 +19,7 @@ WHOLE = "suite"
 """Name of the whole suite beside those of its cases."""
 
 _LEVEL = 0.01
+_DRAWS = 200_000  # of sign flips: the least p-value of hundreds of tests must stay far below the level when corrected
 
 Scores = Mapping[tuple[str, int, str, str], float]
 """Scores by case, seed, variant and key of the score."""
@@ -80,7 +81,7 @@ def effect(before: Scores, after: Scores) -> Effect:
     differing = {key: each for key, each in changes.items() if each.any()}
     if not differing:
         return Effect(False, False, "scores apply to other trials", 1.0, len(seeds))
-    results = {key: paired(np.zeros(len(each)), each) for key, each in differing.items()}
+    results = {key: paired(np.zeros(len(each)), each, draws=_DRAWS) for key, each in differing.items()}
     corrected = dict(zip(results, holm([each.p for each in results.values()]), strict=True))
     best = min(results, key=lambda key: (corrected[key], key[0] != WHOLE, -_strength(differing[key])))
     place, variant, score = best

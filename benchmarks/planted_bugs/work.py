@@ -22,7 +22,7 @@ from simharness.scenario.study_definition import load_study
 _LOCK = threading.Lock()
 _SLOWER = 12.0  # times the limit of a bug: the first run compiles all kernels and simulates everything
 _FEWEST = 6  # seeds that the gate accepts
-_SIMULATED = 12  # most fresh seeds for a bug in the simulator, which must simulate everything again
+_SIMULATED = 24  # most fresh seeds for a bug in the simulator, which must simulate everything again; 12 prove nothing
 
 _WARM = ("tests/mvpose/test_pipeline.py", "tests/mvpose/reconstruction", "tests/simharness/capture/test_rays.py")
 

@@ -20,7 +20,7 @@ EXACT = 12
 """Largest number of differing pairs for which all sign flips are enumerated; for more, :data:`DRAWS` are drawn."""
 
 DRAWS = 20_000
-"""Number of random sign flips."""
+"""Usual number of random sign flips."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,7 @@ def paired(
     *,
     alternative: Alternative = "two-sided",
     symmetric: bool = False,
+    draws: int = DRAWS,
     seed: int = 0,
 ) -> Paired:
     """Test whether the mean of a score changed between two measurements of the same scenes, (n,) each.
@@ -55,7 +56,7 @@ def paired(
 
     - A sign-flip permutation test of the mean difference, exact for differences with a symmetrical distribution.
       Flipping the sign of a pair without difference changes nothing. With at most ``EXACT`` other pairs all signs are
-      enumerated; with more, ``DRAWS`` flips are drawn, and p is at least 1 / 20,001 (Phipson & Smyth, 2010).
+      enumerated; with more, ``draws`` flips are drawn, and p is at least 1 / (1 + draws) (Phipson & Smyth, 2010).
     - Student's t corrected for skewness (:mod:`simharness.statistics.studentized`).
 
     The least p-value is :func:`least_p`. Pairs must be independent of each other.
@@ -66,6 +67,7 @@ def paired(
         alternative: alternative hypothesis; "greater": after is greater than before.
         symmetric: whether the hypothesis is that both measurements have one distribution, not only one mean. The
             differences are symmetrical then, and sign flips alone are exact, with more power.
+        draws: number of random sign flips; of many tests that are corrected, each needs a smaller least p-value.
         seed: seed of the draws.
 
     Raises:
@@ -81,7 +83,7 @@ def paired(
     if not len(change):
         return Paired(np.nan, np.nan, np.nan, 1.0, 0)
     low, high = (float(end) for end in mean_ends(change))
-    p = _sign_flip_p(change, alternative, seed)
+    p = _sign_flip_p(change, alternative, draws, seed)
     if not symmetric:
         p = max(p, _studentized_p(change, alternative))
     return Paired(float(change.mean()), low, high, p, len(change))
@@ -120,7 +122,7 @@ def _studentized_p(change: Floats, alternative: Alternative) -> float:
     return min(1.0, 2 * min(p_greater(change), p_greater(-change)))
 
 
-def _sign_flip_p(change: Floats, alternative: Alternative, seed: int) -> float:
+def _sign_flip_p(change: Floats, alternative: Alternative, draws: int, seed: int) -> float:
     """Return the share of sign flips with a sum at least as extreme as the observed one."""
     differing = change[change != 0]
     # The order of a summation changes its rounding, so equal sums are compared with a tolerance.
@@ -139,8 +141,8 @@ def _sign_flip_p(change: Floats, alternative: Alternative, seed: int) -> float:
     # A random byte is the signs of eight differences; their sums are looked up.
     eights = np.pad(differing, (0, -n % 8)).reshape(-1, 8)
     sums = _signs(8) @ eights.T
-    drawn = stream(seed, "sign-flip").integers(256, size=(DRAWS, len(eights)))
-    share = (1 + count_extreme(sums[drawn, np.arange(len(eights))].sum(axis=1))) / (1 + DRAWS)
+    drawn = stream(seed, "sign-flip").integers(256, size=(draws, len(eights)))
+    share = (1 + count_extreme(sums[drawn, np.arange(len(eights))].sum(axis=1))) / (1 + draws)
     return max(share, 2.0**-n)  # no sum of random signs is rarer, but few draws may miss all
 
 

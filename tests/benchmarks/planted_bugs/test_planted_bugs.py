@@ -181,6 +181,11 @@ class TestEffect:
         assert found.p == pytest.approx(2 * 2 / 2**12)
         assert found.text.startswith("pcp -0.5 (-0.5 to -0.5), full, suite")
 
+    def test_a_shift_at_all_of_many_seeds_is_clear_among_hundreds_of_scores(self):
+        cases = [f"case{k}" for k in range(220)]
+        before = {(case, seed, "full", "pcp"): 90.0 for case in cases for seed in range(24)}
+        assert effect(before, {key: 89.0 - 0.001 * key[1] for key in before}).clear
+
     def test_changes_of_both_signs_are_not_clear(self):
         found = effect(self.scores(np.zeros(12)), self.scores(np.resize([1.0, -1.0], 12)))
         assert (found.identical, found.clear) == (False, False)

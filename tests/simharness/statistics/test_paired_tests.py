@@ -60,6 +60,7 @@ def test_drawn_signs_agree_with_all_signs():
     assert abs(result.p - exact) < 4 * math.sqrt(exact * (1 - exact) / DRAWS)
     assert paired(np.zeros(16), change, alternative="greater").p == result.p  # the draws are keyed
     assert paired(np.zeros(100), np.ones(100), alternative="greater").p == 1 / (1 + DRAWS)
+    assert paired(np.zeros(100), np.ones(100), alternative="greater", draws=400_000).p == 1 / 400_001
 
 
 def test_no_change_is_no_evidence():
