@@ -100,8 +100,8 @@ def _inline(svg: str) -> str:
 def legend_above(axes: Axes, *, columns: int | None = None) -> None:
     """Draw the legend above the plot, from its left edge, where it hides no data; nothing where no line has a label.
 
-    It has one row where that fits, if need be in smaller letters, and else as many columns as fit. It is a legend of
-    the figure: one of the axes would make axes of a fixed aspect smaller until they are as wide as the legend.
+    It has one row where that fits, if need be in smaller letters, and else the fewest rows that fit. It belongs to the
+    figure: a legend of the axes would make axes of a fixed aspect as small as it takes to be as wide as the legend.
 
     Args:
         axes: the plot.
