@@ -177,6 +177,7 @@ def test_make_knows_its_targets(command):
 def test_modules_have_a_command_line(command, monkeypatch, capsys):
     module = command.removeprefix("python -m ")
     monkeypatch.setattr(sys, "argv", [module, "--help"])
+    monkeypatch.delitem(sys.modules, f"{module}.__main__", raising=False)  # other tests import it; runpy would warn
     with pytest.raises(SystemExit) as exit_code:
         runpy.run_module(module, run_name="__main__", alter_sys=True)
     assert not exit_code.value.code
