@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 
 _FAR = 1.5  # times the error of the best: from there on the worst is named
 
@@ -49,18 +49,25 @@ def of_times(times: Mapping[str, Mapping[str, float]]) -> str:
     return f"{needed}, {100 * parts[slowest] / sum(parts.values()):.0f} % of it for {slowest}."
 
 
-def of_people(errors: Floats) -> str:
-    """Return who has the largest error over time; (T, P) millimetres, NaN where a person was not found."""
+def of_people(errors: Floats, present: Bools) -> str:
+    """Return who has the largest error over time.
+
+    Args:
+        errors: millimetres, (T, P); NaN where a person was not found.
+        present: who is in the scene, (T, P); nobody looks for people who never are.
+    """
+    there = np.flatnonzero(present.any(axis=0))
+    errors = errors[:, there]
     found = np.isfinite(errors)
     if errors.shape[1] < 2 or not found.any(axis=0).all():
-        lost = [f"{person}" for person in np.flatnonzero(~found.any(axis=0)).tolist()]
+        lost = [f"{person}" for person in there[~found.any(axis=0)].tolist()]
         return f"Never found: person {', '.join(lost)}." if lost else ""
     means = np.array([column[np.isfinite(column)].mean() for column in errors.T])
     worst, best = int(means.argmax()), int(means.argmin())
     if means[worst] < _FAR * means[best]:
         return f"No person stands out: means of {means[best]:.0f} to {means[worst]:.0f} mm."
-    easiest = f"person {best}, the easiest, {means[best]:.0f} mm"
-    return f"Person {worst} is the hardest: {means[worst]:.0f} mm on average; {easiest}."
+    easiest = f"person {there[best]}, the easiest, {means[best]:.0f} mm"
+    return f"Person {there[worst]} is the hardest: {means[worst]:.0f} mm on average; {easiest}."
 
 
 def of_visibility(cameras: Sequence[str], shares: Floats, labels: Sequence[str]) -> str:

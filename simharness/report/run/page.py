@@ -22,7 +22,7 @@ from simharness.report.run.figures import draw_figures
 from simharness.report.run.film import Film
 from simharness.report.run.headline import COLUMNS, NOTHING, WHOLE_BODY_COLUMNS, has_whole_body
 from simharness.report.run.pictures import Picture
-from simharness.report.run.standard_figures import person_errors
+from simharness.report.run.standard_figures import person_errors, presence
 from simharness.report.run.tracked_people import TRACKING_COLUMNS, tracked_variants
 from simharness.scenario.toml_files import dumps
 from simharness.scoring.pcp import GROUPS, Part
@@ -115,6 +115,7 @@ def _parts_table(variants: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
     """Return the table of people: a row with the scores of each true person."""
     errors, parts = person_errors(record.scores, variant), _parts(record.scores, variant)
+    present = presence(record).sum(axis=0)
     doing = roles(record.scenario)
     rows = []
     for person in range(errors.shape[1]):
@@ -126,7 +127,7 @@ def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
                 "name": f"person {person}",
                 "color": line_color(person),
                 "activity": doing[person],
-                "found": f"{100 * found.mean():.1f}",
+                "found": f"{100 * found.sum() / present[person]:.1f}" if present[person] else NOTHING,
                 "pcp": f"{100 * correct / counted.sum():.1f}" if counted.any() else NOTHING,
                 "mpjpe": f"{person_error[found].mean():.1f}" if found.any() else NOTHING,
             }
@@ -142,14 +143,15 @@ def _parts(scores: pl.DataFrame, variant: str) -> NDArray[np.int8]:
 
 
 def joint_errors(record: Record, variant: str) -> Floats:
-    """Return the distance of every true joint from its estimate, (T, P, J) millimetres; NaN without an estimate."""
-    errors = np.full((len(record.time), *record.truth[0].joints.shape[:2]), np.nan)
+    """Return the distance of every joint of those who are there from its estimate, (n,) mm; NaN without an estimate."""
+    joints = np.stack([true.joints for true in record.truth])
+    errors = np.full(joints.shape[:3], np.nan)
     for frame, (true, estimate) in enumerate(zip(record.truth, record.estimates[variant], strict=True)):
         partner = pair(true.joints, estimate.joints).estimate
         found = partner >= 0
         offset = true.joints[found] - estimate.joints[partner[found]]
         errors[frame, found] = 1000 * np.linalg.norm(offset, axis=-1)
-    return errors
+    return errors[np.isfinite(joints).all(axis=-1)]
 
 
 def _stage_times(record: Record) -> dict[str, dict[str, float]]:
@@ -166,7 +168,7 @@ def _findings(record: Record, main: str) -> dict[str, str]:
         "parts": findings.of_parts(record.summary["variants"][main], GROUPS),
         "times": findings.of_times(_stage_times(record)),
         "distribution": findings.of_joint_errors(
-            {variant: joint_errors(record, variant).ravel() for variant in record.estimates}
+            {variant: joint_errors(record, variant) for variant in record.estimates}
         ),
     }
 
@@ -190,6 +192,6 @@ def _plots(record: Record, main: str, things: Sequence[Floats]) -> dict[str, Mar
     }
     if people:
         drawn["distribution"] = plots.error_distribution(
-            {variant: joint_errors(record, variant).ravel() for variant in record.estimates}
+            {variant: joint_errors(record, variant) for variant in record.estimates}
         )
     return {name: Markup(svg) for name, svg in drawn.items()}

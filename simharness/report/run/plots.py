@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.patches import Polygon
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
 from mvpose.report.rig_plots import camera_from_above, name_cameras
 from mvpose.report.svg_plots import (
@@ -24,23 +24,24 @@ from mvpose.report.svg_plots import (
 VISIBILITY_COLORS: tuple[Color, ...] = ("#2e9e6b", "#d9a514", "#d9643a", "#8a63c9", "#8b93a1")
 
 
-def error_over_time(time: Floats, errors: Floats, *, colors: Sequence[Color]) -> str:
+def error_over_time(time: Floats, errors: Floats, present: Bools, *, colors: Sequence[Color]) -> str:
     """Plot the mean joint error of each person over time.
 
     Args:
         time: seconds, (T,).
-        errors: millimetres, (T, P); NaN where a person was not found, which is marked below the axis.
+        errors: millimetres, (T, P); NaN where a person was not found.
+        present: who is in the scene, (T, P); where such a person was not found is marked below the axis.
         colors: colours of the P people.
     """
     with svg_plot("error-over-time") as (axes, written):
         top = float(np.nanmax(errors)) * 1.15 if np.isfinite(errors).any() else 100.0
         for person in range(errors.shape[1]):
             axes.plot(time, errors[:, person], color=colors[person], lw=1.6, label=f"person {person}", zorder=3)
-            lost = np.isnan(errors[:, person])
+            lost = np.isnan(errors[:, person]) & present[:, person]
             row = -top * (0.05 + 0.045 * person)
             axes.plot(time[lost], np.full(lost.sum(), row), "s", ms=3, color=colors[person], clip_on=False)
         axes.set(xlabel="time, s", ylabel="mean joint error, mm")
-        axes.set_ylim(-top * (0.05 + 0.045 * errors.shape[1]) if np.isnan(errors).any() else 0, top)
+        axes.set_ylim(-top * (0.05 + 0.045 * errors.shape[1]) if (np.isnan(errors) & present).any() else 0, top)
         axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= top])
         axes.set_xlim(time[0], max(time[-1], time[0] + 1e-6))
         axes.grid(axis="y")

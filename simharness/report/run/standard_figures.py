@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from mvpose.report.palette import line_color
 from simharness.report.run import findings, plots
 from simharness.report.run.figures import figure
@@ -24,14 +24,14 @@ _VISIBILITY_LABELS = {
 @figure(
     "Error over time",
     "Mean joint error of each person, variant {variant}. "
-    "Squares below the axis: frames in which the person was not found.",
-    finding=lambda record, variant: findings.of_people(person_errors(record.scores, variant)),
+    "Squares below the axis: frames in which the person was there and was not found.",
+    finding=lambda record, variant: findings.of_people(person_errors(record.scores, variant), presence(record)),
 )
 def error_over_time(record: Record, variant: str) -> str | None:
     """Plot the mean joint error of each person over time; None without people."""
     errors = person_errors(record.scores, variant)
     colors = [line_color(person) for person in range(errors.shape[1])]
-    return plots.error_over_time(record.time, errors, colors=colors) if colors else None
+    return plots.error_over_time(record.time, errors, presence(record), colors=colors) if colors else None
 
 
 @figure(
@@ -55,10 +55,15 @@ def _visibility_finding(record: Record) -> str:
 def _visibility_shares(record: Record) -> Floats | None:
     """Return the share of the joints of each camera by label, (V, 5); None without people."""
     labels = np.stack([true.visibility for true in record.truth], axis=1)  # (V, T, P, J)
-    labels = labels[:, np.stack([true.present for true in record.truth])]  # absent people have no visibility
+    labels = labels[:, presence(record)]  # absent people have no visibility
     if not labels.shape[1]:
         return None
     return np.stack([(labels == label).mean(axis=(1, 2)) for label in _VISIBILITY_LABELS], axis=1)
+
+
+def presence(record: Record) -> Bools:
+    """Return who is in the scene in every frame, (T, P)."""
+    return np.stack([true.present for true in record.truth])
 
 
 def person_errors(scores: pl.DataFrame, variant: str) -> Floats:

@@ -24,7 +24,7 @@ def draw_all(people: int = 3, frames: int = 6) -> list[str]:
     errors[1:3] = np.nan
     shares = np.full((5, 5), 0.2)
     return [
-        plots.error_over_time(np.arange(frames) / 10, errors, colors=COLORS),
+        plots.error_over_time(np.arange(frames) / 10, errors, np.ones(errors.shape, bool), colors=COLORS),
         plots.error_distribution({"full": errors.ravel(), "no-3dps": errors.ravel() * 2}),
         plots.visibility_shares([f"cam{k}" for k in range(5)], shares, labels=list("abcde")),
         plots.stage_times({"full": {"affinity": 1.0, "matching": 2.0, "total": 3.1}, "other": {"affinity": 4.0}}),
@@ -75,9 +75,19 @@ def test_a_method_without_stages_has_the_stage_method():
     assert STAGE_COLORS["method"] not in plots.stage_times({"full": {"affinity": 1.0, "total": 1.0}})
 
 
+def test_only_people_who_are_there_are_marked_as_not_found():
+    errors = np.array([[20.0, 30.0], [20.0, np.nan], [20.0, np.nan]])
+    everywhere, once = np.ones((3, 2), bool), np.array([[True, True], [True, True], [True, False]])
+    marks = [
+        plots.error_over_time(np.arange(3.0), errors, present, colors=COLORS).count(f"fill: {COLORS[1]}")
+        for present in (everywhere, once, np.isfinite(errors))
+    ]
+    assert marks[0] - marks[1] == marks[1] - marks[2] == 1
+
+
 def test_empty_data_gives_a_plot():
     missed = np.full((4, 2), np.nan)
-    assert "<svg" in plots.error_over_time(np.arange(4.0), missed, colors=COLORS)
+    assert "<svg" in plots.error_over_time(np.arange(4.0), missed, np.ones((4, 2), bool), colors=COLORS)
     assert "<svg" in plots.error_distribution({"full": np.zeros(0)})
     assert "<svg" in plots.stage_times({})
     rig = build_rig(Cameras())

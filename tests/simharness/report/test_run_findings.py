@@ -25,7 +25,14 @@ def test_the_median_counts_joints_that_were_not_found_as_infinitely_far() -> Non
     ],
 )
 def test_who_is_hardest(errors: list[list[float]], sentence: str) -> None:
-    assert findings.of_people(np.array(errors)) == sentence
+    assert findings.of_people(np.array(errors), np.ones((len(errors), len(errors[0])), bool)) == sentence
+
+
+def test_people_who_never_come_are_not_looked_for() -> None:
+    errors = np.array([[NAN, 20.0, 60.0], [NAN, NAN, 40.0]])
+    present = np.array([[False, True, True], [False, False, True]])
+    sentence = "Person 2 is the hardest: 50 mm on average; person 1, the easiest, 20 mm."
+    assert findings.of_people(errors, present) == sentence
 
 
 def test_the_camera_that_sees_least_and_why() -> None:
