@@ -111,6 +111,7 @@ class DescriptorModel:
         edges = np.array(distances["hidden_share_of_the_joints_of_the_worse_crop"])
         turns = _waves(np.deg2rad(distances["view_difference_degrees"]))
         measured = {float(level): kinds for level, kinds in distances["look_alike"].items()}
+        _check_ranges(distances["quantiles"], measured)
         levels = sorted(measured)
         bins = len(edges) - 1
         better = _better(measured, bins)
@@ -262,6 +263,18 @@ def _better(measured: Mapping[float, Any], bins: int) -> Floats:
 def _middles(edges: Floats) -> Floats:
     """Return the middles of the bins between edges (b + 1,), (b,)."""
     return 0.5 * (edges[1:] + edges[:-1])
+
+
+def _check_ranges(ranks: Sequence[float], measured: Mapping[float, Any]) -> None:
+    """Raise a ValueError for ranks, distances or cosines that no measurement gives: the fit to them may not end."""
+    if not (np.diff([0.0, *ranks, 1.0]) >= 0).all():
+        raise ValueError("quantiles must increase from 0 to 1")
+    for kind in (summary for kinds in measured.values() for summary in kinds.values()):
+        if not (np.diff([0.0, *kind["all"]["quantiles"], 2.0]) >= 0).all():
+            raise ValueError("distances must increase with their quantiles, from 0 to 2")
+        cosines = [kind["all"]["cosine"], *(each["cosine"] for row in kind["bins"] for each in row if each["pairs"])]
+        if not (np.abs(cosines) <= 1).all():
+            raise ValueError("cosines must be between -1 and 1")
 
 
 def _cosine_deviation(summary: Mapping[str, Any], quantiles: Sequence[float]) -> float:

@@ -335,6 +335,24 @@ def test_a_card_without_distances_is_refused(tmp_path, content):
         DescriptorModel.of_network(tmp_path / "other.onnx")
 
 
+@pytest.mark.parametrize(
+    ("keys", "value", "message"),
+    [
+        (("quantiles", 3), 1.5, "quantiles must increase from 0 to 1"),
+        (("look_alike", "0.0", "same", "all", "quantiles", 0), 3.0, "distances must increase"),
+        (("look_alike", "0.0", "other", "all", "cosine"), -1.2, "cosines must be between"),
+    ],
+)
+def test_distances_that_no_measurement_gives_are_refused(card, keys, value, message):
+    distances = json.loads(json.dumps(card))
+    inner = distances
+    for key in keys[:-1]:
+        inner = inner[key]
+    inner[keys[-1]] = value
+    with pytest.raises(ValueError, match=message):
+        DescriptorModel.fitted(distances)
+
+
 def test_the_card_of_another_network_is_refused(tmp_path):
     shutil.copy(DEFAULT.with_suffix(".json"), tmp_path / "other.json")
     DescriptorModel.of_network(tmp_path / "other.onnx")  # the network file itself is not needed
