@@ -339,8 +339,8 @@ def test_a_card_without_distances_is_refused(tmp_path, content):
     ("keys", "value", "message"),
     [
         (("quantiles", 3), 1.5, "quantiles must increase from 0 to 1"),
-        (("look_alike", "0.0", "same", "all", "quantiles", 0), 3.0, "distances must increase"),
-        (("look_alike", "0.0", "other", "all", "cosine"), -1.2, "cosines must be between"),
+        (("look_alike", "0", "same", "all", "quantiles", 0), 3.0, "distances must increase"),
+        (("look_alike", "0", "other", "all", "cosine"), -1.2, "cosines must be between"),
     ],
 )
 def test_distances_that_no_measurement_gives_are_refused(card, keys, value, message):
