@@ -90,7 +90,7 @@ def paired(
 
 
 def least_p(pairs: int) -> float:
-    """Return the least one-sided p-value of :func:`paired`: of so many pairs that all change alike."""
+    """Return the least one-sided p-value of :func:`paired` with ``DRAWS``: of so many pairs that all change alike."""
     return 2.0**-pairs if pairs <= EXACT else max(2.0**-pairs, 1 / (1 + DRAWS))
 
 

@@ -54,6 +54,7 @@ def render(
     """
     summary = record.summary
     main, scores = next(iter(summary["variants"].items()))
+    errors = {variant: joint_errors(record, variant) for variant in record.estimates}
     return fill_template(
         "run.html",
         scenario=record.scenario,
@@ -70,8 +71,8 @@ def render(
         poster=film and Picture("", "", film.poster).uri,
         blame=found and blame_section(found),
         blame_hint=f"{_command(record)} --blame 10",
-        plots=_plots(record, main, things),
-        findings=_findings(record, main),
+        plots=_plots(record, main, things, errors),
+        findings=_findings(record, main, errors),
         figures=draw_figures(record, main),
         tracking_columns=TRACKING_COLUMNS,
         tracked=tracked_variants(record),
@@ -162,18 +163,16 @@ def _stage_times(record: Record) -> dict[str, dict[str, float]]:
     }
 
 
-def _findings(record: Record, main: str) -> dict[str, str]:
+def _findings(record: Record, main: str, errors: Mapping[str, Floats]) -> dict[str, str]:
     """Return what each figure shows, a sentence, by name; empty where there is nothing to tell."""
     return {
         "parts": findings.of_parts(record.summary["variants"][main], GROUPS),
         "times": findings.of_times(_stage_times(record)),
-        "distribution": findings.of_joint_errors(
-            {variant: joint_errors(record, variant) for variant in record.estimates}
-        ),
+        "distribution": findings.of_joint_errors(errors),
     }
 
 
-def _plots(record: Record, main: str, things: Sequence[Floats]) -> dict[str, Markup]:
+def _plots(record: Record, main: str, things: Sequence[Floats], errors: Mapping[str, Floats]) -> dict[str, Markup]:
     """Return the SVG of each plot by name; plots without data are left out."""
     joints = np.stack([true.joints for true in record.truth])
     people = joints.shape[1]
@@ -191,7 +190,5 @@ def _plots(record: Record, main: str, things: Sequence[Floats]) -> dict[str, Mar
         "times": plots.stage_times(_stage_times(record)),
     }
     if people:
-        drawn["distribution"] = plots.error_distribution(
-            {variant: joint_errors(record, variant) for variant in record.estimates}
-        )
+        drawn["distribution"] = plots.error_distribution(errors)
     return {name: Markup(svg) for name, svg in drawn.items()}
