@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
-from matplotlib.textpath import TextToPath
+from matplotlib.textpath import text_to_path
 
 Color = str
 
@@ -129,7 +129,7 @@ def legend_above(axes: Axes, *, columns: int | None = None) -> None:
 
 def _text_width(text: str) -> float:
     """Return the width of a text in Matplotlib's own font, which is wider than those of most pages, in font sizes."""
-    width, _, _ = TextToPath().get_text_width_height_descent(text, FontProperties(size=100), ismath=False)
+    width, _, _ = text_to_path.get_text_width_height_descent(text, FontProperties(size=100), ismath=False)
     return float(width) / 100
 
 
