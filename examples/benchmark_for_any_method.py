@@ -14,7 +14,7 @@ from mvpose.formats.calibration.panoptic import read_calibration
 from mvpose.formats.openpose import read_frame
 from mvpose.recording import People
 from mvpose.tracking import Tracker, TrackingModel, track
-from simharness.export.panoptic_sequence import ExportPlan, export_sequence
+from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
 from simharness.reality.people_evaluation import evaluate_people
 from simharness.reality.recording_file import read_recording
 

@@ -22,10 +22,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mvpose import Estimate
-from simharness.causes.blame import Blame, blame
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import Assessment, assess
+from simharness.study.causes.cause_shares import Blame, blame
 from simharness.trial.run_trial import TrialResult, run_trial
 from simharness.types.recording import Recording
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from mvpose import COCO17, Estimate
 from simharness.interface import simulate
-from simharness.pairing.pairing import pair
 from simharness.scenario.study_definition import load_study
 from simharness.scoring.confidence import inside
+from simharness.scoring.pairing import pair
 from simharness.trial.stages.build_trial import build_variants
 from simharness.types.recording import Recording
 

@@ -21,8 +21,8 @@ from mvpose import COCO17, SHELF14, Detections, Estimate, Pipeline, Rig
 from mvpose.arrays import Floats
 from mvpose.pipeline import Estimator, SequenceEstimator
 from mvpose.report.expected_error import expected_median
-from simharness.pairing.pairing import pair
 from simharness.reality.recording_file import read_recording
+from simharness.scoring.pairing import pair
 
 _SEED = 2_000  # of the first scene; far from those of suites and baselines
 _NO_WALLS = "room.walls=false"  # cameras that stand farther out than the room is large

@@ -16,7 +16,7 @@ from time import perf_counter
 
 from benchmarks.pictures import networks
 from benchmarks.pictures.painted_bodies import write_pictures
-from simharness.export.panoptic_sequence import ExportPlan, export_sequence
+from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
 from simharness.scenario.load import load
 
 Command = Callable[..., None]

@@ -21,11 +21,11 @@ from scipy.stats import spearmanr
 from mvpose import Pipeline, Rig
 from mvpose.arrays import Floats
 from simharness.interface import simulate
-from simharness.pairing.pairing import pair
 from simharness.planning import FastLayer, Prediction, Volume
 from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.frame import score_frame
+from simharness.scoring.pairing import pair
 from simharness.scoring.pcp import Part
 from simharness.trial.stages.build_trial import true_rig
 from simharness.types.random_streams import stream

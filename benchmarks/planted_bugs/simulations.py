@@ -25,7 +25,7 @@ First = Literal["scenes", "detections", "estimates"]
 """First stage that a change of code can affect: all of them, detections in filmed scenes, or estimates and scores."""
 
 _METHOD = ("affinity", "matching", "reconstruction", "tracking", "rays.py", "duplicates.py", "pipeline.py")
-_AFTER = ("pairing", "scoring", "failures", "statistics", "gate")
+_AFTER = ("scoring", "statistics", "gate")
 AFTER_DETECTION = (*(f"mvpose/{name}" for name in _METHOD), *(f"simharness/{name}" for name in _AFTER))
 """Files and folders that no module of simulation and detection imports; a test checks it."""
 

@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 from mvpose import Estimate
 from mvpose.arrays import Floats, Integers
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.pairing.pairing import pair
+from simharness.scoring.pairing import pair
 
 _ONE_PERSON = 0.5  # metres: distance between estimates of one person in frames that follow each other
 _SHORT = 5  # frames: a track that lives fewer is a ghost

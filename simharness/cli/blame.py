@@ -11,7 +11,7 @@ from simharness.cli.exit_codes import exit_on_error, write_json
 from simharness.cli.options import JsonFile, Overrides, ScenarioFile, Seed
 
 if TYPE_CHECKING:
-    from simharness.causes.blame import Blame
+    from simharness.study.causes.cause_shares import Blame
 
 
 def add_to(app: typer.Typer) -> None:
@@ -57,7 +57,7 @@ def blame(
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)
-        from simharness.causes.blame import blame as find_blame
+        from simharness.study.causes.cause_shares import blame as find_blame
 
         setting = ", ".join(overrides or ())
         with reporter() as bars:
@@ -78,8 +78,8 @@ def blame(
 
 def print_blame(blame: Blame, console: Console) -> None:
     """Print what cost a scenario its score: a row for each cause, and what to mend first."""
-    from simharness.causes.blame_text import conclusion, heading, points, surest
     from simharness.cli.score_tables import ScoreTable
+    from simharness.study.causes.blame_text import conclusion, heading, points, surest
 
     rows = [(each.about.title, points(each.share), points(each.alone)) for each in blame.shares]
     rows.append(("no cause here", points(blame.rest), "–"))

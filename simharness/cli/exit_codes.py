@@ -24,7 +24,7 @@ def exit_on_error() -> Iterator[None]:
     """Exit with a message and an exit code on an error.
 
     A ValueError means bad input, because code that works on validated input raises a RunError instead:
-    :func:`simharness.report.run.result_folder.run` and :func:`run_errors_only` ensure it.
+    :func:`simharness.outputs.run.result_folder.run` and :func:`run_errors_only` ensure it.
     """
     console = Console(stderr=True)
     try:

@@ -39,7 +39,7 @@ def export(
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)
-        from simharness.export.panoptic_sequence import ExportPlan, export_sequence
+        from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
 
         plan = ExportPlan(folder / loaded.name, every=every, pictures=pictures)
         with reporter() as bars:

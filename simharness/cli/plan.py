@@ -91,13 +91,13 @@ def plan(
         loaded = read_room(room, changes={key: value for key, value in changes.items() if value is not None})
         folder = out / (Path(loaded.file).stem or loaded.name)
         if preview:
-            from simharness.report.planning.plan_page import write_preview
+            from simharness.outputs.planning.plan_page import write_preview
 
             page = write_preview(loaded, folder)
             typer.echo(f"preview: {page}")
             return
+        from simharness.outputs.planning.plan_page import write_plan
         from simharness.planning.plan import plan as plan_rig
-        from simharness.report.planning.plan_page import write_plan
 
         try:
             with reporter() as bars:

@@ -116,10 +116,10 @@ def rehearse(
             target_of,
             volume_of,
         )
+        from simharness.outputs.planning.rehearsal_page import render_rehearsal
         from simharness.planning.rehearse import Effort
         from simharness.planning.rehearse import rehearse as rehearse_rig
         from simharness.planning.rig_file import read_rig
-        from simharness.report.planning.rehearsal_page import render_rehearsal
         from simharness.runtime.progress import reporter
         from simharness.scenario.presets import read_profile
         from simharness.trial.provenance import provenance

@@ -12,7 +12,7 @@ from simharness.cli.exit_codes import exit_on_error, run_errors_only
 from simharness.cli.options import BlameSeeds
 
 if TYPE_CHECKING:
-    from simharness.report.study.worst_frames import WorstFrame
+    from simharness.outputs.study.worst_frames import WorstFrame
     from simharness.study.result_folder import Results
 
 
@@ -86,13 +86,13 @@ def report(
             _write_rerun(results, trial, rerun)
             typer.echo(f"recording: {rerun}")
             return
-        from simharness.report.study.page import THRESHOLDS, check_thresholds, write_report
-        from simharness.report.study.worst_frames import SHOWN
+        from simharness.outputs.study.page import THRESHOLDS, check_thresholds, write_report
+        from simharness.outputs.study.worst_frames import SHOWN
         from simharness.runtime.progress import reporter
 
         check_thresholds(thresholds)
         if digest is not None:
-            from simharness.report.study.digest import write_digest
+            from simharness.outputs.study.digest import write_digest
 
             write_digest(results, digest, thresholds=thresholds or THRESHOLDS)
             typer.echo(f"digest: {digest}")
@@ -123,8 +123,8 @@ def _thresholds(given: list[str]) -> dict[str, float]:
 
 def _write_rerun(results: Results, trial: str | None, path: Path) -> None:
     """Write the recording of a trial of a study, which is run again."""
-    from simharness.report.study.replay import replay
-    from simharness.report.study.rerun_recording import require_sdk, write_rerun
+    from simharness.outputs.study.replay import replay
+    from simharness.outputs.study.rerun_recording import require_sdk, write_rerun
 
     require_sdk()
     frame = _choose_frame(results, trial)
@@ -143,8 +143,8 @@ def _write_rerun_of_run(folder: Path, trial: str | None, path: Path | None) -> N
         )
     if trial is not None:
         raise ValueError(f"--trial {trial}: {folder} is the folder of a run, which has one trial; remove --trial")
-    from simharness.report.study.replay import replay_run
-    from simharness.report.study.rerun_recording import require_sdk, write_rerun
+    from simharness.outputs.study.replay import replay_run
+    from simharness.outputs.study.rerun_recording import require_sdk, write_rerun
     from simharness.trial.run_folder import read_run
 
     require_sdk()
@@ -153,7 +153,7 @@ def _write_rerun_of_run(folder: Path, trial: str | None, path: Path | None) -> N
 
 def _choose_frame(results: Results, trial: str | None) -> WorstFrame:
     """Return the worst frame of a trial, or of all trials."""
-    from simharness.report.study.worst_frames import worst_frames
+    from simharness.outputs.study.worst_frames import worst_frames
 
     frames = worst_frames(results, count=results.trials["trial"].n_unique())
     chosen = [frame for frame in frames if frame.trial.startswith(trial or "")]

@@ -15,7 +15,7 @@ from simharness.cli.options import BlameSeeds, Overrides, ScenarioFile, Seed, co
 
 if TYPE_CHECKING:
     from simharness.cli.score_tables import ScoreTable
-    from simharness.report.run.headline import Column
+    from simharness.outputs.run.headline import Column
 
 
 def add_to(app: typer.Typer) -> None:
@@ -50,7 +50,7 @@ def run(
         loaded = load(
             scenario, overrides=overrides or (), seed=seed
         )  # before slow imports: mistakes are reported at once
-        from simharness.report.run.result_folder import run as run_scenario
+        from simharness.outputs.run.result_folder import run as run_scenario
 
         command = command_line()
         with reporter() as bars:
@@ -60,8 +60,8 @@ def run(
     for table in _tables(summary):
         table.print_to(console)
     if blame:
-        from simharness.causes.blame_file import read_blame
         from simharness.cli.blame import print_blame
+        from simharness.study.causes.blame_file import read_blame
 
         if found := read_blame(folder):
             print_blame(found, console)
@@ -104,8 +104,8 @@ def render(
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)
-        from simharness.export.render import RenderPlan
-        from simharness.export.render import render as render_scenario
+        from simharness.outputs.benchmark.render import RenderPlan
+        from simharness.outputs.benchmark.render import render as render_scenario
 
         layers, channels = (frozenset(filter(None, map(str.strip, given.split(",")))) for given in (overlay, also))
         plan = RenderPlan(video=video, overlay=layers, channels=channels, every=every)
@@ -116,8 +116,8 @@ def render(
 
 def _tables(summary: Mapping[str, Any]) -> list[ScoreTable]:
     """Return the headline scores of a run, and those of identities, and of feet and hands, where there are any."""
-    from simharness.report.run.headline import COLUMNS, WHOLE_BODY_COLUMNS, has_whole_body
-    from simharness.report.run.tracked_people import IDENTITY_COLUMNS, has_identities
+    from simharness.outputs.run.headline import COLUMNS, WHOLE_BODY_COLUMNS, has_whole_body
+    from simharness.outputs.run.tracked_people import IDENTITY_COLUMNS, has_identities
 
     variants: Mapping[str, Any] = summary["variants"]
     title = f"{summary['name']}: {summary['frames']} frames, seed {summary['seed']}"

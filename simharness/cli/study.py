@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from simharness.cli.score_tables import ScoreTable
-    from simharness.report.study.losses import Loss
+    from simharness.outputs.study.losses import Loss
     from simharness.study.result_folder import Results
 
 INTERRUPTED = 130
@@ -160,8 +160,8 @@ def _tables(results: Results) -> list[ScoreTable]:
     """
     import polars as pl
 
-    from simharness.report.study.curves import factors_by_case
-    from simharness.report.study.tables import tracks_people
+    from simharness.outputs.study.curves import factors_by_case
+    from simharness.outputs.study.tables import tracks_people
     from simharness.scoring.catalogue import HEADLINE
 
     tracked = results.trials.filter(pl.col("hota").is_not_null().any().over("variant"))
@@ -179,9 +179,9 @@ def _tables(results: Results) -> list[ScoreTable]:
 def _losses(results: Results, score: str) -> ScoreTable:
     """Return what every factor costs: the score at its best and worst value, and where five points are lost."""
     from simharness.cli.score_tables import ScoreTable
-    from simharness.report.study.curves import factors_by_case
-    from simharness.report.study.losses import LOST, losses
-    from simharness.report.study.plots import short
+    from simharness.outputs.study.curves import factors_by_case
+    from simharness.outputs.study.losses import LOST, losses
+    from simharness.outputs.study.plots import short
     from simharness.runtime.number_text import fixed
     from simharness.scoring.catalogue import SCORES
 
@@ -206,7 +206,7 @@ def _losses(results: Results, score: str) -> ScoreTable:
 
 def _lost_at(loss: Loss, values: Sequence[Any]) -> str:
     """Return where points are lost, with its interval."""
-    from simharness.report.study.losses import short
+    from simharness.outputs.study.losses import short
 
     point = loss.point
     if point is None:
@@ -235,7 +235,7 @@ def _table(results: Results, title: str, trials: pl.DataFrame, scores: Sequence[
     import polars as pl
 
     from simharness.cli.score_tables import ScoreTable
-    from simharness.report.study.tables import by_seed
+    from simharness.outputs.study.tables import by_seed
     from simharness.scoring.catalogue import SCORES
     from simharness.statistics.intervals import mean_interval
 
@@ -284,8 +284,8 @@ def _report(results: Results, *, blame: int, workers: int) -> None:
         return
     if blame:
         blame_results(results, seeds=blame, workers=workers)
-    from simharness.report.study.page import write_report
-    from simharness.report.study.worst_frames import SHOWN
+    from simharness.outputs.study.page import write_report
+    from simharness.outputs.study.worst_frames import SHOWN
     from simharness.runtime.progress import reporter
 
     with run_errors_only(), reporter() as bars, bars.stage("report", SHOWN) as advance:
@@ -295,10 +295,10 @@ def _report(results: Results, *, blame: int, workers: int) -> None:
 
 def blame_results(results: Results, *, seeds: int, workers: int = 1) -> None:
     """Find what cost a study its score, write it into its folder, and print it."""
-    from simharness.causes.blame_file import write_blame
     from simharness.cli.blame import print_blame
-    from simharness.report.study.blame_study import blame_study
+    from simharness.outputs.study.blame_study import blame_study
     from simharness.runtime.progress import reporter
+    from simharness.study.causes.blame_file import write_blame
 
     with reporter() as bars:
         found = blame_study(results, seeds=seeds, workers=workers, reporter=bars)

@@ -74,11 +74,11 @@ def validate(
         other = None if fit_on is None else read_recording(fit_on)
         place = out or Path("results/validation") / recorded.name
         make_folder(place)
+        from simharness.outputs.validation.page import render_validation
         from simharness.reality.validation.prediction import predict_halves, simulate_predictions
         from simharness.reality.validation.summary import summarize_halves, summarize_validation
         from simharness.reality.validation.validation import QUICK, Plan
         from simharness.reality.validation.validation import validate as compare
-        from simharness.report.validation.page import render_validation
         from simharness.trial.provenance import provenance
 
         plan = replace(QUICK if quick else Plan(), workers=workers or os.cpu_count() or 1)
@@ -117,7 +117,7 @@ def _print_verdicts(verdicts: Sequence[Verdict], name: str, console: Console) ->
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    from simharness.report.validation.tables import group_rows
+    from simharness.outputs.validation.tables import group_rows
 
     heading = f"{name}: simulated against measured; the worst figure of each group"
     table = Table(

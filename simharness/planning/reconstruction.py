@@ -13,9 +13,9 @@ from mvpose.arrays import Floats
 from mvpose.rays import Rays
 from mvpose.reconstruction import Triangulation
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.pairing.pairing import LIMIT, pair
 from simharness.planning.camera_terms import CameraTerms
 from simharness.planning.standing_people import StandingScenes
+from simharness.scoring.pairing import LIMIT, pair
 from simharness.scoring.pcp import nearest
 
 _SCENES_AT_ONCE = 64  # whose people are triangulated in one call, which searches its detections for each of them

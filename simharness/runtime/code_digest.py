@@ -28,7 +28,7 @@ def digest_of_folders(root: Path, folders: Iterable[str], *, without: Iterable[s
 
     Args:
         root: folder of the package.
-        folders: folders relative to it; "" for all of it.
+        folders: folders and modules relative to it; "" for all of it.
         without: folders and modules in them, relative to ``root``, that do not count.
     """
     digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
@@ -48,7 +48,12 @@ def digest_of_folders(root: Path, folders: Iterable[str], *, without: Iterable[s
 
 
 def files_of(folder: Path) -> Iterator[Path]:
-    """Yield the modules and data files of a folder of code, not what Python, numba and build tools put there."""
+    """Yield the modules and data files of a folder of code, not what Python, numba and build tools put there.
+
+    Of a module, yield the module.
+    """
+    if folder.is_file():
+        yield folder
     for file in folder.rglob("*"):
         inside = file.relative_to(folder).parts
         generated = any(part in _GENERATED or part.endswith(".egg-info") for part in inside)

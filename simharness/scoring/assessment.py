@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from mvpose import COCO17, Estimate
 from mvpose.arrays import Floats
-from simharness.pairing.pairing import Pairing
 from simharness.scoring.average_precision import average_precision, nearest_people
 from simharness.scoring.catalogue import AP_MM, PCK_MM
 from simharness.scoring.frame import score_frame
 from simharness.scoring.joint_errors import joint_errors
 from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, count_pairs, count_violations
+from simharness.scoring.pairing import Pairing
 from simharness.scoring.pck import pck, pck_area
 from simharness.scoring.pcp import Part
 from simharness.scoring.registry import ScoreInput, compute_scores

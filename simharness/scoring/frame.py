@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose import COCO17, SHELF14
 from mvpose.checks import as_array
 from mvpose.skeleton import HeadMapping, coco17_to_shelf14
-from simharness.pairing.pairing import Pairing, pair
 from simharness.scoring.matching import PairCounts
+from simharness.scoring.pairing import Pairing, pair
 from simharness.scoring.pcp import percent, score_parts
 
 

@@ -3,7 +3,7 @@
 SHELF14 has ten parts. A part is correct if the mean of the errors of its two ends is at most half its true length
 (Belagiannis et al., CVPR 2014; as used by Dong et al., CVPR 2019). Every true person is compared with the nearest
 estimate; one estimate may be used for two people, and an unused estimate costs nothing. So PCP ignores ghosts: read it
-together with the scores of :mod:`simharness.pairing.pairing`.
+together with the scores of :mod:`simharness.scoring.pairing`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from mvpose.checks import as_array
-from simharness.pairing.pairing import mean_distances
+from simharness.scoring.pairing import mean_distances
 
 ALPHA = 0.5
 """Largest mean error of the two ends of a correct part, as a share of the part's true length."""

@@ -54,11 +54,14 @@ BESIDE_THE_METHOD = (
 """Folders and modules of ``mvpose`` that make no estimates of bodies in trials: readers, writers, detection in videos,
 hands and faces, the command line, pages."""
 
-SCORES = ("types", "pairing", "scoring")
-"""Folders of ``simharness`` that score estimates."""
+SCORES = ("types", "scoring")
+"""Folders of ``simharness`` that score estimates, without :data:`FAILURES_ALONE`."""
 
-FAILURES = ("types", "pairing", "failures")
-"""Folders of ``simharness`` that find failures and the stage of the method to blame."""
+FAILURES = ("types", "scoring/failures", "scoring/pairing.py")
+"""Folders and modules of ``simharness`` that find failures and the stage of the method to blame."""
+
+FAILURES_ALONE = ("scoring/failures",)
+"""What of :data:`SCORES` only failures depend on."""
 
 _SIZE = 16  # bytes of a digest, so that no two trials share one by chance
 
@@ -87,7 +90,7 @@ def code() -> Code:
     return Code(
         simulation=_digest([digest_of_folders(ours, SIMULATION), digest_of_folders(its, BORROWED)]),
         method=digest_of_folders(its, ("",), without=BESIDE_THE_METHOD),
-        scores=digest_of_folders(ours, SCORES),
+        scores=digest_of_folders(ours, SCORES, without=FAILURES_ALONE),
         failures=digest_of_folders(ours, FAILURES),
     )
 

@@ -20,13 +20,13 @@ from mvpose import Estimate
 from mvpose.pipeline import Estimator, SequenceEstimator
 from mvpose.presets import PRESETS
 from mvpose.wholebody import complete
-from simharness.failures.blame import blame_frames, failure_scores, failure_table
-from simharness.failures.classification import find_failures
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import Assessment, assess
 from simharness.scoring.catalogue import SCORES
+from simharness.scoring.failures.failure_classes import find_failures
+from simharness.scoring.failures.stage_blame import blame_frames, failure_scores, failure_table
 from simharness.scoring.whole_body import WholeBodyInput
 from simharness.trial.audit import audit
 from simharness.trial.kernel_compilation import Compilation

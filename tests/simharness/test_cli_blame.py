@@ -5,8 +5,8 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from simharness.causes.blame import Blame
 from simharness.cli import app
+from simharness.study.causes.cause_shares import Blame
 
 SMALL = ["people.count=2", "duration=0.2", "cameras.count=3", "cameras.size=[160,120]", 'rendering.renderer="rays"']
 

@@ -72,7 +72,7 @@ def test_an_internal_error_shows_its_traceback(call, tmp_path, monkeypatch):
     def broken(*_args, **_options):
         raise ValueError("wrong turn")
 
-    monkeypatch.setattr("simharness.export.panoptic_sequence.body_scene", broken)
+    monkeypatch.setattr("simharness.outputs.benchmark.panoptic_sequence.body_scene", broken)
     result = call(QUICKSTART, "bench", *TINY)
     assert result.exit_code == 3
     assert "Traceback" in result.stderr

@@ -36,7 +36,7 @@ def reports(monkeypatch):
         requested.append(results)
         return results.folder / "report.html"
 
-    monkeypatch.setattr("simharness.report.study.page.write_report", write_report)
+    monkeypatch.setattr("simharness.outputs.study.page.write_report", write_report)
     return requested
 
 

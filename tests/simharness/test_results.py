@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from simharness.report.study.digest import SCORED, markdown
+from simharness.outputs.study.digest import SCORED, markdown
 from simharness.runtime.version import code_version
 from simharness.scenario.load import load
 from simharness.scenario.study_definition import load_study

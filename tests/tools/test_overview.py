@@ -12,9 +12,9 @@ import pytest
 
 from mvpose import Detections
 from mvpose.report.palette import css, person_color
-from simharness.report.run.result_folder import run
-from simharness.report.study.replay import Replay
-from simharness.report.study.room_view import RoomView
+from simharness.outputs.run.result_folder import run
+from simharness.outputs.study.replay import Replay
+from simharness.outputs.study.room_view import RoomView
 from simharness.scenario.load import load
 from simharness.scenario.shipped import shipped_folder
 from simharness.trial.run_folder import read_run

@@ -20,7 +20,7 @@ _FINER = 2  # samples per pixel along each axis
 
 def one_picture(scenario: Path, camera: int, frame: int, layers: tuple[str, ...]) -> NDArray[np.uint8]:
     """Return a picture of a scenario with layers drawn in, (h, w, 3)."""
-    from simharness.report.run.pictures import annotate
+    from simharness.outputs.run.pictures import annotate
     from simharness.scenario.load import load
     from simharness.trial.run_trial import run_trial
     from simharness.trial.stages.build_trial import build_trial

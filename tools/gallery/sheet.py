@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from simharness.report.figures.mosaic import mosaic
+from simharness.outputs.figures.mosaic import mosaic
 
 Rgb = NDArray[np.uint8]
 

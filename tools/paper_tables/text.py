@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from simharness.report.documents import markdown_table, provenance_sentence
+from simharness.outputs.documents import markdown_table, provenance_sentence
 from simharness.runtime.number_text import fixed, signed
 from simharness.runtime.progress import duration
 

@@ -23,10 +23,10 @@ from mvpose.arrays import Floats
 from mvpose.files.atomic_files import write_atomic
 from mvpose.report.limbs import COCO17_BODY
 from mvpose.report.palette import TRUTH, css, person_color
-from simharness.report.documents import fill_template
-from simharness.report.run.pictures import Picture
-from simharness.report.study.replay import Replay
-from simharness.report.study.room_view import RoomView
+from simharness.outputs.documents import fill_template
+from simharness.outputs.run.pictures import Picture
+from simharness.outputs.study.replay import Replay
+from simharness.outputs.study.room_view import RoomView
 from simharness.trial.run_folder import Record, read_run
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import picture_source_of

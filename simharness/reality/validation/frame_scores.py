@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Bools, Floats
 from mvpose.skeleton import COCO17, HeadMapping, coco17_to_shelf14
-from simharness.pairing.pairing import assign, mean_where_shared
 from simharness.reality.validation.head_joints import fill_face
+from simharness.scoring.pairing import assign, mean_where_shared
 from simharness.scoring.pcp import part_states
 
 

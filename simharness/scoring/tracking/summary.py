@@ -10,7 +10,7 @@ import numpy as np
 from mvpose import COCO17, SHELF14, Estimate
 from mvpose.arrays import Floats
 from mvpose.skeleton import HeadMapping, coco17_to_shelf14
-from simharness.pairing.pairing import pair
+from simharness.scoring.pairing import pair
 from simharness.scoring.tracking.columns import DISTANCE
 from simharness.scoring.tracking.figures import OF_SOME_PEOPLE, identity_figures
 from simharness.scoring.tracking.motion_scores import rms_jerk, velocity_error

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose import Estimate, Skeleton
 from mvpose.arrays import Floats
 from mvpose.checks import as_array
-from simharness.pairing.pairing import mean_distances
+from simharness.scoring.pairing import mean_distances
 
 Labels = NDArray[np.int64]
 

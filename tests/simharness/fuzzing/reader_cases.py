@@ -25,13 +25,13 @@ from mvpose.formats.detection_files import DetectionFiles
 from mvpose.formats.detection_formats import FORMATS as DETECTIONS
 from mvpose.networks import Session
 from simharness.detector.descriptor_model import DescriptorModel
-from simharness.export.layout import check_place
 from simharness.formats.joint_tracks import TrackFiles
 from simharness.formats.npz_joints import write_tracks
 from simharness.formats.panoptic_poses import body_scene
 from simharness.formats.track_formats import FORMATS as TRACKS
 from simharness.gate.baseline import KEPT, Measurement, read_baseline, write_baseline
 from simharness.gate.trial_command import TrialKey
+from simharness.outputs.benchmark.layout import check_place
 from simharness.reality.recording_file import read_keys
 from simharness.scenario.load import load
 from simharness.scenario.presets import read_profile

@@ -13,13 +13,13 @@ from typer.testing import CliRunner
 
 import simharness.planning.rehearse
 from simharness.cli import app
+from simharness.outputs.planning.floor_maps import outline_of
+from simharness.outputs.planning.rehearsal_page import render_rehearsal
 from simharness.planning.rehearsal import HEIGHTS
 from simharness.planning.rehearse import Effort, rehearse
 from simharness.planning.rig_file import read_rig
 from simharness.planning.sentences import good_rectangle, sentences
 from simharness.planning.volume import Volume
-from simharness.report.planning.floor_maps import outline_of
-from simharness.report.planning.rehearsal_page import render_rehearsal
 from simharness.scenario.presets import read_profile
 from simharness.trial.provenance import provenance
 

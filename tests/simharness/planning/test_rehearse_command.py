@@ -10,11 +10,11 @@ from mvpose import Rig
 from mvpose.formats.calibration.voxelpose import write_calibration
 from simharness.cli import app
 from simharness.cli.rehearse_values import clutter_of, obstacle_of, room_of, surroundings_of, target_of, volume_of
+from simharness.outputs.planning.floor_maps import corners_of
 from simharness.planning.rehearse import rehearse
 from simharness.planning.room_file import read_room
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
-from simharness.report.planning.floor_maps import corners_of
 from simharness.scenario.presets import read_profile
 from simharness.scenario.shipped import shipped_folder
 from simharness.world.rigs.layouts import look_at

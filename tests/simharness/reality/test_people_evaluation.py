@@ -14,7 +14,7 @@ from mvpose.formats.people_table import read_people
 from mvpose.formats.writers import write_people
 from mvpose.recording import People
 from simharness.cli import app
-from simharness.export.panoptic_sequence import ExportPlan, export_sequence
+from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
 from simharness.reality.people_evaluation import evaluate_people
 from simharness.scenario.load import load
 

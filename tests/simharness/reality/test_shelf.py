@@ -5,10 +5,10 @@ import pytest
 from scipy.optimize import linear_sum_assignment
 
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.pairing.pairing import pair
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.recording_file import read_recording
 from simharness.scenario.shipped import shipped_folder
+from simharness.scoring.pairing import pair
 from simharness.scoring.pcp import percent, score_parts
 
 

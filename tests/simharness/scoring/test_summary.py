@@ -3,9 +3,9 @@ import json
 import numpy as np
 import pytest
 
-from simharness.pairing.pairing import Pairing
 from simharness.scoring.frame import FrameScore
 from simharness.scoring.matching import PairCounts
+from simharness.scoring.pairing import Pairing
 from simharness.scoring.pcp import GROUPS
 from simharness.scoring.summary import STAGES, VariantScores, summarize
 

@@ -16,11 +16,11 @@ from trials import simulated
 
 from mvpose import Pipeline
 from mvpose.presets import PRESETS
-from simharness.report.run.result_folder import run
-from simharness.report.study.digest import write_digest
-from simharness.report.study.page import write_report
-from simharness.report.study.replay import replay
-from simharness.report.study.worst_frames import _command
+from simharness.outputs.run.result_folder import run
+from simharness.outputs.study.digest import write_digest
+from simharness.outputs.study.page import write_report
+from simharness.outputs.study.replay import replay
+from simharness.outputs.study.worst_frames import _command
 from simharness.runtime.errors import RunError
 from simharness.runtime.frame_pool import map_frames
 from simharness.scenario.load import load

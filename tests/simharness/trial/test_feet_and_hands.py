@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mvpose.wholebody import skeleton_by_name
-from simharness.report.run.result_folder import _record
+from simharness.outputs.run.result_folder import _record
 from simharness.scenario.load import load
 from simharness.scoring.whole_body import WHOLE_BODY_SCORES, WholeBodyInput, whole_body_scores
 from simharness.trial.archive import pack_detected, unpack_detected

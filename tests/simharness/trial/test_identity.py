@@ -197,8 +197,8 @@ class TestCode:
             ("simharness/trial/stages/estimation.py", {"simulation"}),
             ("simharness/types/truth.py", {"simulation", "scores", "failures"}),
             ("simharness/scoring/pcp.py", {"scores"}),
-            ("simharness/pairing/pairing.py", {"scores", "failures"}),
-            ("simharness/failures/blame.py", {"failures"}),
+            ("simharness/scoring/pairing.py", {"scores", "failures"}),
+            ("simharness/scoring/failures/stage_blame.py", {"failures"}),
             ("mvpose/matching/admm.py", {"method"}),
             ("mvpose/networks/data/reid.onnx", {"method"}),
             ("mvpose/formats/calibration/opencv.py", {"simulation"}),
@@ -206,7 +206,7 @@ class TestCode:
             ("mvpose/files/input_files.py", set()),
             ("mvpose/pyproject.toml", set()),
             ("simharness/cli/run.py", set()),
-            ("simharness/report/run/page.py", set()),
+            ("simharness/outputs/run/page.py", set()),
             ("simharness/study/trial_store.py", set()),
             ("simharness/trial/run_trial.py", set()),
             ("simharness/statistics/intervals.py", set()),
@@ -229,7 +229,7 @@ class TestCode:
         for file in (
             "simharness/world/scene/build.py",
             "simharness/scoring/pcp.py",
-            "simharness/failures/blame.py",
+            "simharness/scoring/failures/stage_blame.py",
             "mvpose/matching/admm.py",
         ):
             path = folder / file

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.report.run.result_folder import run
+from simharness.outputs.run.result_folder import run
 from simharness.runtime.machine import memory
 from simharness.scenario.load import load
 from simharness.trial import needs

@@ -5,7 +5,7 @@ import pytest
 from onnx_graphs import dots, mean_color
 from trials import simulated as detected_frames
 
-from simharness.report.run.result_folder import run
+from simharness.outputs.run.result_folder import run
 from simharness.scenario.load import ScenarioError, load
 from simharness.trial.run_folder import read_run
 from simharness.trial.stages.build_trial import build_trial

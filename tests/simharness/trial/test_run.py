@@ -8,9 +8,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from simharness.report.run import result_folder as running
-from simharness.report.run.pictures import frame_costs
-from simharness.report.run.result_folder import run
+from simharness.outputs.run import result_folder as running
+from simharness.outputs.run.pictures import frame_costs
+from simharness.outputs.run.result_folder import run
 from simharness.runtime.errors import RunError
 from simharness.scenario.load import fingerprint
 from simharness.scenario.presets import read_profile

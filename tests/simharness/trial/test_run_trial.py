@@ -6,11 +6,11 @@ import polars as pl
 import pytest
 from trials import measured as measure
 
-from simharness.failures import blame
 from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
 from simharness.scenario.study_definition import load_study
 from simharness.scoring.catalogue import SCORES
+from simharness.scoring.failures import stage_blame
 from simharness.study.runner import run_study
 from simharness.trial import run_trial as module
 from simharness.trial.variant_result import VariantResult
@@ -87,8 +87,8 @@ def test_blame_uses_the_detections_that_the_variant_was_given(monkeypatch):
         seen.setdefault(id(estimator), detections.likelihoods is not None)
         return find_stages(recording, estimator, estimates, failures)
 
-    find_stages = blame.blame
-    monkeypatch.setattr(blame, "blame", look)
+    find_stages = stage_blame.blame
+    monkeypatch.setattr(stage_blame, "blame", look)
     measure(cheap("detector.heatmaps.size=64x48"), ["full", "fast"])
     assert sorted(seen.values()) == [False, True]
 

@@ -11,6 +11,8 @@ from typer.testing import CliRunner
 from mvpose import COCO17, SHELF14
 from mvpose.formats.calibration.voxelpose import write_calibration
 from simharness.cli import app
+from simharness.outputs.validation.page import render_validation
+from simharness.outputs.validation.tables import group_rows
 from simharness.reality.validation import prediction
 from simharness.reality.validation import validation as validation_module
 from simharness.reality.validation.prediction import halves
@@ -18,8 +20,6 @@ from simharness.reality.validation.summary import summarize_validation
 from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.validation import Plan, validate
 from simharness.reality.validation.verdicts import State
-from simharness.report.validation.page import render_validation
-from simharness.report.validation.tables import group_rows
 from simharness.scenario.toml_files import dumps_keys
 from simharness.trial.provenance import provenance
 

@@ -1,0 +1,215 @@
+"""Rendered pictures or films of all cameras of a scenario, and a mosaic of them, as files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose import Detections, Estimate
+from mvpose.files.atomic_files import atomic_folder
+from mvpose.report.film_file import FilmFile
+from simharness.capture.picture import PictureSource
+from simharness.outputs.figures.mosaic import mosaic
+from simharness.outputs.run.pictures import annotate
+from simharness.runtime.progress import Reporter, Silence
+from simharness.scenario.sections.scenario import Scenario
+from simharness.trial.run_trial import Goal, run_trial
+from simharness.trial.stages.build_trial import Trial, build_trial
+from simharness.trial.stages.capture import picture_source_of
+from simharness.types.truth import Truth
+from simharness.world.scene.playback import Playback
+
+Rgb = NDArray[np.uint8]
+
+LAYERS = ("truth", "detections", "estimates")
+"""Layers that can be drawn into the pictures."""
+
+CHANNELS = ("depth", "ids", "parts")
+"""Images that can be written beside the pictures."""
+
+_FILM_QUALITY = 24  # constant rate factor of VP9: finer than on pages
+_MOSAIC_WIDTH = 1920  # largest width, pixels
+
+
+@dataclass(frozen=True)
+class RenderPlan:
+    """Content and format of rendered files.
+
+    Attributes:
+        video: one MP4 for each camera instead of one PNG for each picture.
+        overlay: layers drawn into the pictures, of ``LAYERS``.
+        channels: images written beside every picture as PNG, of ``CHANNELS``. depth: 16 bits, millimetres, 0 for no
+            surface. ids: 8 bits, person + 1, 255 for objects and the room, 0 for none. parts: 8 bits,
+            :class:`simharness.world.humans.segments.Segment` + 1, 0 where there is no body.
+        every: step between rendered frames.
+        finer: samples per pixel along each axis.
+
+    Raises:
+        ValueError: an unknown layer or channel, channels of a video, or ``every`` below 1.
+    """
+
+    video: bool = False
+    overlay: frozenset[str] = frozenset()
+    channels: frozenset[str] = frozenset()
+    every: int = 1
+    finer: int = 2
+
+    def __post_init__(self) -> None:
+        for option, given, known in (("--overlay", self.overlay, LAYERS), ("--also", self.channels, CHANNELS)):
+            unknown = given - set(known)
+            if unknown:
+                raise ValueError(f"{option}: unknown {', '.join(sorted(unknown))}; expected any of {', '.join(known)}")
+        if self.video and self.channels:
+            raise ValueError(
+                "--also needs pictures, not --video, because video compression changes depth and ids; omit one"
+            )
+        if self.every < 1:
+            raise ValueError(f"--every must be 1 or more, got {self.every}")
+
+
+def render(scenario: Scenario, plan: RenderPlan, *, out: Path, reporter: Reporter | None = None) -> Path:
+    """Render the pictures of all cameras of a scenario to files.
+
+    Args:
+        scenario: scenario to render.
+        plan: content and format of the files.
+        out: parent of the folder ``<name>``, which appears when it is complete and replaces an earlier one.
+        reporter: receiver of progress.
+
+    Returns:
+        The folder: ``<camera>/0000.png`` (and ``0000.depth.png``, ...) or ``<camera>.mp4`` for each camera, and
+        ``mosaic`` like them.
+
+    Raises:
+        ValueError: the scenario cannot be built.
+    """
+    reporter = reporter or Silence()
+    trial, layers = _layers(scenario, plan, reporter)
+    picture_source = picture_source_of(scenario, Playback(trial.scene))
+    frames = range(0, scenario.frames, plan.every)
+    names = [*(camera.name for camera in trial.exposures.believed_rig), "mosaic"]
+    folder = out / scenario.name
+    with reporter.stage("render", len(frames)) as advance, atomic_folder(folder) as partial, ExitStack() as stack:
+        write: Callable[[str, int, Rgb], None] = _PngWriter(partial)
+        if plan.video:
+            write = stack.enter_context(_VideoWriter(partial, rate=scenario.rate / plan.every))
+        for frame, pictures in zip(frames, _pictures(trial, picture_source, plan, layers, frames), strict=True):
+            sheet = mosaic(pictures, names[:-1])
+            shrink = min(1.0, _MOSAIC_WIDTH / sheet.shape[1])
+            small = cv2.resize(sheet, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA).astype(np.uint8)
+            for name, picture in zip(names, [*pictures, small], strict=True):
+                write(name, frame, picture)
+            for view, name in enumerate(names[:-1]):
+                for channel in sorted(plan.channels):
+                    _write(
+                        partial / name / f"{frame:04d}.{channel}.png",
+                        _channel(picture_source, trial, frame, view, channel),
+                    )
+            advance(1)
+    return folder
+
+
+@dataclass(frozen=True)
+class _Layers:
+    """Layers of every frame; estimates only if they are drawn."""
+
+    truth: Sequence[Truth]
+    detections: Sequence[Detections]
+    estimates: Sequence[Estimate] | None
+
+
+def _layers(scenario: Scenario, plan: RenderPlan, reporter: Reporter) -> tuple[Trial, _Layers | None]:
+    """Build the trial, and run it as far as the overlay needs; no layers without an overlay."""
+    if not plan.overlay:
+        with reporter.stage("build", 1):
+            return build_trial(scenario), None
+    first = scenario.method.variants[:1]
+    until: Goal = "estimate" if "estimates" in plan.overlay else "detect"
+    result = run_trial(scenario, variants=first, until=until, reporter=reporter)
+    recording = result.recording
+    return result.trial, _Layers(recording.truth, recording.detections, result.estimates.get(first[0]))
+
+
+def _pictures(
+    trial: Trial, picture_source: PictureSource, plan: RenderPlan, layers: _Layers | None, frames: range
+) -> Iterator[list[Rgb]]:
+    """Yield the pictures of all views, frame by frame."""
+    overlay = plan.overlay
+    for frame in frames:
+        pictures = []
+        for view in range(len(trial.exposures.believed_rig)):
+            rgb = picture_source.picture(trial.exposures, frame, view, finer=plan.finer)
+            if layers is not None:
+                rgb = annotate(
+                    rgb,
+                    trial.exposures.camera(frame, view),
+                    view,
+                    truth=layers.truth[frame],
+                    detections=layers.detections[frame] if "detections" in overlay else None,
+                    estimate=layers.estimates[frame] if layers.estimates is not None else None,
+                    show_truth="truth" in overlay,
+                )
+            pictures.append(rgb)
+        yield pictures
+
+
+def _channel(
+    picture_source: PictureSource, trial: Trial, frame: int, view: int, channel: str
+) -> NDArray[np.unsignedinteger]:
+    """Return a channel of one picture as integers for PNG (see ``RenderPlan``); zeros where no picture is delivered."""
+    if not trial.exposures.delivered[frame, view]:
+        width, height = trial.exposures.believed_rig[view].size
+        return np.zeros((height, width), np.uint16 if channel == "depth" else np.uint8)
+    image = picture_source.image(trial.exposures, frame, view)
+    if channel == "depth":
+        millimetres = np.where(np.isfinite(image.depth), 1000.0 * image.depth, 0.0)
+        return np.clip(np.rint(millimetres), 0, 65535).astype(np.uint16)
+    if channel == "ids":
+        return np.where(image.ids >= len(trial.scene.bodies), 255, image.ids + 1).astype(np.uint8)
+    assert image.parts is not None  # rendered for this channel
+    return (image.parts + 1).astype(np.uint8)
+
+
+def _write(path: Path, picture: NDArray[np.unsignedinteger]) -> None:
+    path.parent.mkdir(exist_ok=True)
+    if not cv2.imwrite(str(path), picture):
+        raise RuntimeError(f"OpenCV cannot write a picture of shape {picture.shape} to {path}")
+
+
+class _PngWriter:
+    """Writer of one PNG for each picture, in a folder for each name."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __call__(self, name: str, frame: int, rgb: Rgb) -> None:
+        _write(self._folder / name / f"{frame:04d}.png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR).astype(np.uint8))
+
+
+class _VideoWriter:
+    """Writer of one MP4 for each name, frame by frame; a context manager that closes the files."""
+
+    def __init__(self, folder: Path, *, rate: float) -> None:
+        self._folder = folder
+        self._rate = rate
+        self._writers: dict[str, FilmFile] = {}
+
+    def __enter__(self) -> _VideoWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for writer in self._writers.values():
+            writer.close()
+
+    def __call__(self, name: str, frame: int, rgb: Rgb) -> None:
+        even = rgb[: rgb.shape[0] // 2 * 2, : rgb.shape[1] // 2 * 2]  # the codec halves the resolution of colour
+        if name not in self._writers:
+            path, size = self._folder / f"{name}.mp4", (even.shape[1], even.shape[0])
+            self._writers[name] = FilmFile(path, size, self._rate, quality=_FILM_QUALITY)
+        self._writers[name].add(even)

@@ -1,0 +1,153 @@
+"""Plots of identities, as SVG: a timeline of each person, and tracks from above."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from mvpose.arrays import Floats
+from mvpose.report.palette import UNMATCHED, css
+from mvpose.report.svg_plots import FAINT, INK, legend_above, svg_plot
+from mvpose.report.track_plots import BAR, draw_bar, half_step, label_ends, runs_of, thinned
+from simharness.outputs.run.identities import Identities
+from simharness.scoring.tracking.clear_mot import ABSENT, MISSED
+
+_ROWS, _ROW = 3.4, (0.25, 0.55)  # height of all rows together, and least and greatest height of one, inches
+_MOST_GHOST_ROWS = 8
+
+
+def timeline(name: str, identities: Identities) -> str:
+    """Plot the identity of each person over time: a row for each person, a bar for each stretch of one identity.
+
+    A thin line is a person without an estimate, ticks one who is absent, a triangle an identity switch. Below are the
+    estimates without a person.
+
+    Args:
+        name: name of the plot, unique on its page.
+        identities: identities of a variant.
+    """
+    time, people = identities.time, identities.frames.people
+    half = half_step(time)
+    span = float(time[-1] - time[0]) + 2 * half
+    rows, left_out = _ghost_rows(identities)
+    below = 0.5 * len(rows) + (0.6 if rows else 0.0)
+    row_height = min(max(_ROW[0], _ROWS / max(1.0, people + below)), _ROW[1])
+    with svg_plot(name, size=(5.2, 0.95 + row_height * (people + below))) as (axes, written):
+        for person in range(people):
+            _row_of_person(axes, identities, person, half, span)
+        for row, tracks in enumerate(rows):
+            for track, frames in tracks:
+                for start, end in _stretches(frames):
+                    width = max(float(time[end] - time[start]) + 2 * half, 0.004 * span)
+                    box = [(float(time[start]) - half, width)]
+                    axes.broken_barh(box, (people + 0.1 + 0.5 * row, 0.28), color=identities.colors[track], lw=0)
+        labels = [f"person {person}" for person in range(people)]
+        ticks = [float(person) for person in range(people)]
+        if rows:
+            labels.append(f"ghosts (+{left_out})" if left_out else "ghosts")
+            ticks.append(people + 0.24)
+        axes.set(xlabel="time, s", yticks=ticks, yticklabels=labels)
+        axes.set_xlim(float(time[0]) - half, float(time[-1]) + half)
+        axes.set_ylim(people - 0.4 + below, -0.75)
+        axes.tick_params(axis="y", length=0, labelcolor=INK)
+        axes.spines["left"].set_visible(False)
+        axes.grid(axis="x")
+        _legend_of_states(axes, identities)
+        legend_above(axes)
+    return written[0]
+
+
+def trajectories(name: str, identities: Identities) -> str:
+    """Plot paths from above: thin lines are the true people, wide ones the estimates in the colour of their identity.
+
+    Args:
+        name: name of the plot, unique on its page.
+        identities: identities of a variant.
+    """
+    with svg_plot(name, size=(5.2, 4.6)) as (axes, written):
+        grey = css(UNMATCHED)
+        ends: dict[int, Floats] = {}
+        for track, places in identities.stretches:
+            color = identities.colors[track]
+            ghost = color == grey
+            if len(places) == 1:
+                axes.plot(*places[0], ".", ms=2.5, mew=0, color=color, alpha=0.6, zorder=2)
+            else:
+                width, order = (1.2, 2) if ghost else (3.0, 3)
+                axes.plot(*thinned(places).T, color=color, lw=width, alpha=0.7, solid_capstyle="round", zorder=order)
+            known = places[np.isfinite(places).all(axis=1)]
+            if len(known) and not ghost:
+                ends[track] = known[-1]
+        for person in range(identities.frames.people):
+            path = identities.paths[:, person]
+            axes.plot(*thinned(path).T, color=INK, lw=0.7, zorder=4, label="true path" if person == 0 else None)
+            there = path[np.isfinite(path).all(axis=1)]
+            if len(there):
+                axes.plot(*there[-1], ".", ms=3.5, mew=0, color=INK, zorder=6)
+        frames, people = np.nonzero(identities.pairs.switched)
+        if len(frames):
+            at = identities.paths[frames, people]
+            axes.plot(*at.T, "v", ms=5, color=INK, mew=0, zorder=6, label="switch")
+        if grey in identities.colors:
+            axes.plot([], [], color=grey, lw=1.2, label="ghost")
+        axes.set(xlabel="x, m", ylabel="y, m")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.margins(0.08)
+        axes.grid()
+        axes.spines[:].set_visible(False)
+        for track, place in ends.items():
+            axes.plot(*place, "o", ms=5, color=identities.colors[track], mew=0, zorder=5)
+        label_ends(axes, {str(identities.frames.ids[track]): place for track, place in ends.items()})
+        legend_above(axes)
+    return written[0]
+
+
+def _row_of_person(axes: Axes, identities: Identities, person: int, half: float, span: float) -> None:
+    time, states = identities.time, identities.pairs.track[:, person]
+    for start, end in runs_of(states):
+        first, last = float(time[start]) - half, float(time[end - 1]) + half
+        state = int(states[start])
+        if state == ABSENT:
+            axes.plot([first, last], [person, person], color=FAINT, lw=5, dashes=(0.12, 1.1), dash_capstyle="butt")
+        elif state == MISSED:
+            axes.plot([first, last], [person, person], color=FAINT, lw=1, solid_capstyle="butt")
+        else:
+            color = identities.colors[state]
+            label = str(identities.frames.ids[state])
+            draw_bar(axes, person, (first, last), color=color, label=label, span=span)
+    switched = time[identities.pairs.switched[:, person]] - half
+    above = np.full(len(switched), person - BAR / 2 - 0.12)
+    axes.plot(switched, above, "v", ms=4.5, color=INK, mew=0, zorder=5, clip_on=False)
+
+
+def _legend_of_states(axes: Axes, identities: Identities) -> None:
+    """Add the entries of the states that occur."""
+    states, pairs = identities.pairs.track, identities.pairs
+    if (states == MISSED).any():
+        axes.plot([], [], color=FAINT, lw=1, label="missed")
+    if (states == ABSENT).any():
+        axes.plot([], [], color=FAINT, lw=5, dashes=(0.12, 1.1), dash_capstyle="butt", label="absent")
+    if pairs.switched.any():
+        axes.plot([], [], "v", ms=4.5, color=INK, mew=0, label="identity switch")
+
+
+def _ghost_rows(identities: Identities) -> tuple[list[list[tuple[int, NDArray[np.int64]]]], int]:
+    """Arrange the tracks of ghosts in rows without overlaps; return the rows, and how many tracks found no place."""
+    rows: list[list[tuple[int, NDArray[np.int64]]]] = []
+    left_out = 0
+    for track, frames in identities.ghosts:
+        free = [row for row in rows if row[-1][1][-1] < frames[0]]
+        if free:
+            free[0].append((track, frames))
+        elif len(rows) < _MOST_GHOST_ROWS:
+            rows.append([(track, frames)])
+        else:
+            left_out += 1
+    return rows, left_out
+
+
+def _stretches(frames: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """Return the first and the last of each stretch of consecutive frames."""
+    found = runs_of(frames - np.arange(len(frames)))
+    return [(int(frames[start]), int(frames[end - 1])) for start, end in found]

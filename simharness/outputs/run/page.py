@@ -1,0 +1,194 @@
+"""Report of a run as one self-contained HTML file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import polars as pl
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from mvpose.arrays import Floats
+from mvpose.report.palette import line_color
+from mvpose.skeleton import COCO17
+from simharness.outputs.documents import fill_template
+from simharness.outputs.figures.blame_section import blame_section
+from simharness.outputs.run import findings, plots
+from simharness.outputs.run.figures import draw_figures
+from simharness.outputs.run.film import Film
+from simharness.outputs.run.headline import COLUMNS, NOTHING, WHOLE_BODY_COLUMNS, has_whole_body
+from simharness.outputs.run.pictures import Picture
+from simharness.outputs.run.standard_figures import person_errors, presence
+from simharness.outputs.run.tracked_people import TRACKING_COLUMNS, tracked_variants
+from simharness.scenario.toml_files import dumps
+from simharness.scoring.pairing import pair
+from simharness.scoring.pcp import GROUPS, Part
+from simharness.study.causes.cause_shares import Blame
+from simharness.trial.run_folder import Record
+from simharness.world.motion.choreography import roles
+
+_HIPS = [COCO17.index("left_hip"), COCO17.index("right_hip")]
+
+
+def render(
+    record: Record,
+    *,
+    pictures: Sequence[Picture] = (),
+    things: Sequence[Floats] = (),
+    film: Film | None = None,
+    found: Blame | None = None,
+) -> str:
+    """Return the page of a run.
+
+    Args:
+        record: the run.
+        pictures: pictures below the headline scores.
+        things: outlines of the clutter from above, each (n, 2) metres.
+        film: film of the run.
+        found: what cost the score; None where it was not examined.
+
+    Returns:
+        A self-contained HTML document.
+    """
+    summary = record.summary
+    main, scores = next(iter(summary["variants"].items()))
+    errors = {variant: joint_errors(record, variant) for variant in record.estimates}
+    return fill_template(
+        "run.html",
+        scenario=record.scenario,
+        summary=summary,
+        main=main,
+        facts=_facts(record),
+        cards=[{"title": column.title, "about": column.about, "text": column.text(scores)} for column in COLUMNS],
+        columns=COLUMNS,
+        whole_body_columns=WHOLE_BODY_COLUMNS if has_whole_body(summary) else (),
+        parts=_parts_table(summary["variants"]),
+        people=_people_table(record, main),
+        pictures=pictures,
+        film=film,
+        poster=film and Picture("", "", film.poster).uri,
+        blame=found and blame_section(found),
+        blame_hint=f"{_command(record)} --blame 10",
+        plots=_plots(record, main, things, errors),
+        findings=_findings(record, main, errors),
+        figures=draw_figures(record, main),
+        tracking_columns=TRACKING_COLUMNS,
+        tracked=tracked_variants(record),
+        stages=summary.get("run", {}).get("stages_s", {}),
+        command=_command(record),
+        resolved=dumps(record.scenario),
+    )
+
+
+def _facts(record: Record) -> list[tuple[str, str]]:
+    scenario = record.scenario
+    things = (*scenario.clutter.model_dump(exclude={"coverage"}).values(), *scenario.decoys.model_dump().values())
+    return [
+        ("people", f"{scenario.people.count}"),
+        ("cameras", f"{len(record.rig)} × {record.rig[0].size[0]}×{record.rig[0].size[1]}"),
+        ("objects", f"{sum(things)}"),
+        ("detector", "a pose head" if scenario.detector.onnx else scenario.detector.name),
+        ("frames", f"{len(record.time)} at {scenario.rate:g} Hz"),
+        ("detections", f"{sum(map(len, record.detections))}"),
+        ("seed", f"{scenario.seed}"),
+        ("version", f"{record.summary['code']}"),
+    ]
+
+
+def _command(record: Record) -> str:
+    return record.summary.get("run", {}).get("command") or "simharness run scenario.toml"
+
+
+def _parts_table(variants: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the table of PCP: a row for each group of parts, a number for each variant."""
+    rows = [
+        {
+            "part": group.replace("_", " "),
+            "values": [scores["pcp_parts"][group] for scores in variants.values()],
+        }
+        for group in GROUPS
+    ]
+    return [*rows, {"part": "all", "values": [scores["pcp"] for scores in variants.values()]}]
+
+
+def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
+    """Return the table of people: a row with the scores of each true person."""
+    errors, parts = person_errors(record.scores, variant), _parts(record.scores, variant)
+    present = presence(record).sum(axis=0)
+    doing = roles(record.scenario)
+    rows = []
+    for person in range(errors.shape[1]):
+        person_error, counted = errors[:, person], parts[:, person] != Part.UNDEFINED
+        found = np.isfinite(person_error)
+        correct = (parts[:, person] == Part.CORRECT).sum()
+        rows.append(
+            {
+                "name": f"person {person}",
+                "color": line_color(person),
+                "activity": doing[person],
+                "found": f"{100 * found.sum() / present[person]:.1f}" if present[person] else NOTHING,
+                "pcp": f"{100 * correct / counted.sum():.1f}" if counted.any() else NOTHING,
+                "mpjpe": f"{person_error[found].mean():.1f}" if found.any() else NOTHING,
+            }
+        )
+    return rows
+
+
+def _parts(scores: pl.DataFrame, variant: str) -> NDArray[np.int8]:
+    """Return the :class:`Part` value of the ten parts of every true person in every frame, (T, P, 10)."""
+    rows = scores.filter(pl.col("variant") == variant).sort("frame")["parts"].to_list()
+    people = len(rows[0]) // 10
+    return np.array(rows, np.int8).reshape(len(rows), people, 10)
+
+
+def joint_errors(record: Record, variant: str) -> Floats:
+    """Return the distance of every joint of those who are there from its estimate, (n,) mm; NaN without an estimate."""
+    joints = np.stack([true.joints for true in record.truth])
+    errors = np.full(joints.shape[:3], np.nan)
+    for frame, (true, estimate) in enumerate(zip(record.truth, record.estimates[variant], strict=True)):
+        partner = pair(true.joints, estimate.joints).estimate
+        found = partner >= 0
+        offset = true.joints[found] - estimate.joints[partner[found]]
+        errors[frame, found] = 1000 * np.linalg.norm(offset, axis=-1)
+    return errors[np.isfinite(joints).all(axis=-1)]
+
+
+def _stage_times(record: Record) -> dict[str, dict[str, float]]:
+    """Return the median time of each stage by variant, milliseconds."""
+    return {
+        variant: {stage: time["median"] for stage, time in scores["timings_ms"].items() if time["median"] is not None}
+        for variant, scores in record.summary["variants"].items()
+    }
+
+
+def _findings(record: Record, main: str, errors: Mapping[str, Floats]) -> dict[str, str]:
+    """Return what each figure shows, a sentence, by name; empty where there is nothing to tell."""
+    return {
+        "parts": findings.of_parts(record.summary["variants"][main], GROUPS),
+        "times": findings.of_times(_stage_times(record)),
+        "distribution": findings.of_joint_errors(errors),
+    }
+
+
+def _plots(record: Record, main: str, things: Sequence[Floats], errors: Mapping[str, Floats]) -> dict[str, Markup]:
+    """Return the SVG of each plot by name; plots without data are left out."""
+    joints = np.stack([true.joints for true in record.truth])
+    people = joints.shape[1]
+    colors = [line_color(person) for person in range(people)]
+    found = np.concatenate([estimate.joints[:, _HIPS, :2].mean(axis=1) for estimate in record.estimates[main]])
+    drawn = {
+        "plan": plots.floor_plan(
+            record.rig,
+            record.scenario.room.size[:2],
+            things=things,
+            paths=joints[:, :, _HIPS, :2].mean(axis=2),
+            estimates=found,
+            colors=colors,
+        ),
+        "times": plots.stage_times(_stage_times(record)),
+    }
+    if people:
+        drawn["distribution"] = plots.error_distribution(errors)
+    return {name: Markup(svg) for name, svg in drawn.items()}

@@ -1,0 +1,234 @@
+"""Pictures of a frame: the view of every camera with truth, detections and estimates drawn in."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from mvpose import Camera, Detections, Estimate
+from mvpose.report.limbs import COCO17_BODY, SMALL_FACE, plain_face
+from mvpose.report.palette import TRUTH, UNMATCHED, Color, person_color
+from simharness.capture.picture import PictureSource
+from simharness.outputs.figures.mosaic import Mark, legend, mosaic, rooms_in_grid
+from simharness.outputs.figures.overlay import BoxTag, Overlay
+from simharness.scenario.sections.scenario import Scenario
+from simharness.scoring.pairing import LIMIT, pair
+from simharness.trial.run_folder import Record
+from simharness.trial.stages.build_trial import Trial
+from simharness.trial.stages.capture import picture_source_of
+from simharness.types.truth import Truth
+from simharness.world.motion.choreography import roles
+from simharness.world.rigs.projection import project_to_image
+from simharness.world.scene.build import Scene
+from simharness.world.scene.playback import Playback
+
+Rgb = NDArray[np.uint8]
+
+MAX_VIEWS = 8  # with the legend, three rows of three tiles
+MAX_NAMED = 6  # people in the legend
+_MAX_WIDTH = 2400  # pixels of a picture on the page
+_JPEG_QUALITY = 88
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Picture on a page.
+
+    Attributes:
+        title: heading.
+        caption: description.
+        rgb: pixels, (h, w, 3) uint8.
+    """
+
+    title: str
+    caption: str
+    rgb: Rgb = field(repr=False)
+
+    def png(self) -> bytes:
+        """Return the picture as a PNG file, without loss."""
+        return _encoded(self.rgb, ".png", [])
+
+    @property
+    def uri(self) -> str:
+        """Picture as a data URI for a page: JPEG, at most 2400 pixels wide."""
+        shrink = min(1.0, _MAX_WIDTH / self.rgb.shape[1])
+        small = cv2.resize(self.rgb, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
+        jpeg = _encoded(small.astype(np.uint8, copy=False), ".jpg", [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+        return "data:image/jpeg;base64," + base64.b64encode(jpeg).decode()
+
+
+def _encoded(rgb: Rgb, suffix: str, options: list[int]) -> bytes:
+    done, encoded = cv2.imencode(suffix, cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), options)
+    if not done:
+        raise RuntimeError(f"OpenCV cannot encode a picture of shape {rgb.shape} as {suffix}")
+    return encoded.tobytes()
+
+
+def draw_pictures(
+    trial: Trial, record: Record, *, progress: Callable[[int], None] = lambda pictures: None
+) -> list[Picture]:
+    """Draw the typical frame of a run, and its worst frame if that is worse, by the scores of the first variant."""
+    variant = next(iter(record.estimates))
+    costs = frame_costs(record.scores, variant)
+    typical = int(np.argsort(costs, kind="stable")[(len(costs) - 1) // 2])
+    worst = int(costs.argmax())
+    frames = {"A typical frame": typical}
+    if costs[worst] > costs[typical]:
+        frames["The worst frame"] = worst
+    picture_source = picture_source_of(trial.scenario, Playback(trial.scene))
+    pictures = []
+    for title, frame in frames.items():
+        rgb = draw_frame(
+            trial,
+            picture_source,
+            frame,
+            truth=record.truth[frame],
+            detections=record.detections[frame],
+            estimate=record.estimates[variant][frame],
+        )
+        pictures.append(Picture(title, _caption(record, variant, frame), rgb))
+        progress(1)
+    return pictures
+
+
+def frame_costs(scores: pl.DataFrame, variant: str) -> NDArray[np.float64]:
+    """Return the cost of each frame, (T,) millimetres: sum of the errors of people, 500 per missed person or ghost."""
+    rows = scores.filter(pl.col("variant") == variant).sort("frame")
+    wrong = (rows["missed"] + rows["ghosts"]).to_numpy()
+    return rows["errors_mm"].list.sum().to_numpy() + 1000 * LIMIT * wrong
+
+
+def _caption(record: Record, variant: str, frame: int) -> str:
+    row = record.scores.filter((pl.col("variant") == variant) & (pl.col("frame") == frame)).row(0, named=True)
+    found = f"{row['found']} of {row['people']} people found"
+    ghosts = f"{row['ghosts']} ghost{'' if row['ghosts'] == 1 else 's'}"
+    error = "" if row["mpjpe_mm"] is None else f", mean joint error {row['mpjpe_mm']:.1f} mm"
+    where = f"Frame {frame} of {len(record.time)}, at {record.time[frame]:.1f} s, variant {variant}"
+    views = f"; {MAX_VIEWS} of {len(record.rig)} cameras" if len(record.rig) > MAX_VIEWS else ""
+    return f"{where}: {found}, {ghosts}{error}{views}."
+
+
+def draw_frame(
+    trial: Trial,
+    picture_source: PictureSource,
+    frame: int,
+    *,
+    truth: Truth,
+    detections: Detections,
+    estimate: Estimate,
+    explained: bool | None = True,
+) -> Rgb:
+    """Draw up to ``MAX_VIEWS`` views of a frame as a mosaic, with :func:`annotate`.
+
+    Args:
+        trial: the trial.
+        picture_source: renderer of the views.
+        frame: frame index.
+        truth: truth of the frame.
+        detections: detections of the frame.
+        estimate: estimate of the frame.
+        explained: whether a legend is the last tile; None: where the last row of tiles has room for it.
+    """
+    rig = trial.exposures.believed_rig
+    views = np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MAX_VIEWS)).astype(int))
+    tiles = []
+    for view in map(int, views):
+        rgb = picture_source.picture(trial.exposures, frame, view, finer=2)
+        camera = trial.exposures.camera(frame, view)
+        tiles.append(annotate(rgb, camera, view, truth=truth, detections=detections, estimate=estimate))
+    titles = [rig[view].name for view in views]
+    if explained or (explained is None and rooms_in_grid(len(tiles)) > len(tiles)):
+        tiles.append(legend(legend_entries(trial.scenario), size=rig[0].size, title="Legend"))
+        titles.append("")
+    return mosaic(tiles, titles)
+
+
+def annotate(
+    rgb: Rgb,
+    camera: Camera,
+    view: int,
+    *,
+    truth: Truth,
+    detections: Detections | None = None,
+    estimate: Estimate | None = None,
+    show_truth: bool = True,
+) -> Rgb:
+    """Draw truth, detections and estimates of one view into its picture.
+
+    True skeletons are thin and white. Detections are boxes and dots, estimates are broad limbs; both have the colour of
+    the true person that the estimate is paired with, and are grey without one. Without an estimate, detections have
+    the colour of the person that they show.
+
+    Args:
+        rgb: picture, (h, w, 3).
+        camera: camera that took the picture.
+        view: index of the camera in the rig.
+        truth: truth of the frame.
+        detections: detections of the frame; None draws none.
+        estimate: estimate of the frame; None draws none.
+        show_truth: draw the true skeletons.
+    """
+    overlay = Overlay(rgb)
+    assigned = truth.person
+    if estimate is not None:
+        owner = np.full(len(estimate), -1)  # true person of each estimate
+        partner = pair(truth.joints, estimate.joints).estimate
+        owner[partner[partner >= 0]] = np.flatnonzero(partner >= 0)
+        # True person of each detection by the matching of the method; label -1 has none.
+        assigned = np.append(owner, -1)[estimate.matching.labels_of(len(truth.person))]
+        for joints, person in zip(estimate.joints, owner, strict=True):
+            _draw_estimate(overlay, camera, joints, person_color(int(person)))
+    if show_truth:
+        for pixels in truth.pixels[view]:
+            overlay.skeleton(
+                plain_face(pixels, least=SMALL_FACE * overlay.scale), color=TRUTH, width=1.3, dots=1.8, outline=0.9
+            )
+    if detections is not None:
+        tags = [
+            _draw_detection(overlay, detections, index, assigned=int(assigned[index]), true=int(truth.person[index]))
+            for index in np.flatnonzero(detections.view == view).tolist()
+        ]
+        overlay.tags([tag for tag in tags if tag.text])
+    return overlay.rgb
+
+
+def _draw_estimate(overlay: Overlay, camera: Camera, joints: NDArray[np.float64], color: Color) -> None:
+    overlay.skeleton(project_to_image(camera, joints), color=color, edges=COCO17_BODY, width=7, dots=0, opacity=0.55)
+
+
+def _draw_detection(overlay: Overlay, detections: Detections, index: int, *, assigned: int, true: int) -> BoxTag:
+    """Draw box and joints; return the tag with the assigned person, and with the true one where they differ."""
+    color = person_color(assigned)
+    label = "" if assigned < 0 else f"{assigned}"
+    if assigned not in (-1, true):
+        label += " (no person)" if true < 0 else f" (is {true})"
+    overlay.box(detections.boxes[index], color=color)
+    keypoints = plain_face(detections.keypoints[index], least=SMALL_FACE * overlay.scale)
+    overlay.skeleton(keypoints, color=color, edges=(), dots=2.6, outline=0.9)
+    return BoxTag(label, tuple(detections.boxes[index].tolist()), color)
+
+
+def legend_entries(scenario: Scenario) -> list[tuple[Mark, Color, str]]:
+    """Return mark, colour and meaning of everything that is drawn into pictures."""
+    named: Sequence[tuple[Mark, Color, str]] = [
+        ("limbs", person_color(person), f"estimate of person {person} ({role})")
+        for person, role in enumerate(roles(scenario)[:MAX_NAMED])
+    ]
+    return [
+        ("skeleton", TRUTH, "true skeleton"),
+        *named,
+        ("box", person_color(0), "detection assigned to a person"),
+        ("box", UNMATCHED, "detection assigned to no person"),
+        ("limbs", UNMATCHED, "ghost: estimate that matches no person"),
+    ]
+
+
+def outlines(scene: Scene) -> list[NDArray[np.float64]]:
+    """Return the ground plan of each object in the room, (4, 2) metres."""
+    return [solid.hull.corners[[0, 2, 6, 4], :2] for solid in scene.solids if solid.kind != "room"]

@@ -1,0 +1,115 @@
+"""Where a score is lost along a factor: the question of a study, as numbers and as a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from simharness.outputs.study.curves import Factor, breaking_along
+from simharness.runtime.number_text import fixed
+from simharness.scoring.catalogue import SCORES, ScoreInfo
+from simharness.statistics.breaking_points import BreakingPoint
+from simharness.statistics.intervals import Interval, mean_interval
+
+LOST = 5.0
+"""Points of a percentage whose loss is reported."""
+
+_ALIKE = 0.02  # relative difference of breaking points that one number describes
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What a factor costs one variant.
+
+    Attributes:
+        variant: name of the variant.
+        best, worst: values of the factor with the best and the worst mean score; of a numeric factor its two ends.
+        at_best, at_worst: the scores there.
+        point: value of a numeric factor at which :data:`LOST` points are lost against the best end, seed by seed; None
+            for other factors, and for scores that are no percentages.
+        rising: whether the score gets worse as the factor grows.
+    """
+
+    variant: str
+    best: Any
+    worst: Any
+    at_best: Interval
+    at_worst: Interval
+    point: BreakingPoint | None
+    rising: bool
+
+
+def losses(factor: Factor, variants: Sequence[str], score: str) -> list[Loss]:
+    """Return what a factor costs each variant; variants without the score at two values are left out."""
+    info = SCORES[score]
+    sign = 1.0 if info.better == "higher" else -1.0
+    found = []
+    for variant in variants:
+        table = factor.table(variant, score)
+        known = np.flatnonzero(np.isfinite(table).any(axis=0))
+        if len(known) < 2:
+            continue
+        means = sign * np.array([table[np.isfinite(table[:, k]), k].mean() for k in known])
+        if factor.numeric:
+            rising = bool(means[-1] <= means[0])
+            best, worst = (known[0], known[-1]) if rising else (known[-1], known[0])
+        else:
+            rising, best, worst = False, known[means.argmax()], known[means.argmin()]
+        point = None
+        if factor.numeric and info.unit == "%":
+            change = sign * (table - table[:, [best]])
+            _, point = breaking_along(np.array(factor.values, float), change, -LOST, better="higher", rising=rising)
+        at_best, at_worst = (mean_interval(table[:, k], unit=info.unit) for k in (best, worst))
+        found.append(Loss(variant, factor.values[best], factor.values[worst], at_best, at_worst, point, rising))
+    return found
+
+
+def finding(factor: Factor, variants: Sequence[str], score: str) -> str:
+    """Return what was found along a factor as a sentence without its full stop; empty without data."""
+    info, found = SCORES[score], losses(factor, variants, score)
+    if not found:
+        return ""
+    points = {each.variant: each.point for each in found if each.point is not None and each.point.value is not None}
+    if found[0].point is None or (found[0].at_best.mean == found[0].at_worst.mean and not points):
+        return _ends(found[0], info)
+    low, high = short(factor.values[0]), short(factor.values[-1])
+    if not points:
+        who = "No variant loses" if len(found) > 1 else f"{found[0].variant} does not lose"
+        return f"{who} {LOST:g} points of {info.title} between {low} and {high}"
+    side = {each.variant: "above" if each.rising else "below" for each in found}
+    spared = [each.variant for each in found if each.variant not in points]
+    head = f"{LOST:g} points of {info.title} are lost "
+    if len(found) == 1:
+        (variant,) = points
+        return f"{variant} loses {LOST:g} points of {info.title} {side[variant]} {short(points[variant].value)}"
+    return head + _listed(points, side) + (f"; not by {', '.join(spared)}" if spared else "")
+
+
+def _listed(points: Mapping[str, BreakingPoint], side: Mapping[str, str]) -> str:
+    """Return breaking points with their variants; variants with nearly the same point have one number."""
+    groups: list[tuple[str, float, list[str]]] = []
+    for variant, point in points.items():
+        value = float(point.value or 0.0)
+        for where, other, names in groups:
+            if where == side[variant] and abs(value - other) <= _ALIKE * max(abs(value), abs(other)):
+                names.append(variant)
+                break
+        else:
+            groups.append((side[variant], value, [variant]))
+    return ", ".join(f"{where} {short(value)} ({', '.join(names)})" for where, value, names in groups)
+
+
+def _ends(loss: Loss, info: ScoreInfo) -> str:
+    unit = f" {info.unit}" if info.unit else ""
+    one, other = (fixed(each.mean, info.digits) for each in (loss.at_best, loss.at_worst))
+    return f"{info.title} of {loss.variant}: {one}{unit} at {short(loss.best)}, {other}{unit} at {short(loss.worst)}"
+
+
+def short(value: Any) -> str:
+    """Return the text of a value of a factor with at most three digits."""
+    if value is None:
+        return "–"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

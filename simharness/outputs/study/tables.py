@@ -1,0 +1,200 @@
+"""Tables of a study: mean scores of the variants with intervals over seeds, and differences between variants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from simharness.outputs.run.headline import NOTHING
+from simharness.outputs.study.curves import FactorBreakingPoint
+from simharness.outputs.study.failure_rates import NOT_BLAMED
+from simharness.runtime.number_text import fixed, signed
+from simharness.scoring.catalogue import SCORES, ScoreInfo
+from simharness.statistics.intervals import Interval, mean_interval
+from simharness.statistics.paired_tests import holm, paired
+
+COLUMNS: tuple[ScoreInfo, ...] = tuple(
+    SCORES[key] for key in ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts", "time_ms")
+)
+"""Scores of the headline table."""
+
+OVER_TIME = ("hota", "idf1", "switches_per_minute", "jerk_ratio")
+"""Scores over time with curves, of studies with a variant that tracks people."""
+
+SIGNIFICANT = 0.05
+"""Adjusted p value below which a difference is significant."""
+
+_OF_A_VARIANT = ("variant", "seconds", "scenario")  # columns besides the scores that are not part of the setting
+_OTHER = " of the other variant"  # suffix that no column of a study has
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Table cell.
+
+    Attributes:
+        text: the number.
+        small: note in small letters below the number.
+        strong: whether the number is bold.
+    """
+
+    text: str
+    small: str = ""
+    strong: bool = False
+
+
+def tracks_people(trials: pl.DataFrame) -> bool:
+    """Return whether a variant of a study gives identities; tables of earlier versions have no column of them."""
+    return "hota" in trials.columns and trials["hota"].is_not_null().any()
+
+
+def by_seed(rows: pl.DataFrame, score: str) -> dict[int, float]:
+    """Return a score by seed, as the mean over the settings; seeds without the score are left out.
+
+    The settings of one seed share their people and are not independent, so intervals are over seeds.
+    """
+    means = rows.group_by("seed").agg(pl.col(score).mean()).drop_nulls(score).sort("seed")
+    return dict(zip(means["seed"].to_list(), means[score].to_list(), strict=True))
+
+
+def cell(interval: Interval, score: ScoreInfo) -> Cell:
+    """Return the cell of a mean, with its interval in small letters."""
+    if not interval.n:
+        return Cell(NOTHING)
+    return Cell(number(interval.mean, score), ends(interval, score))
+
+
+def number(value: float, score: ScoreInfo) -> str:
+    """Return the text of a value of a score."""
+    return fixed(value, score.digits) if np.isfinite(value) else NOTHING
+
+
+def ends(interval: Interval, score: ScoreInfo) -> str:
+    """Return the text of the ends of an interval; empty without an interval."""
+    if not np.isfinite([interval.low, interval.high]).all():
+        return ""
+    return f"{fixed(interval.low, score.digits)} to {fixed(interval.high, score.digits)}"
+
+
+def headline(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Cell]]:
+    """Return the headline table: a row for each variant, a cell for each of :data:`COLUMNS`.
+
+    A mean is over the settings where the score applies to that variant, and these may differ between variants. So the
+    difference between two variants is the one of :func:`differences`, not the difference of these means.
+    """
+    rows = {}
+    for variant in variants:
+        trials_of_variant = trials.filter(pl.col("variant") == variant)
+        rows[variant] = [
+            cell(mean_interval(list(by_seed(trials_of_variant, info.key).values()), unit=info.unit), info)
+            for info in COLUMNS
+        ]
+    return rows
+
+
+def all_scores(trials: pl.DataFrame, variants: Sequence[str]) -> list[tuple[ScoreInfo, list[Cell]]]:
+    """Return the table of all scores that apply to any variant: a row for each score, a cell for each variant.
+
+    Means are over the settings where the score applies to that variant, as in :func:`headline`.
+    """
+    rows = []
+    for info in SCORES.values():
+        if info.key not in trials.columns:  # a table of an earlier version
+            continue
+        means = [
+            mean_interval(list(by_seed(trials.filter(pl.col("variant") == variant), info.key).values()), unit=info.unit)
+            for variant in variants
+        ]
+        if any(mean.n for mean in means):
+            rows.append((info, [cell(mean, info) for mean in means]))
+    return rows
+
+
+def cases(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, dict[str, list[Cell]]]:
+    """Return a headline table for each case; empty for a study without cases."""
+    names = [name for name in dict.fromkeys(trials["case"]) if name]
+    return {name: headline(trials.filter(pl.col("case") == name), variants) for name in names}
+
+
+def differences(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Cell]]:
+    """Return the differences of the other variants from the first, paired by seed, over the settings that both have.
+
+    A cell is strong where the p value, adjusted by Holm's method over all cells, is below :data:`SIGNIFICANT`. Time is
+    not tested, because other work on the machine changes it.
+    """
+    tests: list[tuple[str, ScoreInfo, Any]] = []
+    first, *others = variants
+    base = trials.filter(pl.col("variant") == first)
+    setting = [column for column in trials.columns if column not in (*SCORES, *_OF_A_VARIANT)]  # with the seed
+    for variant in others:
+        other = trials.filter(pl.col("variant") == variant)
+        pairs = base.join(other, on=setting, suffix=_OTHER, nulls_equal=True, maintain_order="left")
+        for info in COLUMNS:
+            both = pairs.drop_nulls([info.key, f"{info.key}{_OTHER}"])
+            before, after = by_seed(both, info.key), by_seed(both, f"{info.key}{_OTHER}")
+            tests.append((variant, info, paired(list(before.values()), list(after.values()))))
+    tested = [each for each in tests if each[1].key != "time_ms"]
+    adjusted = dict(zip([(each[0], each[1].key) for each in tested], holm([each[2].p for each in tested]), strict=True))
+    rows: dict[str, list[Cell]] = {variant: [] for variant in others}
+    for variant, info, pair in tests:
+        if not pair.n:
+            rows[variant].append(Cell(NOTHING))
+            continue
+        small = ""
+        if np.isfinite(pair.low):
+            small = f"{_signed(pair.low, info)} to {_signed(pair.high, info)}"
+        significant = adjusted.get((variant, info.key), 1.0) < SIGNIFICANT
+        rows[variant].append(Cell(_signed(pair.difference, info), small, significant))
+    return rows
+
+
+def _signed(value: float, score: ScoreInfo) -> str:
+    """Return a difference with its sign; the minus is typographic, and zero has no sign."""
+    return signed(value, score.digits).replace("-", "−")
+
+
+def breaking_cell(breaking: FactorBreakingPoint | None) -> Cell:
+    """Return the cell of a breaking point."""
+    if breaking is None:
+        return Cell(NOTHING)
+    low, high = breaking.swept
+    point = breaking.point
+    side = "above" if breaking.rising else "below"
+    small = ""
+    if point.low is not None or point.high is not None:
+        least = f"{_short(low)} or less" if point.low is None else _short(point.low)
+        most = f"{_short(high)} or more" if point.high is None else _short(point.high)
+        small = f"{least} to {most}"
+    if point.why == "never":
+        return Cell(f"not between {_short(low)} and {_short(high)}", small)
+    if point.why == "at once":
+        return Cell(f"already at {_short(low if breaking.rising else high)}", small)
+    assert point.value is not None  # the score crosses the threshold
+    return Cell(f"{side} {_short(point.value)}", small, strong=True)
+
+
+def _short(value: float) -> str:
+    return f"{value:.3g}"
+
+
+def failures_per_100_frames(
+    failures: pl.DataFrame, frames: Mapping[str, int], variants: Sequence[str], column: str
+) -> dict[str, dict[str, float]]:
+    """Return the failures per 100 frames of each variant, by a column of the table of failures.
+
+    Args:
+        failures: table of failures of the study.
+        frames: scored frames of each variant.
+        variants: variants in the order of the result.
+        column: ``kind`` or ``stage``; null becomes :data:`simharness.outputs.study.failure_rates.NOT_BLAMED`.
+    """
+    rates: dict[str, dict[str, float]] = {}
+    for variant in variants:
+        classes = failures.filter(pl.col("variant") == variant)[column].fill_null(NOT_BLAMED)
+        counts = dict(classes.value_counts().iter_rows())
+        rates[variant] = {key: 100 * count / max(1, frames.get(variant, 0)) for key, count in counts.items()}
+    return rates

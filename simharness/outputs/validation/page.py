@@ -1,0 +1,229 @@
+"""Report of a validation as one self-contained HTML file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from mvpose import SHELF14
+from simharness.outputs.documents import fill_template, provenance_sentence
+from simharness.outputs.validation import plots, tables
+from simharness.reality.validation.evidence import Compared
+from simharness.reality.validation.measurements import AFFINITY_EDGES, AMBIGUOUS
+from simharness.reality.validation.treatments import KINDS
+from simharness.reality.validation.validation import Validation
+from simharness.reality.validation.verdicts import BOUNDS, State
+from simharness.runtime.number_text import fixed
+
+_HEADS = {"voxelpose": "VoxelPose", "2019": "2019"}
+_RATIOS = (
+    *("bones.shank", "bones.thigh", "bones.forearm", "bones.upper arm", "behind", "affinity.different"),
+    *("detected", "missing.ears", "missing.elbows", "missing.wrists", "missing.knees", "missing.ankles"),
+    *("phantoms", "others", "score.q10", "score.q50"),
+)
+
+
+def render_validation(validation: Validation, *, provenance: Mapping[str, Any], fitted_on: str = "") -> str:
+    """Return the page of a validation.
+
+    Args:
+        validation: the validation.
+        provenance: keys of :func:`simharness.trial.provenance.provenance`.
+        fitted_on: name of the recording to which the twins were fitted; empty: the same.
+
+    Returns:
+        A self-contained HTML document.
+    """
+    recording = validation.recording
+    states = [verdict.state for verdict in validation.verdicts]
+    return fill_template(
+        "validation.html",
+        name=recording.name,
+        code=provenance["code"],
+        fitted_on=fitted_on,
+        facts=_facts(validation),
+        cards=_cards(validation),
+        passed=State.FAILS not in states,
+        group_columns=tables.GROUP_COLUMNS,
+        groups=tables.group_rows(validation.verdicts),
+        verdicts=list(tables.verdict_rows(validation.verdicts)),
+        heads=[_HEADS.get(rule.mapping, rule.mapping) for rule in tables.PUBLISHED],
+        variants=tables.variant_rows(validation),
+        contrasts=tables.contrast_rows(validation),
+        people=tables.people_rows(validation),
+        subsets=list(tables.subset_rows(validation)),
+        losses=list(tables.response_rows(validation)),
+        sampled=validation.subsets.sampled,
+        measurements=tables.measurement_rows(validation),
+        colors=plots.colors(validation.plan.variants),
+        plots={key: Markup(svg) for key, svg in _plots(validation).items()},
+        curves=[(name, Markup(svg)) for name, svg in _subset_plots(validation)],
+        responses=[(title, Markup(svg)) for title, svg in _response_plots(validation)],
+        draws=[(title, ranks, Markup(svg)) for title, ranks, svg in _draw_plots(validation)],
+        subset_ranks=_ranks({name: rank.mean for name, rank in validation.subsets.ranks.items()}),
+        joints=validation.joints,
+        bounds=BOUNDS,
+        command=provenance.get("command") or "",
+        provenance=provenance_sentence(provenance),
+    )
+
+
+def _facts(validation: Validation) -> list[tuple[str, str]]:
+    recording = validation.recording
+    return [
+        ("frames", f"{len(recording)}, annotated"),
+        ("cameras", f"{len(recording.rig)}"),
+        ("actors", f"{recording.people}, {len(recording.scored)} of them scored"),
+        ("detector", recording.kind),
+        ("twins", f"{validation.twins} of {validation.twin_frames:.0f} frames"),
+        ("calibration draws", f"{validation.plan.draws}"),
+    ]
+
+
+def _cards(validation: Validation) -> list[dict[str, str]]:
+    """Return the headline numbers: verdicts by state, and the largest and the mean difference of PCP."""
+    states = [verdict.state for verdict in validation.verdicts]
+    of_variants = [
+        abs(scores["pcp"][rule].difference) for scores in validation.variants.values() for rule in tables.PUBLISHED
+    ]
+    pairs = np.array([pair for of in _points(validation).values() for each in of.values() for pair in each])
+    return [
+        {
+            "title": "Verdicts",
+            "text": f"{states.count(State.HOLDS)} of {len(states)} hold",
+            "about": f"{states.count(State.UNCLEAR)} unclear, {states.count(State.FAILS)} fail",
+        },
+        {
+            "title": "Variants, all cameras",
+            "text": f"{fixed(max(of_variants), 1)} points",
+            "about": "largest difference of PCP between simulation and reality, both head rules",
+        },
+        {
+            "title": "All settings",
+            "text": f"{fixed(float(np.mean(np.abs(pairs[:, 1] - pairs[:, 0]))), 1)} points",
+            "about": f"mean difference of PCP over {len(pairs)} settings: subsets of cameras, treatments, variants",
+        },
+        {
+            "title": "Joint difficulty",
+            "text": f"ρ {validation.joints.rank_correlation:.2f}",
+            "about": "rank correlation of the mean errors of the 14 joints",
+        },
+    ]
+
+
+def _points(validation: Validation) -> dict[str, dict[str, list[tuple[float, float]]]]:
+    """Return (real, twin) PCP of every scored setting, by kind of setting and variant."""
+    names = validation.plan.variants
+    result: dict[str, dict[str, list[tuple[float, float]]]] = {
+        "all cameras": {
+            name: [(each.real.mean, each.twin.mean) for each in _published(validation, name)] for name in names
+        }
+    }
+    most = max(validation.subsets.curves)
+    for count in validation.subsets.curves:
+        if count < most:
+            result[f"{count} cameras"] = {
+                name: [pair for views, pair in validation.subsets.single[name].items() if len(views) == count]
+                for name in names
+            }
+    if validation.responses:
+        bases = {name: validation.bases[name] for name in names}
+        result["treated"] = {
+            name: [
+                (bases[name][0] - each.loss.real.mean, bases[name][1] - each.loss.twin.mean)
+                for each in validation.responses
+                if each.variant == name
+            ]
+            for name in names
+        }
+    return result
+
+
+def _published(validation: Validation, name: str) -> list[Compared]:
+    return [validation.variants[name]["pcp"][rule] for rule in tables.PUBLISHED]
+
+
+def _plots(validation: Validation) -> dict[str, str]:
+    shades = plots.colors(validation.plan.variants)
+    drawn = {
+        "agreement": plots.agreement(_points(validation), shades, name="agreement"),
+        "joints": plots.joint_errors(validation.joints, SHELF14.joints, name="joints"),
+        "ratios": plots.ratios(_ratios(validation), name="ratios"),
+    }
+    if validation.responses:
+        drawn["losses"] = plots.losses(validation.responses, shades, name="losses")
+    pairs = {
+        name: np.array([pair for views, pair in of.items() if len(views) == 2]).reshape(-1, 2).T
+        for name, of in validation.subsets.single.items()
+    }
+    drawn["pairs"] = plots.scatter(pairs, shades, name="pairs", what="PCP, %")
+    if validation.subsets.gains:
+        drawn["gains"] = plots.gains(validation.subsets, name="gains")
+    for key, (real, twin) in validation.affinities.items():
+        drawn[f"affinity_{key}"] = plots.histogram(AFFINITY_EDGES, real, twin, name=f"affinity-{key}", limit=AMBIGUOUS)
+    return drawn
+
+
+def _ratios(validation: Validation) -> dict[str, tuple[Compared, tuple[float, float] | None]]:
+    """Return the measurements whose ratio says something, with the accepted range."""
+    shown: dict[str, tuple[Compared, tuple[float, float] | None]] = {}
+    for key in _RATIOS:
+        figure = validation.measured[key]
+        if not (np.isfinite(figure.real.mean) and figure.real.mean > 0 and np.isfinite(figure.twin.mean)):
+            continue
+        accepted = None
+        if key.startswith("bones."):
+            accepted = BOUNDS.bones
+        elif key == "affinity.different":
+            accepted = (1 - BOUNDS.ambiguous, 1 + BOUNDS.ambiguous)
+        elif key == "behind":
+            share = BOUNDS.behind / figure.real.mean
+            accepted = (max(0.0, 1 - share), 1 + share)
+        shown[tables.measurement_title(key).removesuffix(", %").removesuffix(", mm")] = figure, accepted
+    return shown
+
+
+def _subset_plots(validation: Validation) -> list[tuple[str, str]]:
+    subsets, shades = validation.subsets, plots.colors(validation.plan.variants)
+    ends = [
+        end
+        for curve in subsets.curves.values()
+        for each in curve.values()
+        for end in (each.real.mean, each.twin.mean, each.real.low, each.twin.low)
+    ]
+    low = 5 * np.floor(np.nanmin(ends) / 5)
+    return [
+        (name, plots.subset_curve(subsets, name, shades[name], name=f"subsets-{name}", low=low))
+        for name in validation.plan.variants
+    ]
+
+
+def _response_plots(validation: Validation) -> list[tuple[str, str]]:
+    shades = plots.colors(validation.plan.variants)
+    by_kind = {
+        kind: [each for each in validation.responses if each.kind == kind]
+        for kind in dict.fromkeys(each.kind for each in validation.responses)
+    }
+    return [(KINDS[kind].title, plots.response(of, shades, name=f"dose-{kind}")) for kind, of in by_kind.items()]
+
+
+def _draw_plots(validation: Validation) -> list[tuple[str, str, str]]:
+    """Return title, rank correlations and plot of each kind of calibration errors, at its highest level."""
+    shades = plots.colors(validation.plan.variants)
+    drawn = []
+    for kind in dict.fromkeys(each.kind for each in validation.responses if KINDS[each.kind].calibration):
+        highest = max(each.level for each in validation.responses if each.kind == kind)
+        of = [each for each in validation.responses if each.kind == kind and each.level == highest]
+        title = f"{KINDS[kind].title}, {tables.level_text(kind, highest)}"
+        pairs = {each.variant: each.draws for each in of}
+        svg = plots.scatter(pairs, shades, name=f"draws-{kind}", what="loss, points", wide=True)
+        drawn.append((title, _ranks({each.variant: each.rank.mean for each in of}), svg))
+    return drawn
+
+
+def _ranks(ranks: Mapping[str, float]) -> str:
+    """Return the rank correlations of variants as text."""
+    return ", ".join(f"{name} {rank:.2f}" for name, rank in ranks.items())

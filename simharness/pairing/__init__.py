@@ -1,1 +1,0 @@
-"""One-to-one pairs of true and estimated people of a frame."""

@@ -1,0 +1,224 @@
+"""Stage to blame for each failure, found by replacing one stage after the other by the truth.
+
+A frame with failures is estimated again, and the first substitution that removes a failure determines its stage:
+
+- detection: perfect detections of the same pictures in place of the real ones. Misses of hidden people count here, too.
+- matching: perfect detections and the true labels.
+- reconstruction: neither removes the failure. The cause is reconstruction itself or its other input: a wrong
+  calibration, late pictures, or too few views with the joint inside the picture.
+- method: matching or reconstruction of a user-defined estimator, which takes no labels and whose stages are unknown.
+
+Perfect detections remove most failures, so matching rarely gets the blame. One more substitution stands beside that
+order: the real detections with the true labels, which shows what a perfect matching alone would remove.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+import polars as pl
+from scipy.optimize import linear_sum_assignment
+
+from mvpose import COCO17, Detections, Estimate, Rig
+from mvpose.pipeline import Estimator
+from simharness.runtime.errors import naming_frame
+from simharness.scoring.failures.failure_classes import Failure, FailureKind, failures_of_frame
+from simharness.scoring.failures.substitution import perfect_detections, true_labels, with_labels
+from simharness.scoring.pairing import mean_distances
+from simharness.types.recording import Recording
+from simharness.types.truth import Truth
+
+
+class Stage(StrEnum):
+    """Stages of the method, in the order in which they are replaced by the truth."""
+
+    DETECTION = "detection"
+    MATCHING = "matching"
+    RECONSTRUCTION = "reconstruction"
+    METHOD = "method"
+
+
+@dataclass(frozen=True)
+class Blamed:
+    """Failure and the stage to blame.
+
+    Attributes:
+        failure: the failure.
+        stage: first stage whose replacement by the truth removes it.
+        matching_alone: whether true labels of the real detections remove it; None for a method that takes no labels.
+    """
+
+    failure: Failure
+    stage: Stage
+    matching_alone: bool | None
+
+
+_WHOLE_PERSON = (FailureKind.MISSED, FailureKind.MERGED, FailureKind.SPLIT)
+
+FAILURE_SCHEMA: dict[str, Any] = {
+    "frame": pl.Int64,
+    "person": pl.Int64,
+    "kind": pl.String,
+    "stage": pl.String,
+    "matching_alone": pl.Boolean,
+    "joints": pl.List(pl.String),
+    "error_mm": pl.Float64,
+}
+"""Columns and types of :func:`failure_table`."""
+
+
+def blame(
+    recording: Recording, estimator: Estimator, estimates: Sequence[Estimate], failures: Sequence[Failure]
+) -> list[Blamed]:
+    """Find the stage to blame for every failure; each frame with failures is estimated three more times at most.
+
+    A missed, merged or split person is no longer a failure of that class as soon as the person is none of the three,
+    even with a displaced joint, because displaced joints are frequent. A swapped limb or a displaced joint is removed
+    when the person has no failure at all. If a frame has k ghosts fewer than before, k ghosts are removed: those
+    furthest from the remaining ones.
+
+    Args:
+        recording: T frames, as they were estimated. Heat maps are used if the detections have them.
+        estimator: the method. Only pipelines of mvpose take true labels; for others, failures that perfect detections
+            do not remove are blamed on the method.
+        estimates: estimates of the method, T.
+        failures: :func:`simharness.scoring.failures.failure_classes.find_failures` of these estimates.
+
+    Returns:
+        Failures with stages, in the same order.
+    """
+    blamed: list[Blamed] = []
+    for frame, group in itertools.groupby(failures, key=lambda failure: failure.frame):
+        inputs = _FrameInput(recording.rig, recording.detections[frame], recording.truth[frame])
+        blamed += _blame_frame(inputs, estimator, estimates[frame], list(group))
+    return blamed
+
+
+def blame_frames(
+    recording: Recording,
+    estimator: Estimator,
+    estimates: Sequence[Estimate],
+    input_of: Callable[[int], Detections],
+) -> Iterator[Blamed]:
+    """Find failures and the stage to blame frame by frame, because heat maps of all frames are large.
+
+    Args:
+        recording: T frames.
+        estimator: the method.
+        estimates: its estimates, T.
+        input_of: detections of a frame as the method got them, with heat maps if it reads them.
+
+    Raises:
+        RunError: the method failed; the message names the frame.
+    """
+    for frame, (truth, estimate) in enumerate(zip(recording.truth, estimates, strict=True)):
+        if failures := failures_of_frame(recording.rig, recording.detections[frame], truth, estimate):
+            moment = Recording(recording.time[[frame]], recording.rig, (input_of(frame),), (truth,))
+            with naming_frame(frame):
+                blamed = blame(moment, estimator, [estimate], failures)
+            for each in blamed:
+                yield replace(each, failure=replace(each.failure, frame=frame))
+
+
+@dataclass(frozen=True)
+class _FrameInput:
+    """One frame with real or perfect detections."""
+
+    rig: Rig
+    detections: Detections
+    truth: Truth
+
+    def removes(self, estimator: Estimator, before: Estimate, failures: Sequence[Failure]) -> list[bool]:
+        """Estimate this input, and return which of the failures of an earlier estimate of the frame are gone."""
+        after = estimator.estimate(self.rig, self.detections)
+        remaining = failures_of_frame(self.rig, self.detections, self.truth, after)
+        kinds = {failure.person: failure.kind for failure in remaining}
+        removed_ghosts = _removed_ghosts(before, _ghosts(failures), after, _ghosts(remaining))
+        return [
+            failure.estimate in removed_ghosts
+            if failure.kind is FailureKind.GHOST
+            else _removed(failure.kind, kinds.get(failure.person))
+            for failure in failures
+        ]
+
+
+def _removed(before: FailureKind, after: FailureKind | None) -> bool:
+    """Return whether a person's failure is removed, if the person now has failure ``after``, or none."""
+    return after is None or (before in _WHOLE_PERSON and after not in _WHOLE_PERSON)
+
+
+def _blame_frame(
+    real: _FrameInput, estimator: Estimator, estimate: Estimate, failures: Sequence[Failure]
+) -> Iterable[Blamed]:
+    perfect = _FrameInput(real.rig, *perfect_detections(real.detections, real.truth))
+    by_detection = perfect.removes(estimator, estimate, failures)
+    by_matching = [False] * len(failures)
+    last = Stage.RECONSTRUCTION
+    labelled = with_labels(estimator, true_labels(perfect.detections, perfect.truth))
+    if labelled is None:
+        last = Stage.METHOD
+    elif not all(by_detection):
+        by_matching = perfect.removes(labelled, estimate, failures)
+    matching_alone: list[bool | None] = [None] * len(failures)
+    labelled = with_labels(estimator, true_labels(real.detections, real.truth))
+    if labelled is not None:
+        matching_alone = list(real.removes(labelled, estimate, failures))
+    for failure, detection, matching, alone in zip(failures, by_detection, by_matching, matching_alone, strict=True):
+        stage = Stage.DETECTION if detection else Stage.MATCHING if matching else last
+        yield Blamed(failure, stage, alone)
+
+
+def _ghosts(failures: Sequence[Failure]) -> list[int]:
+    return [failure.estimate for failure in failures if failure.kind is FailureKind.GHOST]
+
+
+def _removed_ghosts(before: Estimate, ghosts: list[int], after: Estimate, remaining: list[int]) -> set[int]:
+    """Return the removed ghosts: all except those paired one to one with the nearest remaining ghosts."""
+    distance = mean_distances(before.joints[ghosts], after.joints[remaining])
+    stay, _ = linear_sum_assignment(np.minimum(distance, 1e6))  # infinite where two ghosts share no joint
+    return set(ghosts) - {ghosts[index] for index in stay}
+
+
+def failure_table(failures: Iterable[Failure | Blamed]) -> pl.DataFrame:
+    """Return a table with a row for each failure and the columns of :data:`FAILURE_SCHEMA`.
+
+    Joints are given by name; the person of a ghost is -1; the stage of a failure without blame is null.
+    """
+    return pl.DataFrame([_row(each) for each in failures], schema=FAILURE_SCHEMA, orient="row")
+
+
+def _row(each: Failure | Blamed) -> tuple[Any, ...]:
+    failure, stage, alone = (
+        (each.failure, str(each.stage), each.matching_alone) if isinstance(each, Blamed) else (each, None, None)
+    )
+    joints = [COCO17.joints[joint] for joint in failure.joints]
+    return failure.frame, failure.person, str(failure.kind), stage, alone, joints, failure.error_mm
+
+
+def failure_scores(table: pl.DataFrame, frames: int) -> dict[str, float | None]:
+    """Return the scores of failures: ``failures_<kind>`` per frame, and ``blame_<stage>`` in percent of the failures.
+
+    ``blame_<stage>`` is None without blamed failures; for a method whose stages are unknown, matching and
+    reconstruction are None.
+
+    Args:
+        table: table of :func:`failure_table`.
+        frames: number of frames that were classified.
+
+    Raises:
+        ValueError: no frames.
+    """
+    if frames < 1:
+        raise ValueError(f"failures must be counted over one frame or more, got {frames}")
+    kinds, stages = table["kind"].to_list(), table["stage"].drop_nulls().to_list()
+    scores: dict[str, float | None] = {f"failures_{kind}": kinds.count(kind) / frames for kind in FailureKind}
+    unknown = {Stage.MATCHING, Stage.RECONSTRUCTION} if Stage.METHOD in stages else set()
+    for stage in Stage:
+        known = stages and stage not in unknown
+        scores[f"blame_{stage}"] = 100.0 * stages.count(stage) / len(stages) if known else None
+    return scores

@@ -1,0 +1,79 @@
+"""Sentences and numbers of a blame, for pages and terminals."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simharness.runtime.number_text import fixed, signed
+from simharness.scoring.catalogue import SCORES
+from simharness.statistics.intervals import Interval
+from simharness.study.causes.cause_shares import RESTORED, Blame
+
+_DIGITS = 1  # of differences of scores
+
+
+def points(number: Interval, *, interval: bool = True) -> str:
+    """Return a difference of scores, with its interval where wanted: "2.5 (−1.4 to 6.9)"."""
+    return _minus(fixed(number.mean, _DIGITS)) + (_ends(number, _DIGITS) if interval else "")
+
+
+def heading(blame: Blame) -> str:
+    """Return what was found in a line: the score as it is, and with all causes mended."""
+    info = SCORES[blame.score]
+    return f"{info.title} {_value(blame, blame.before)}, {_value(blame, blame.after)} with all causes mended"
+
+
+def conclusion(blame: Blame) -> str:
+    """Return what to mend first, in a sentence or two."""
+    info = SCORES[blame.score]
+    if blame.mending is None:
+        return f"Nothing is to be gained: mending all causes together does not improve {info.title}."
+    mending = blame.mending
+    what = ", ".join(cause.title for cause in mending.about)
+    after = f"{_value(blame, mending.score)}{_ends(mending.score, info.digits)}"
+    part = f"{100 * mending.restored:.0f} % of what mending everything would gain"
+    if mending.restored < RESTORED:
+        return (
+            f"The largest causes together are not enough. With these mended, {what}, {info.title} is {after}: {part}."
+        )
+    return f"Mend first: {what}. {info.title} is then {after}: {part}."
+
+
+def surest(blame: Blame) -> str:
+    """Return whether the largest share is above zero for certain, in a sentence; empty where nothing is lost."""
+    if blame.mending is None or not blame.shares:
+        return ""
+    first = blame.shares[0]
+    if not np.isfinite(first.share.low):
+        return "A single seed has no intervals: run more seeds before you decide."
+    if first.share.low > 0:
+        return f"The largest cause is {first.about.title}, {points(first.share)} points."
+    return (
+        f"The largest cause is {first.about.title}, {points(first.share)} points, but its interval reaches below zero: "
+        "run more seeds before you decide."
+    )
+
+
+def gain(number: Interval, *, interval: bool = True) -> str:
+    """Return a gain with its sign, and its interval where wanted: "+2.5 (−1.4 to 6.9)"."""
+    return _minus(signed(number.mean, _DIGITS)) + (_ends(number, _DIGITS) if interval else "")
+
+
+def ends(number: Interval) -> str:
+    """Return the interval of a difference of scores: "−1.4 to 6.9"; empty where there is none."""
+    return _ends(number, _DIGITS).strip(" ()")
+
+
+def _value(blame: Blame, interval: Interval) -> str:
+    info = SCORES[blame.score]
+    return f"{fixed(interval.mean, info.digits)}{f' {info.unit}' if info.unit else ''}"
+
+
+def _ends(interval: Interval, digits: int) -> str:
+    if not np.isfinite([interval.low, interval.high]).all():
+        return ""
+    return f" ({_minus(fixed(interval.low, digits))} to {_minus(fixed(interval.high, digits))})"
+
+
+def _minus(number: str) -> str:
+    return number.replace("-", "−")
