@@ -1,8 +1,8 @@
 """Blame that decides: the share of each cause in a lost score, and the fewest causes whose mending restores it.
 
 The worth of a coalition of causes is the score of the same trial with these causes mended
-(:class:`.mended_trial.MendedTrial`). Causes overlap: a joint that people hide is also guessed, and a person who is missed
-in one view is less missed with one more camera. So a cause has three numbers:
+(:class:`.mended_trial.MendedTrial`). Causes overlap: a joint that people hide is also guessed, and a person who is
+missed in one view is less missed with one more camera. So a cause has three numbers:
 
 - its gain alone: the score with only this cause mended, minus the score as it is. It answers what mending it is worth;
 - its gain last: the score with everything mended, minus that with everything but this. Where it is zero, the other
