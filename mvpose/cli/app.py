@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from mvpose.cli import detect, doctor, estimate, repair, view
+from mvpose.cli import detect_command, doctor_command, estimate_command, repair_command, view_command
 
 app = typer.Typer(
     name="mvpose",
@@ -41,8 +41,8 @@ def options(
     """Make 3D poses of several people from recordings of calibrated cameras, and check the calibration."""
 
 
-estimate.add_to(app)
-detect.add_to(app)
-doctor.add_to(app)
-repair.add_to(app)
-view.add_to(app)
+estimate_command.add_to(app)
+detect_command.add_to(app)
+doctor_command.add_to(app)
+repair_command.add_to(app)
+view_command.add_to(app)

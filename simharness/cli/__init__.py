@@ -7,35 +7,35 @@ traceback), 130 interrupted. Commands import heavy modules only when they run.
 from __future__ import annotations
 
 from simharness.cli import (
-    blame,
-    check,
-    evaluate,
-    export,
-    fit_detector,
-    plan,
-    rehearse,
-    report,
-    run,
-    scenarios,
-    study,
-    validate,
+    blame_command,
+    check_command,
+    evaluate_command,
+    export_command,
+    fit_detector_command,
+    plan_command,
+    rehearse_command,
+    report_command,
+    run_command,
+    scenarios_command,
+    study_command,
+    validate_command,
 )
 from simharness.cli.app import app
 
 __all__ = ["app", "main"]
 
-run.add_to(app)
-export.add_to(app)
-scenarios.add_to(app)
-check.add_to(app)
-blame.add_to(app)
-report.add_to(app)
-study.add_to(app)
-app.add_typer(evaluate.app, name="evaluate")
-fit_detector.add_to(app)
-validate.add_to(app)
-rehearse.add_to(app)
-plan.add_to(app)
+run_command.add_to(app)
+export_command.add_to(app)
+scenarios_command.add_to(app)
+check_command.add_to(app)
+blame_command.add_to(app)
+report_command.add_to(app)
+study_command.add_to(app)
+app.add_typer(evaluate_command.app, name="evaluate")
+fit_detector_command.add_to(app)
+validate_command.add_to(app)
+rehearse_command.add_to(app)
+plan_command.add_to(app)
 
 
 def main() -> None:

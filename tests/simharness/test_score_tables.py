@@ -10,7 +10,7 @@ import pytest
 from made_study import make_study
 from rich.console import Console
 
-from simharness.cli import run, study
+from simharness.cli import run_command, study_command
 from simharness.cli.score_tables import ScoreTable
 
 
@@ -49,7 +49,7 @@ def summary(*, tracking):
 def test_a_run_has_identities_where_variants_have_them():
     scores = {"full": summary(tracking=False), "track": summary(tracking=True)}
     given = {"name": "scene", "frames": 10, "seed": 3, "variants": scores}
-    head, identities = (printed(table, 80) for table in run._tables(given))
+    head, identities = (printed(table, 80) for table in run_command._tables(given))
     assert "HOTA" not in head
     assert "full" in head
     assert all(column in identities for column in ("HOTA", "IDF1", "Switches", "Switch rate"))
@@ -57,7 +57,7 @@ def test_a_run_has_identities_where_variants_have_them():
     assert next(line.split() for line in identities.splitlines() if line.startswith("track")) == [
         "track", "61.2", "73.8", "3", "0.46",
     ]  # fmt: skip
-    assert len(run._tables({**given, "variants": {"full": scores["full"]}})) == 1
+    assert len(run_command._tables({**given, "variants": {"full": scores["full"]}})) == 1
 
 
 def test_a_study_has_identities_where_variants_have_them():
@@ -70,19 +70,19 @@ def test_a_study_has_identities_where_variants_have_them():
     lines = [{**row, "variant": "full", **nothing}, {**row, "variant": "track", **tracked}]
     lines += [{**each, "seed": 1, "hota": each["hota"] and 70.0} for each in lines]
     info = {"name": "clocks", "factors": ["faults.clock_offset"], "one_at_a_time": False}
-    head, identities = study._tables(SimpleNamespace(info=info, trials=pl.DataFrame(lines)))
+    head, identities = study_command._tables(SimpleNamespace(info=info, trials=pl.DataFrame(lines)))
     assert [row[:2] for row in head.rows] == [("0.067", "full"), ("0.067", "track")]
     ((offset, variant, hota, _, switches, rate),) = identities.rows
     assert (offset, variant, switches.split("\n")[0], rate.split("\n")[0]) == ("0.067", "track", "3", "0.46")
     assert hota.split("\n")[0] == "65.0"
-    (only,) = study._tables(SimpleNamespace(info=info, trials=pl.DataFrame(lines[:1])))
+    (only,) = study_command._tables(SimpleNamespace(info=info, trials=pl.DataFrame(lines[:1])))
     assert only.rows[0][1] == "full"
 
 
 def test_a_study_with_a_factor_says_where_points_are_lost(tmp_path):
     """PCP is linear in the synthetic study, 5 points a camera: they are lost one camera below the best."""
     results = make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}, cases=("crowd", "empty"))
-    (table,) = study._tables(results)
+    (table,) = study_command._tables(results)
     assert table.rows[0] == ["crowd", "cameras.count", "full", "85.4 at 5", "70.4 at 2", "below 4 (4 to 4)"]
     assert [row[:3] for row in table.rows[1:3]] == [["", "", "fast"], ["empty", "cameras.count", "full"]]
     text = printed(table, 80)
@@ -92,5 +92,5 @@ def test_a_study_with_a_factor_says_where_points_are_lost(tmp_path):
 
 def test_a_factor_that_costs_little_is_said_to(tmp_path):
     results = make_study(tmp_path, factors={"people.count": [1, 2]}, slope=-1.0)
-    (table,) = study._tables(results)
+    (table,) = study_command._tables(results)
     assert table.rows[0] == ["people.count", "full", "59.4 at 1", "58.4 at 2", "not from 1 to 2"]

@@ -117,7 +117,7 @@ AROUND = {
     "simharness/scenario/load.py": "digests of regular files",
     "simharness/gate/suite.py": "digests of regular files",
     "simharness/outputs/benchmark/cameras.py": "a file that was just written",
-    "simharness/cli/run.py": "a file that was just written",
+    "simharness/cli/run_command.py": "a file that was just written",
     "simharness/outputs/study/page.py": "a file of a result folder, if regular",
 }
 SHIPPED = {

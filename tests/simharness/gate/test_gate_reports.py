@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import pytest
 from rich.console import Console
 
-from simharness.cli.check import _print
+from simharness.cli.check_command import _print
 from simharness.gate.baseline import FRAMES, GATED, TIME, Measurement
 from simharness.gate.change_text import difference
 from simharness.gate.compare import compare

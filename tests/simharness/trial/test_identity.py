@@ -205,7 +205,7 @@ class TestCode:
             ("mvpose/formats/openpose.py", set()),
             ("mvpose/files/input_files.py", set()),
             ("mvpose/pyproject.toml", set()),
-            ("simharness/cli/run.py", set()),
+            ("simharness/cli/run_command.py", set()),
             ("simharness/outputs/run/page.py", set()),
             ("simharness/study/trial_store.py", set()),
             ("simharness/trial/run_trial.py", set()),

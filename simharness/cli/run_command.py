@@ -60,7 +60,7 @@ def run(
     for table in _tables(summary):
         table.print_to(console)
     if blame:
-        from simharness.cli.blame import print_blame
+        from simharness.cli.blame_command import print_blame
         from simharness.study.causes.blame_file import read_blame
 
         if found := read_blame(folder):

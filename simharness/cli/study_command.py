@@ -295,7 +295,7 @@ def _report(results: Results, *, blame: int, workers: int) -> None:
 
 def blame_results(results: Results, *, seeds: int, workers: int = 1) -> None:
     """Find what cost a study its score, write it into its folder, and print it."""
-    from simharness.cli.blame import print_blame
+    from simharness.cli.blame_command import print_blame
     from simharness.outputs.study.blame_study import blame_study
     from simharness.runtime.progress import reporter
     from simharness.study.causes.blame_file import write_blame

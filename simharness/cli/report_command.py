@@ -98,7 +98,7 @@ def report(
             typer.echo(f"digest: {digest}")
             return
         if blame:
-            from simharness.cli.study import blame_results
+            from simharness.cli.study_command import blame_results
 
             blame_results(results, seeds=blame)
         with reporter() as bars, bars.stage("worst frames", SHOWN) as advance:

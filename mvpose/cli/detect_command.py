@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mvpose.cli.estimate import Wanted, estimate_into
+from mvpose.cli.estimate_command import Wanted, estimate_into
 from mvpose.cli.exit_codes import exit_on_error, note
 from mvpose.cli.inputs import Calibration, Choices
 from mvpose.cli.option_groups import grouped
