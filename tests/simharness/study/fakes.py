@@ -118,7 +118,7 @@ def run_program(folder: Path, **options) -> subprocess.CompletedProcess:
 
 def main():
     """Run ``simharness study`` with made-up trials."""
-    from simharness.cli import study_command as study_command
+    from simharness.cli import study_command
     from simharness.study import runner
 
     options = json.loads(sys.argv[1])
