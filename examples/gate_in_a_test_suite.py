@@ -7,7 +7,7 @@ To compare a change of the method with the version before it, use ``simharness c
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from simharness.testing import assert_robust
+from simharness import assert_robust
 
 SUITE = """
 extends = "quickstart"

@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from simharness.interface import Blame, TrialResult, blame, load_scenario, run_trial, score, simulate
+    from simharness.api import Blame, TrialResult, assert_robust, blame, load_scenario, run_trial, score, simulate
     from simharness.scenario.sections.scenario import Scenario
     from simharness.types.recording import Recording
     from simharness.types.sequence import Sequence
@@ -14,20 +14,21 @@ if TYPE_CHECKING:
     from simharness.types.views import Views, Visibility
 
 _MODULES = {
-    "Blame": "simharness.interface",
+    "Blame": "simharness.api",
     "KeypointError": "simharness.types.truth",
     "Recording": "simharness.types.recording",
     "Scenario": "simharness.scenario.sections.scenario",
     "Sequence": "simharness.types.sequence",
-    "TrialResult": "simharness.interface",
+    "TrialResult": "simharness.api",
     "Truth": "simharness.types.truth",
     "Views": "simharness.types.views",
     "Visibility": "simharness.types.views",
-    "blame": "simharness.interface",
-    "load_scenario": "simharness.interface",
-    "run_trial": "simharness.interface",
-    "score": "simharness.interface",
-    "simulate": "simharness.interface",
+    "assert_robust": "simharness.api",
+    "blame": "simharness.api",
+    "load_scenario": "simharness.api",
+    "run_trial": "simharness.api",
+    "score": "simharness.api",
+    "simulate": "simharness.api",
 }
 
 __all__ = [
@@ -40,6 +41,7 @@ __all__ = [
     "Truth",
     "Views",
     "Visibility",
+    "assert_robust",
     "blame",
     "load_scenario",
     "run_trial",

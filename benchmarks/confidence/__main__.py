@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import COCO17, Estimate
-from simharness.interface import simulate
+from simharness import simulate
 from simharness.scenario.study_definition import load_study
 from simharness.scoring.confidence import inside
 from simharness.scoring.pairing import pair

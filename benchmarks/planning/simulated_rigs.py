@@ -20,7 +20,7 @@ from scipy.stats import spearmanr
 
 from mvpose import Pipeline, Rig
 from mvpose.arrays import Floats
-from simharness.interface import simulate
+from simharness import simulate
 from simharness.planning import FastLayer, Prediction, Volume
 from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.scenario import Scenario

@@ -1,7 +1,7 @@
 """One trial from its scenario to its scores: build, capture, audit, detect, read, estimate, score, classify, blame.
 
 Every command runs trials through :func:`run_trial`: ``run``, ``render``, ``export``, ``study``, ``check``,
-``evaluate``, :func:`simharness.testing.assert_robust` and the Python interface. Stages whose results are known
+``evaluate``, :func:`simharness.api.assert_robust` and the Python interface. Stages whose results are known
 already, such as those of a stored trial, are given as :class:`Known` and left out.
 """
 

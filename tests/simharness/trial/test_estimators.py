@@ -16,6 +16,7 @@ from trials import simulated
 
 from mvpose import Pipeline
 from mvpose.presets import PRESETS
+from simharness import assert_robust
 from simharness.outputs.run.result_folder import run
 from simharness.outputs.study.digest import write_digest
 from simharness.outputs.study.page import write_report
@@ -27,7 +28,6 @@ from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Estimators, Method
 from simharness.scenario.study_definition import load_study
 from simharness.study.runner import run_study
-from simharness.testing import assert_robust
 from simharness.trial.run_folder import read_run
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.estimation import EstimateFrames

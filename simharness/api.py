@@ -1,12 +1,26 @@
-"""A scenario file as an assertion, for test suites::
+"""Public Python interface, whose functions are names of :mod:`simharness` as well.
 
-    from simharness.testing import assert_robust
+Load a scenario, simulate it, run a trial of it, score estimates, find what cost the score, and assert scores in a test
+suite.
 
+::
+
+    import simharness
+    from mvpose import Pipeline
+
+    scenario = simharness.load_scenario("quickstart", overrides=["people.count=6", 'rendering.renderer="rays"'])
+    recording = simharness.simulate(scenario)
+    pipeline = Pipeline.preset("fast")
+    estimates = [pipeline.estimate(recording.rig, detections) for detections in recording.detections]
+    simharness.score(recording, estimates).scores["pcp"]
+    simharness.blame(scenario, seeds=5).shares[0].cause
+
+A scenario file as an assertion, for test suites::
 
     def test_the_method_is_robust():
-        assert_robust("scenarios/ci.toml", seeds=4, pcp=90, recall=95, ghosts=0.3)
+        simharness.assert_robust("scenarios/ci.toml", seeds=4, pcp=90, recall=95, ghosts=0.3)
 
-Any score of :data:`simharness.scoring.catalogue.SCORES` can be asserted.
+Studies have a module of their own: :mod:`simharness.study.runner`.
 """
 
 from __future__ import annotations
@@ -17,15 +31,63 @@ from collections.abc import Mapping, Sequence
 from numbers import Real
 from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING
 
+from mvpose import Estimate
+from simharness.gate.trial_command import TrialKey, command_of, setting_name
+from simharness.runtime.errors import RunError
+from simharness.scenario.load import load
+from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.study_definition import Study, load_study
+from simharness.scoring.assessment import Assessment, assess
 from simharness.scoring.catalogue import SCORES, ScoreInfo
+from simharness.study.causes.cause_shares import Blame, blame
+from simharness.trial.run_trial import TrialResult, run_trial
+from simharness.types.recording import Recording
 
-if TYPE_CHECKING:
-    from simharness.gate.trial_command import TrialKey
-    from simharness.scenario.study_definition import Study
+__all__ = ["Blame", "TrialResult", "assert_robust", "blame", "load_scenario", "run_trial", "score", "simulate"]
 
-__all__ = ["assert_robust"]
+
+def load_scenario(name: str | Path, *, overrides: Sequence[str] = (), seed: int | None = None) -> Scenario:
+    """Load a scenario.
+
+    Args:
+        name: name of a shipped scenario, "quickstart", or the path of a scenario file.
+        overrides: changed keys, "people.count=6", as ``--set`` takes them.
+        seed: seed in place of the scenario's.
+
+    Raises:
+        ValueError: no such scenario, or mistakes in it; the message names them all.
+    """
+    return load(name, overrides=overrides, seed=seed)
+
+
+def simulate(scenario: Scenario) -> Recording:
+    """Simulate a scenario: people, cameras, pictures, detections. The result is audited.
+
+    Returns:
+        The recording: detections and truth of each frame, and the believed cameras.
+
+    Raises:
+        ValueError: the scenario cannot be built.
+        RunError: any error after that.
+    """
+    return run_trial(scenario, until="detect").recording
+
+
+def score(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
+    """Score estimates of a recording.
+
+    Args:
+        recording: T frames.
+        estimates: one for each frame, T; ``Estimate.of_joints(joints)`` makes one of joints (n, 17, 3) in metres.
+
+    Returns:
+        Scores by the keys of :data:`simharness.scoring.catalogue.SCORES`, and tables by frame and by person.
+
+    Raises:
+        ValueError: another number of estimates, or estimates that do not fit the detections.
+    """
+    return assess(recording, estimates)
 
 
 def assert_robust(
@@ -56,8 +118,6 @@ def assert_robust(
         RunError: a trial that could not be run.
     """
     __tracebackhide__ = True  # pytest then shows the caller's line
-    from simharness.scenario.study_definition import load_study
-
     _check(thresholds)
     study = load_study(scenario, seeds=seeds, variants=[variant])
     scores = _run_unstored(study, workers) if keep is None else _run_stored(study, Path(keep), workers)
@@ -77,7 +137,6 @@ def _run_unstored(study: Study, workers: int) -> Mapping[TrialKey, Mapping[str, 
 
 def _run_stored(study: Study, folder: Path, workers: int) -> dict[TrialKey, Mapping[str, float | None]]:
     """Run the unfinished trials of a study in a folder, and return the scores of all trials."""
-    from simharness.gate.trial_command import TrialKey, setting_name
     from simharness.study.plan import plan
     from simharness.study.runner import run_study
 
@@ -100,8 +159,6 @@ def _run_stored(study: Study, folder: Path, workers: int) -> dict[TrialKey, Mapp
 def _require_all(failed: Sequence[tuple[str, int, str]], study: Study) -> None:
     """Raise a RunError if trials failed: (case, seed, error)."""
     __tracebackhide__ = True
-    from simharness.runtime.errors import RunError
-
     if failed:
         case, seed, error = failed[0]
         count = f"{len(failed)} of {study.trials} trials could not be run, the first"
@@ -127,8 +184,6 @@ def _check(thresholds: Mapping[str, float]) -> None:
 
 def _message(key: str, limit: float, scores: Mapping[TrialKey, Mapping[str, float | None]], study: Study) -> str:
     """Return a message if the mean of a score is beyond its threshold; "" otherwise."""
-    from simharness.gate.trial_command import command_of
-
     info = SCORES[key]
     known = {trial: value for trial, each in scores.items() if (value := each[key]) is not None}
     if not known:

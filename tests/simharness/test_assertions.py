@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from suites import SMALL, remember_scenes
 
+from simharness import assert_robust
 from simharness.gate import suite
 from simharness.runtime.errors import RunError
 from simharness.scenario.toml_files import ScenarioError
-from simharness.testing import assert_robust
 from simharness.trial import run_trial
 
 
