@@ -8,7 +8,7 @@ from mvpose import Camera, Rig
 from simharness.planning import FastLayer, Prediction, Volume
 from simharness.planning.rig_file import read_rig
 from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.cameras import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
 from simharness.world.rigs.layouts import build_rig
 
 ROOM = 8.0, 7.0, 3.0  # metres
@@ -26,7 +26,7 @@ def row(name: str, prediction: Prediction) -> str:
 
 def on_the_walls() -> Rig:
     """Return cameras at eight places where one more may hang, 2.4 m high."""
-    ring = Cameras.model_validate({"layout": "ring", "count": 8, "radius": 3.2, "height": 2.4})
+    ring = CamerasSection.model_validate({"layout": "ring", "count": 8, "radius": 3.2, "height": 2.4})
     return build_rig(ring, room=ROOM)
 
 

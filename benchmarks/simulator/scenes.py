@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.scenario import Cameras, Clutter, People, Scenario
+from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.scenario import Scenario
 
 
 def scenario(
@@ -13,8 +16,8 @@ def scenario(
     return Scenario(
         name="bench",
         duration=duration,
-        people=People(count=people),
-        clutter=Clutter(boxes=2, shelves=1, tables=1, chairs=3, plants=1),
-        cameras=Cameras(count=cameras, size=size),
+        people=PeopleSection(count=people),
+        clutter=ClutterSection(boxes=2, shelves=1, tables=1, chairs=3, plants=1),
+        cameras=CamerasSection(count=cameras, size=size),
         detector=read_profile("typical"),
     )

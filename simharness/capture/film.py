@@ -29,7 +29,7 @@ from simharness.world.scene.lookalikes import Lookalikes
 
 if TYPE_CHECKING:
     from simharness.world.rigs.exposure_schedule import ExposureSchedule
-    from simharness.world.scene.playback import Playback, State
+    from simharness.world.scene.playback import Playback, PlaybackState
 
 PREVIEW = 320  # width of the reduced pictures, pixels
 
@@ -52,7 +52,7 @@ class Observation:
 class Observer(Protocol):
     """Method to determine what cameras see."""
 
-    def observe(self, states: Many[State], cameras: Many[Camera]) -> list[Observation]:
+    def observe(self, states: Many[PlaybackState], cameras: Many[Camera]) -> list[Observation]:
         """Return the observations of cameras that expose at the same time.
 
         Args:
@@ -79,7 +79,7 @@ class PictureObserver:
         radii = [body.joint_radii for body in self._scene.bodies]
         self._radii = np.stack(radii) if people else np.zeros((0, 17))
 
-    def observe(self, states: Many[State], cameras: Many[Camera]) -> list[Observation]:
+    def observe(self, states: Many[PlaybackState], cameras: Many[Camera]) -> list[Observation]:
         """Return the observations: see :class:`Observer`."""
         people = len(self._scene.bodies)
         meshes = [meshes_at(self._scene, state) for state in states]
@@ -169,7 +169,7 @@ _BLOCK = 64  # frames for which motions are sampled together
 
 def simultaneous_exposures(
     playback: Playback, exposures: ExposureSchedule, frames: Many[int]
-) -> Iterator[tuple[int, NDArray[np.int64], list[State]]]:
+) -> Iterator[tuple[int, NDArray[np.int64], list[PlaybackState]]]:
     """Yield an index into ``frames``, the views exposed at the same time, and the scene at the times of their bands."""
     for start in range(0, len(frames), _BLOCK):
         groups = []

@@ -27,7 +27,7 @@ from simharness.world.humans.outer_joints import OuterJoints
 
 if TYPE_CHECKING:
     from simharness.world.rigs.exposure_schedule import ExposureSchedule
-    from simharness.world.scene.playback import Playback, State
+    from simharness.world.scene.playback import Playback, PlaybackState
 
 
 class OuterJointFilm:
@@ -72,7 +72,7 @@ class OuterJointFilm:
                 pixels[f, view, here], visibility[f, view, here] = at[v, here], labels[v, here]
         return OuterViews(pixels, visibility)
 
-    def _at(self, state: State) -> Floats:
+    def _at(self, state: PlaybackState) -> Floats:
         """Return the joints in one state, (P, E, 3), metres."""
         placed = [joints.at(bones) for joints, bones in zip(self._joints, state.bones, strict=True)]
         return np.stack(placed) if placed else np.zeros((*self._depths.shape, 3))

@@ -23,17 +23,17 @@ from simharness.types.mirror import Mirror
 from simharness.world.motion.trajectory import transform_points
 
 if TYPE_CHECKING:
-    from simharness.scenario.sections.scenario import Sensor
+    from simharness.scenario.sections.cameras import SensorSection
     from simharness.world.rigs.exposure_schedule import ExposureSchedule
     from simharness.world.scene.build import Scene
-    from simharness.world.scene.playback import Playback, State
+    from simharness.world.scene.playback import Playback, PlaybackState
 
 Rgb = NDArray[np.uint8]
 
 _BLUR_STEPS = 5  # times averaged for the motion blur of one picture
 
 
-def meshes_at(scene: Scene, state: State) -> list[Mesh]:
+def meshes_at(scene: Scene, state: PlaybackState) -> list[Mesh]:
     """Return the meshes of a scene in one state: the P people, then the solids, so mesh indices < P are people.
 
     The mesh of an absent person is a point on the floor: it has no area in a picture and does not extend the scene.
@@ -121,7 +121,7 @@ class PictureSource:
         seed: seed of the scenario.
     """
 
-    def __init__(self, playback: Playback, renderer: Renderer, *, sensor: Sensor, seed: int) -> None:
+    def __init__(self, playback: Playback, renderer: Renderer, *, sensor: SensorSection, seed: int) -> None:
         self._playback = playback
         self._renderer = renderer
         self._sensor = sensor
@@ -173,7 +173,7 @@ class PictureSource:
         steps = _BLUR_STEPS if shutter else 1
         return middle + shutter * ((np.arange(steps) + 0.5) / steps - 0.5)
 
-    def _render(self, state: State, camera: Camera, finer: int) -> Rgb:
+    def _render(self, state: PlaybackState, camera: Camera, finer: int) -> Rgb:
         scene = self._playback.scene
         return antialiased(
             self._renderer,

@@ -21,7 +21,7 @@ from simharness.capture.raw_kernels import expose
 from simharness.types.srgb import linear_table, rounded
 
 if TYPE_CHECKING:
-    from simharness.scenario.sections.cameras import Sensor
+    from simharness.scenario.sections.cameras import SensorSection
 
 Rgb = NDArray[np.uint8]
 
@@ -34,14 +34,14 @@ _STEEPEST = 0.065  # cos^2 of these 75 degrees; beyond, the falloff goes on less
 _LARGEST = 0.8  # standard deviation of the blur that the kernel's three taps make, pixels
 
 
-def is_ideal(sensor: Sensor) -> bool:
+def is_ideal(sensor: SensorSection) -> bool:
     """Return whether light reaches the picture unchanged: the dials of lens, colour filters and noise are zero."""
     light = (sensor.softness, sensor.vignetting, sensor.aberration, sensor.shot_noise, sensor.read_noise)
     return not any(light) and not sensor.mosaic
 
 
 def raw_picture(
-    rgb: Rgb, sensor: Sensor, random: np.random.Generator, *, camera: Camera | None, exposure: float
+    rgb: Rgb, sensor: SensorSection, random: np.random.Generator, *, camera: Camera | None, exposure: float
 ) -> NDArray[np.uint16]:
     """Return the colours that a camera reads from its sensor, (h, w, 3), from ``BLACK`` to ``WHITE``.
 

@@ -21,7 +21,7 @@ from simharness.world.humans.mujoco_model import SKIN_GROUP
 
 if TYPE_CHECKING:
     from simharness.world.scene.build import Scene
-    from simharness.world.scene.playback import State
+    from simharness.world.scene.playback import PlaybackState
 
 
 _OBJECT_GROUPS = np.array([group != SKIN_GROUP for group in range(6)], np.uint8)  # geom groups tested by MuJoCo
@@ -62,7 +62,7 @@ class RayCaster:
         self._low, self._high = np.empty((2, 3, len(self._objects)))
         self._box_objects()
 
-    def place(self, state: State) -> None:
+    def place(self, state: PlaybackState) -> None:
         """Move all people and objects to their positions in a state."""
         bones = np.ascontiguousarray(state.bones)
         place_capsules(self._rest, self._bone, self._radii, self._first, bones, self._placed, self._around)

@@ -23,7 +23,7 @@ from simharness.types.views import Visibility
 from simharness.world.scene.lookalikes import Lookalikes
 
 if TYPE_CHECKING:
-    from simharness.world.scene.playback import Playback, State
+    from simharness.world.scene.playback import Playback, PlaybackState
 
 
 # Share of a box that the person fills: median over simulated people who walk and wave (10th to 90th percentile: 0.33 to
@@ -51,7 +51,7 @@ class RayObserver:
         self._cameras: CameraArrays | None = None  # those of the last observation
         self._allowed = np.concatenate([np.zeros(len(bodies)), self._lookalikes.allowed])
 
-    def observe(self, states: Sequence[State], cameras: Sequence[Camera]) -> list[Observation]:
+    def observe(self, states: Sequence[PlaybackState], cameras: Sequence[Camera]) -> list[Observation]:
         """Return the observations: see :class:`simharness.capture.film.Observer`."""
         people = len(self._radii)
         self._cameras = views = CameraArrays.of(cameras, self._cameras)
@@ -85,7 +85,7 @@ class RayObserver:
 
 def cast_bands(
     caster: RayCaster,
-    states: Sequence[State],
+    states: Sequence[PlaybackState],
     cameras: CameraArrays,
     pixels: Floats,
     targets: Floats,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mvpose.camera import Camera
 from simharness.capture.raw import BLACK, WHITE, is_ideal, raw_picture
 from simharness.capture.raw_kernels import look_up
-from simharness.scenario.sections.cameras import Sensor
+from simharness.scenario.sections.cameras import SensorSection
 from simharness.types.random_streams import stream
 from simharness.types.srgb import from_linear, linear_table, rounded, to_linear
 
@@ -42,7 +42,7 @@ class Response:
     stops: float = 0.0
 
 
-def draw_response(sensor: Sensor, *, seed: int, view: int) -> Response:
+def draw_response(sensor: SensorSection, *, seed: int, view: int) -> Response:
     """Draw the response of camera ``view``; each parameter scales a separate draw, so none shifts another."""
     contrast, red, blue, stops = stream(seed, "sensor", "character", view).standard_normal(4).tolist()
     return Response(
@@ -53,7 +53,14 @@ def draw_response(sensor: Sensor, *, seed: int, view: int) -> Response:
 
 
 def develop(
-    rgb: Rgb, sensor: Sensor, *, seed: int, view: int, frame: int, camera: Camera | None = None, scale: float = 1.0
+    rgb: Rgb,
+    sensor: SensorSection,
+    *,
+    seed: int,
+    view: int,
+    frame: int,
+    camera: Camera | None = None,
+    scale: float = 1.0,
 ) -> Rgb:
     """Apply the sensor of camera ``view`` to a picture; with all parameters at zero the picture is unchanged.
 
@@ -126,7 +133,7 @@ def compressed(rgb: Rgb, quality: int) -> Rgb:
     return cv2.cvtColor(decoded, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
 
 
-def _reduced(sensor: Sensor, scale: float) -> Sensor:
+def _reduced(sensor: SensorSection, scale: float) -> SensorSection:
     """Return the sensor of a reduced picture, in which each pixel is the mean of ``1 / scale^2`` pixels."""
     less = {
         key: scale * getattr(sensor, key) for key in ("shot_noise", "read_noise", "noise", "softness", "sharpening")

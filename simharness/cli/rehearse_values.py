@@ -11,8 +11,8 @@ import numpy as np
 from simharness.planning.rehearsal import Target
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
-from simharness.scenario.sections.detector import Detector
-from simharness.scenario.sections.room import Clutter
+from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.room import ClutterSection
 
 _ROOM_HEIGHT = 3.0  # metres, unless another is given
 
@@ -65,7 +65,7 @@ class Surroundings:
     volume: Volume | None = None
     obstacles: tuple[Obstacle, ...] = ()
     people: int | None = None
-    detector: Detector | None = None
+    detector: DetectorSection | None = None
 
 
 def surroundings_of(text: str) -> Surroundings:
@@ -113,20 +113,20 @@ def obstacle_of(text: str) -> Obstacle:
     return Obstacle(np.array([x, y, height / 2]), np.array([width, depth, height]))
 
 
-def clutter_of(texts: Sequence[str]) -> Clutter:
+def clutter_of(texts: Sequence[str]) -> ClutterSection:
     """Return the numbers of objects: "boxes=6", "shelves=1".
 
     Raises:
         ValueError: not of this form, or no such kind of objects.
     """
-    kinds = [name for name in Clutter.model_fields if name != "coverage"]
+    kinds = [name for name in ClutterSection.model_fields if name != "coverage"]
     numbers = {}
     for text in texts:
         kind, _, number = text.partition("=")
         if kind not in kinds or not number.isdecimal():
             raise ValueError(f"--clutter {text}: expected a kind and a number, boxes=6; kinds are {', '.join(kinds)}")
         numbers[kind] = int(number)
-    return Clutter(**numbers)
+    return ClutterSection(**numbers)
 
 
 def target_of(text: str) -> Target:

@@ -15,7 +15,7 @@ from simharness.cli.options import Overrides, ScenarioFile, Seed
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from simharness.scenario.resolution import Plan
+    from simharness.scenario.resolution import ScenarioPlan
 
 
 def add_to(app: typer.Typer) -> None:
@@ -76,7 +76,7 @@ def show(
     typer.echo(outline(plan, note) + needs, nl=False)
 
 
-def _needs(plan: Plan) -> str:
+def _needs(plan: ScenarioPlan) -> str:
     """Return the needs of the base as comments, with which the scenario can still be read; "" for an impossible rig."""
     from simharness.trial.needs import describe, needs_of
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
-from simharness.scenario.sections.detector import Bias
+from simharness.scenario.sections.detector import BiasSection
 from simharness.world.rigs.projection import project_to_image
 
 _LEFT_SHOULDER, _RIGHT_SHOULDER, _LEFT_HIP, _RIGHT_HIP = 5, 6, 11, 12
@@ -29,13 +29,13 @@ def body_axes(joints: ArrayLike) -> Floats:
     return np.stack([np.cross(left, up), left, up], axis=-2)
 
 
-def world_offsets(joints: ArrayLike, bias: Bias) -> Floats:
+def world_offsets(joints: ArrayLike, bias: BiasSection) -> Floats:
     """Return the offsets of the detector's joints from the anatomical joints (..., 17, 3), (..., 17, 3) metres."""
     in_body = np.array(bias.by_joint()) * np.stack([np.ones(17), SIDE, np.ones(17)], axis=1)
     return in_body @ body_axes(joints)
 
 
-def pixel_offsets(joints: Floats, bias: Bias, rig: Rig) -> Floats:
+def pixel_offsets(joints: Floats, bias: BiasSection, rig: Rig) -> Floats:
     """Return the same offsets in the pictures of V cameras: joints (T, P, 17, 3) metres to (T, V, P, 17, 2) pixels.
 
     The cameras are those of the first frame. Where cameras drift, this is a small error of a small offset.

@@ -22,7 +22,7 @@ from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import LIMB_OF_JOINT, Key, KeyedDraws, logistic
 from simharness.detector.steps import Context, StepStage, step
 from simharness.detector.view_geometry import hidden_shares
-from simharness.scenario.sections.detector import Boxes
+from simharness.scenario.sections.detector import BoxesSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility
 
@@ -48,7 +48,7 @@ def detect_people(block: DetectionBlock, context: Context) -> DetectionBlock:
 
 
 def apply_box_errors(
-    people: DetectionBlock, views: Views, rig: Rig, config: Boxes, draws: KeyedDraws
+    people: DetectionBlock, views: Views, rig: Rig, config: BoxesSection, draws: KeyedDraws
 ) -> DetectionBlock:
     """Return the detections of people in boxes.
 
@@ -97,7 +97,7 @@ def apply_box_errors(
 class _BoxErrors:
     """Draws of the errors of boxes, and everything that depends on these draws only."""
 
-    def __init__(self, views: Views, rig: Rig, config: Boxes, draws: KeyedDraws) -> None:
+    def __init__(self, views: Views, rig: Rig, config: BoxesSection, draws: KeyedDraws) -> None:
         self._views, self._config, self._draws = views, config, draws
         self._shape = views.boxes.shape[:3]
         self._image = np.array([camera.size for camera in rig], float).reshape(-1, 1, 2)

@@ -17,7 +17,7 @@ from simharness.detector.draws import KeyedDraws
 from simharness.detector.false_positives import MIN_JOINTS, bounding_box, false_positive_block, keypoint_scores
 from simharness.detector.phantom_poses import NORMALS, postures, project_upright
 from simharness.detector.steps import Context, StepStage, step
-from simharness.scenario.sections.detector import DecoyHits
+from simharness.scenario.sections.detector import DecoyHitsSection
 from simharness.types.views import Views
 
 _SCATTER = 0.2  # deviation of keypoints at the decoy's true joints, in units of OKS sigma x sqrt(area)
@@ -30,7 +30,7 @@ def add_decoy_hits(block: DetectionBlock, context: Context) -> DetectionBlock:
     return DetectionBlock.concatenate([block, hits])
 
 
-def draw_decoy_hits(views: Views, rig: Rig, config: DecoyHits, draws: KeyedDraws) -> DetectionBlock:
+def draw_decoy_hits(views: Views, rig: Rig, config: DecoyHitsSection, draws: KeyedDraws) -> DetectionBlock:
     """Draw which decoys are taken for people, in one slot for each of the D lookalikes.
 
     A decoy can be detected in a view where at least ``MIN_JOINTS`` of its joints are seen, and is then detected with
@@ -53,7 +53,9 @@ def draw_decoy_hits(views: Views, rig: Rig, config: DecoyHits, draws: KeyedDraws
     return false_positive_block(rig, len(views), where, keypoints, scores, origin=Origin.DECOY, number=slot)
 
 
-def _hits_of_decoy(views: Views, config: DecoyHits, draws: KeyedDraws, decoy: int) -> Iterator[tuple[NDArray, ...]]:
+def _hits_of_decoy(
+    views: Views, config: DecoyHitsSection, draws: KeyedDraws, decoy: int
+) -> Iterator[tuple[NDArray, ...]]:
     """Yield for each view the frame, view, slot, keypoints and scores of the hits of one decoy, (r, ...) each."""
     key = ("decoy", views.lookalikes.names[decoy])
     seen, pixels = views.lookalikes.visible[:, :, decoy], views.lookalikes.pixels[:, :, decoy]

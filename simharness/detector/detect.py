@@ -24,7 +24,7 @@ from simharness.detector.draws import KeyedDraws
 from simharness.detector.heatmaps import Peaks
 from simharness.detector.outer_joints import detect_outer_joints
 from simharness.detector.steps import Context, registered_steps
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.types.sequence import Sequence
 from simharness.types.truth import Truth
 from simharness.types.views import Views
@@ -59,7 +59,7 @@ def detect(
     sequence: Sequence,
     views: Views,
     rig: Rig,
-    config: Detector,
+    config: DetectorSection,
     *,
     seed: int,
     descriptors: DescriptorSettings | None = None,

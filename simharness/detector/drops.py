@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 from simharness.detector.bias import SIDE
 from simharness.detector.conditions import OCCLUDED, OUTSIDE, VISIBLE
-from simharness.scenario.sections.detector import BEARINGS, KIND_OF_JOINT, KINDS, Drop, Face
+from simharness.scenario.sections.detector import BEARINGS, KIND_OF_JOINT, KINDS, DropSection, FaceSection
 
 
-def drop_shares(drop: Drop, face: Face, occlusion: NDArray[np.int8], bearings: Floats | None) -> Floats:
+def drop_shares(drop: DropSection, face: FaceSection, occlusion: NDArray[np.int8], bearings: Floats | None) -> Floats:
     """Return the share of each joint that is not reported, (T, V, P, 17); for joints outside the image any value.
 
     Args:

@@ -19,7 +19,7 @@ from mvpose.heatmaps import Heatmaps
 from mvpose.kernels import njit
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.steps import Context, StepStage, step
-from simharness.scenario.sections.detector import HeatmapHead
+from simharness.scenario.sections.detector import HeatmapHeadSection
 from simharness.types.truth import KeypointError
 
 ASPECT = 3 / 4
@@ -49,7 +49,7 @@ class Peaks:
     keypoints: Floats
     scores: Floats
     rivals: Floats
-    config: HeatmapHead
+    config: HeatmapHeadSection
 
     def heatmaps(self) -> Heatmaps:
         """Draw the maps: the strongest modes are the keypoints, as high as their scores; the second are the rivals.

@@ -31,7 +31,7 @@ from simharness.detector.reported import ReportedJoints, last_pixels
 from simharness.detector.scatter import Scatter
 from simharness.detector.steps import Context, StepStage, step
 from simharness.detector.view_geometry import bearings, image_axes
-from simharness.scenario.sections.detector import Bias, Correlation, Keypoints
+from simharness.scenario.sections.detector import BiasSection, CorrelationSection, KeypointsSection
 from simharness.types.sequence import Sequence
 from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError
 from simharness.types.views import Views
@@ -62,7 +62,7 @@ class Keypoints2D:
 def set_keypoints(block: DetectionBlock, context: Context) -> DetectionBlock:
     """Move every person's keypoints to where the detector finds them."""
     config, rig = context.config, context.rig
-    offset = None if config.bias == Bias() else pixel_offsets(context.sequence.joints, config.bias, rig)
+    offset = None if config.bias == BiasSection() else pixel_offsets(context.sequence.joints, config.bias, rig)
     found = find_keypoints(
         context.views,
         context.conditions,
@@ -89,8 +89,8 @@ def find_keypoints(
     conditions: Conditions,
     sequence: Sequence,
     rig: Rig,
-    config: Keypoints,
-    correlation: Correlation,
+    config: KeypointsSection,
+    correlation: CorrelationSection,
     draws: KeyedDraws,
     *,
     kind: str = "top-down",
@@ -128,8 +128,8 @@ class _KeypointErrors:
         conditions: Conditions,
         joints: Floats,
         rig: Rig,
-        config: Keypoints,
-        correlation: Correlation,
+        config: KeypointsSection,
+        correlation: CorrelationSection,
         draws: KeyedDraws,
         kind: str,
     ) -> None:

@@ -32,7 +32,7 @@ from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.scatter import Scatter
 from simharness.detector.steps import Context
 from simharness.detector.view_geometry import image_axes
-from simharness.scenario.sections.detector import Bias
+from simharness.scenario.sections.detector import BiasSection
 from simharness.types.truth import KeypointError
 from simharness.types.whole_body import OuterTruth
 
@@ -128,7 +128,7 @@ def _places(
     t, v, who = where
     pixels = outer.views.pixels[t, v]  # (n, P, E, 2)
     target = context.views.pixels[t, v]
-    if context.config.bias != Bias():
+    if context.config.bias != BiasSection():
         target = target + pixel_offsets(context.sequence.joints, context.config.bias, context.rig)[t, v]
     target = target[:, :, anchors]  # (n, P, E, 2, 2)
     away = np.where(np.isin(error, _DISPLACED)[..., None], anchor - target[:, who], 0.0).mean(axis=-2)

@@ -18,7 +18,7 @@ from simharness.detector.draws import KeyedDraws
 from simharness.detector.false_positives import MIN_JOINTS, bounding_box, false_positive_block, keypoint_scores
 from simharness.detector.phantom_poses import NORMALS, postures, project_upright, rotate_about_z
 from simharness.detector.steps import Context, StepStage, step
-from simharness.scenario.sections.detector import Phantoms
+from simharness.scenario.sections.detector import PhantomsSection
 from simharness.types.views import Views, Visibility
 from simharness.world.rigs.projection import project_to_image
 
@@ -39,7 +39,7 @@ def add_phantoms(block: DetectionBlock, context: Context) -> DetectionBlock:
     return DetectionBlock.concatenate([block, drawn])
 
 
-def draw_phantoms(views: Views, rig: Rig, config: Phantoms, draws: KeyedDraws) -> DetectionBlock:
+def draw_phantoms(views: Views, rig: Rig, config: PhantomsSection, draws: KeyedDraws) -> DetectionBlock:
     """Draw the phantoms of all pictures.
 
     Their mean number in a view and frame, over all views, is ``config.rate``; a share ``config.views`` of them are
@@ -74,7 +74,7 @@ def _block(
 # ---- Figures in space.
 
 
-def _figures(rig: Rig, config: Phantoms, draws: KeyedDraws) -> DetectionBlock:
+def _figures(rig: Rig, config: PhantomsSection, draws: KeyedDraws) -> DetectionBlock:
     """Draw the figures in the room.
 
     A figure that c of V views contain counts c times. Therefore figures are kept with a probability proportional to
@@ -156,7 +156,7 @@ def viewed_area(rig: Rig) -> tuple[Floats, float]:
 # ---- Phantoms in one picture only.
 
 
-def _single_view(views: Views, rig: Rig, config: Phantoms, draws: KeyedDraws) -> DetectionBlock:
+def _single_view(views: Views, rig: Rig, config: PhantomsSection, draws: KeyedDraws) -> DetectionBlock:
     """Draw the phantoms of each view, independently of the other views."""
     rate = config.rate * (1 - config.views)
     rows: list[tuple[Integers, ...]] = []

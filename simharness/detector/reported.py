@@ -13,7 +13,7 @@ from simharness.detector.drops import drop_shares
 from simharness.detector.error_draws import ErrorDraws
 from simharness.detector.part_tree import with_parents
 from simharness.detector.view_geometry import head_bearings
-from simharness.scenario.sections.detector import Face, Keypoints
+from simharness.scenario.sections.detector import FaceSection, KeypointsSection
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,13 @@ class ReportedJoints:
     """Draws which joints of one person after the other are reported; the shares are computed once."""
 
     def __init__(
-        self, target: Floats, conditions: Conditions, joints: Floats, rig: Rig, config: Keypoints, errors: ErrorDraws
+        self,
+        target: Floats,
+        conditions: Conditions,
+        joints: Floats,
+        rig: Rig,
+        config: KeypointsSection,
+        errors: ErrorDraws,
     ) -> None:
         """Compute the shares.
 
@@ -49,7 +55,7 @@ class ReportedJoints:
         """
         self._target, self._conditions, self._border, self._errors = target, conditions, config.border, errors
         self._last = last_pixels(rig)
-        head = head_bearings(joints, rig) if config.face != Face() else None
+        head = head_bearings(joints, rig) if config.face != FaceSection() else None
         self._drop = drop_shares(config.drop, config.face, conditions.occlusion, head)
         guess = config.guess
         by_occlusion = (guess.visible, guess.self_occluded, guess.occluded, guess.outside)

@@ -15,7 +15,7 @@ from mvpose import COCO17
 from mvpose.arrays import Floats
 from simharness.detector.conditions import VISIBLE
 from simharness.detector.draws import Key, KeyedDraws
-from simharness.scenario.sections.detector import Correlation, Keypoints
+from simharness.scenario.sections.detector import CorrelationSection, KeypointsSection
 from simharness.types.truth import GOOD_BELOW
 
 
@@ -29,8 +29,8 @@ class Scatter:
         draws: draws of the sequence.
     """
 
-    config: Keypoints
-    correlation: Correlation
+    config: KeypointsSection
+    correlation: CorrelationSection
     draws: KeyedDraws
 
     def of_person(self, person: int, occlusion: NDArray[np.int8], axes: Floats) -> Floats:

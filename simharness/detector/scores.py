@@ -16,7 +16,7 @@ from simharness.detector.conditions import OUTSIDE, VISIBLE, Conditions
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import KeyedDraws, logistic
 from simharness.detector.steps import Context, StepStage, step
-from simharness.scenario.sections.detector import Correlation, Scores
+from simharness.scenario.sections.detector import CorrelationSection, ScoresSection
 from simharness.types.truth import KeypointError
 
 MIN_SCORE = 0.02
@@ -41,8 +41,8 @@ def score_keypoints(
     error: NDArray[np.int8],
     guessed: Bools,
     conditions: Conditions,
-    config: Scores,
-    correlation: Correlation,
+    config: ScoresSection,
+    correlation: CorrelationSection,
     draws: KeyedDraws,
 ) -> Floats:
     """Return the scores of everyone's keypoints, (T, V, P, J); 0 where not reported.

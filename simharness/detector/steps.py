@@ -4,28 +4,8 @@
 (:meth:`~simharness.detector.detection_block.DetectionBlock.of_people`) and runs every registered step on them, ordered
 by :class:`StepStage` and within a stage by :data:`MODULES`.
 
-How to add an error, for example keypoints that are rounded to whole pixels:
-
-1. Parameters: a model in ``simharness/scenario/sections/detector.py`` and one field of ``Detector`` with it, then
-   ``simharness schema --out scenarios/schema.json``. The default of every parameter means that the error does not
-   occur::
-
-       class Quantisation(Section):
-           pixels: Amount = Field(0.0, description="px, grid that keypoints are rounded to; 0: not rounded")
-
-       class Detector(Section):
-           quantisation: Quantisation = Quantisation()
-
-2. The step: one new file, ``simharness/detector/quantisation.py``::
-
-       @step("quantisation", stage=StepStage.DETECTIONS, sections=("quantisation",))
-       def quantise(block: DetectionBlock, context: Context) -> DetectionBlock:
-           grid = context.config.quantisation.pixels
-           if grid == 0:
-               return block
-           return replace(block, keypoints=grid * np.round(block.keypoints / grid))
-
-3. The registration: the name of that file in :data:`MODULES`, one line.
+An added error is a section of :mod:`simharness.scenario.sections.detector`, a field of ``DetectorSection`` with it, one
+file with the step, and its name in :data:`MODULES`: see "a detector error" in the documentation (extending).
 
 Rules for a step:
 
@@ -55,7 +35,7 @@ from mvpose.camera import Rig
 from simharness.detector.conditions import Conditions
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import KeyedDraws
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views
 
@@ -104,7 +84,7 @@ class Context:
     sequence: Sequence
     views: Views
     rig: Rig
-    config: Detector
+    config: DetectorSection
     draws: KeyedDraws
 
     @cached_property
@@ -146,16 +126,16 @@ def step(name: str, *, stage: StepStage, sections: tuple[str, ...] = ()) -> Call
         sections: sections of ``[detector]`` that it reads.
 
     Raises:
-        ValueError: the name is taken, or a section is no field of :class:`Detector`.
+        ValueError: the name is taken, or a section is no field of :class:`DetectorSection`.
     """
     if name in REGISTRY:
         raise ValueError(f"detector step {name!r} is registered twice; choose another name")
     for section in sections:
-        if section not in Detector.model_fields:
-            near = difflib.get_close_matches(section, Detector.model_fields, 1)
+        if section not in DetectorSection.model_fields:
+            near = difflib.get_close_matches(section, DetectorSection.model_fields, 1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
             raise ValueError(
-                f"detector step {name!r}: expected sections of [detector] ({', '.join(Detector.model_fields)}), "
+                f"detector step {name!r}: expected sections of [detector] ({', '.join(DetectorSection.model_fields)}), "
                 f"got {section!r}{hint}"
             )
 

@@ -35,7 +35,7 @@ from simharness.gate.baseline import GATED, TIME, Measurement
 from simharness.gate.pairs import Pairs, pairs_of
 from simharness.gate.score_tests import Tested, test_of
 from simharness.gate.trial_command import TrialKey
-from simharness.scenario.sections.gate import Gate
+from simharness.scenario.sections.gate import GateSection
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.paired_tests import holm
 
@@ -129,7 +129,7 @@ class Comparison:
         return tuple(change for change in self.changes if (change.variant, change.case) == (variant, case))
 
 
-def compare(before: Measurement, after: Measurement, gate: Gate) -> Comparison:
+def compare(before: Measurement, after: Measurement, gate: GateSection) -> Comparison:
     """Compare two measurements of one suite.
 
     Trials that only one of them has, because they failed in the other, are left out; the caller reports them.
@@ -156,7 +156,7 @@ def compare(before: Measurement, after: Measurement, gate: Gate) -> Comparison:
     return Comparison(tuple(changes), before.cases if families > 1 else ())
 
 
-def _allowed(score: str, gate: Gate, slowdown: float) -> Allowed:
+def _allowed(score: str, gate: GateSection, slowdown: float) -> Allowed:
     if score == TIME:
         return Allowed(math.log(slowdown), math.inf)
     return Allowed(gate.tolerance_of(score), gate.improvement_of(score))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from simharness.gate.compare import Change, Comparison
 from simharness.gate.trial_command import TrialKey
-from simharness.scenario.sections.gate import Gate
+from simharness.scenario.sections.gate import GateSection
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class GateResult:
 
     suite: str
     variants: tuple[str, ...]
-    gate: Gate
+    gate: GateSection
     comparison: Comparison
     failed: tuple[FailedCase, ...]
     trials: int

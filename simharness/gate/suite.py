@@ -17,7 +17,8 @@ from simharness.gate.gate_result import FailedCase
 from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.version import code_version
-from simharness.scenario.sections.scenario import Method, Scenario
+from simharness.scenario.sections.method import MethodSection
+from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study
 from simharness.study.measure import StoredTrial, TrialOutput
 from simharness.study.scheduler import TrialSuccess, Unit, run_units
@@ -126,7 +127,7 @@ def fingerprint(study: Study) -> str:
         "variants": study.variants,
     }
     lags = {setting.scenario.method.lag for setting in study.settings}
-    if TRACKING.intersection(map(without_repair, study.variants)) and lags != {Method().lag}:
+    if TRACKING.intersection(map(without_repair, study.variants)) and lags != {MethodSection().lag}:
         values["lags"] = [setting.scenario.method.lag for setting in study.settings]
     text = json.dumps(values, sort_keys=True)
     digest = hashlib.blake2b(digest_size=5)

@@ -14,8 +14,8 @@ from simharness.planning.scene_frame import SceneFrame
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.reality.validation.frame_scores import RULES, HeadRule
-from simharness.scenario.sections.detector import Detector
-from simharness.scenario.sections.room import Clutter
+from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.room import ClutterSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.world.humans.wearing import take_off
 from simharness.world.motion.poses.kinematics import Kinematics
@@ -57,8 +57,8 @@ class SceneSettings:
     rig: Rig
     volume: Volume
     people: int
-    detector: Detector
-    clutter: Clutter = field(default_factory=Clutter)
+    detector: DetectorSection
+    clutter: ClutterSection = field(default_factory=ClutterSection)
     obstacles: tuple[Obstacle, ...] = ()
     activities: tuple[str, ...] = ACTIVITIES
     frames: int = 8
@@ -144,7 +144,7 @@ def _moved(root: Floats, turn: Rotation, stretch: Floats) -> Floats:
     return np.concatenate([places, turned[:, [3, 0, 1, 2]]], axis=1)
 
 
-def has_objects(clutter: Clutter) -> bool:
+def has_objects(clutter: ClutterSection) -> bool:
     """Return whether there are objects."""
     return any(clutter.model_dump().values())
 

@@ -33,8 +33,8 @@ from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.reality.validation.subsets import camera_subsets
 from simharness.runtime.progress import Reporter, Silence
-from simharness.scenario.sections.detector import Detector
-from simharness.scenario.sections.room import Clutter
+from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.room import ClutterSection
 from simharness.statistics.intervals import Interval
 
 T = TypeVar("T")
@@ -88,11 +88,11 @@ class Question:
     name: str
     rig: Rig
     volume: Volume
-    detector: Detector
+    detector: DetectorSection
     people: int = 4
     room: Volume | None = None
     obstacles: tuple[Obstacle, ...] = ()
-    clutter: Clutter = field(default_factory=Clutter)
+    clutter: ClutterSection = field(default_factory=ClutterSection)
     target: Target = Target()
     subsets: bool = False
     seed: int = 0
@@ -101,12 +101,12 @@ class Question:
 def rehearse(
     rig: Rig,
     *,
-    detector: Detector,
+    detector: DetectorSection,
     volume: Volume | None = None,
     people: int = 4,
     room: Volume | None = None,
     obstacles: Sequence[Obstacle] = (),
-    clutter: Clutter | None = None,
+    clutter: ClutterSection | None = None,
     target: Target | None = None,
     subsets: bool = False,
     seed: int = 0,
@@ -149,7 +149,7 @@ def rehearse(
         people,
         room,
         tuple(obstacles),
-        Clutter() if clutter is None else clutter,
+        ClutterSection() if clutter is None else clutter,
         Target() if target is None else target,
         subsets,
         seed,

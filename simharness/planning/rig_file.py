@@ -9,7 +9,7 @@ from pathlib import Path
 from mvpose import Rig
 from mvpose.files.message_text import one_line
 from simharness.scenario.presets import RIGS, file_of, read_preset
-from simharness.scenario.sections.cameras import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
 from simharness.scenario.toml_files import read_toml
 from simharness.world.rigs.layouts import build_rig
 
@@ -36,7 +36,7 @@ def read_rig(
         raise ValueError(message if str(path) in message else f"{path}: {message}") from None
 
 
-def _cameras(path: str, size: tuple[int, int] | None) -> Cameras:
+def _cameras(path: str, size: tuple[int, int] | None) -> CamerasSection:
     sized = {} if size is None else {"size": list(size)}
     if not os.path.exists(path) and not Path(path).suffix:
         settings = read_preset(RIGS, file_of(RIGS, path, [Path()]))
@@ -45,11 +45,11 @@ def _cameras(path: str, size: tuple[int, int] | None) -> Cameras:
     else:
         settings = {"layout": "file", "file": path} | sized
     try:
-        return Cameras.model_validate_json(json.dumps(settings, default=str))
+        return CamerasSection.model_validate_json(json.dumps(settings, default=str))
     except ValueError as error:
         raise ValueError(one_line(f"{path}: {error}")) from None
 
 
 def _is_rig_file(path: Path) -> bool:
     """Return whether a TOML file has the keys of a section of cameras; else it is a calibration."""
-    return read_toml(path).keys() <= {*Cameras.model_fields, RIGS.key}
+    return read_toml(path).keys() <= {*CamerasSection.model_fields, RIGS.key}

@@ -20,7 +20,7 @@ from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import Key, KeyedDraws
 from simharness.detector.steps import Context, registered_steps
 from simharness.planning.standing_people import StandingScenes
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.types.random_streams import stream
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views
@@ -28,7 +28,9 @@ from simharness.types.views import Views
 _SHARED = "all"  # part of the key of draws that all views share
 
 
-def detect_in(camera: Camera, scenes: StandingScenes, views: Views, detector: Detector, *, seed: int) -> DetectionBlock:
+def detect_in(
+    camera: Camera, scenes: StandingScenes, views: Views, detector: DetectorSection, *, seed: int
+) -> DetectionBlock:
     """Return the detections of S scenes in one camera, (S, 1, slots); person q in slot q.
 
     Phantoms that stand in the room and would be seen by several cameras are drawn in each camera alone.
@@ -50,7 +52,7 @@ def detect_in(camera: Camera, scenes: StandingScenes, views: Views, detector: De
     return block
 
 
-def _independent(detector: Detector) -> Detector:
+def _independent(detector: DetectorSection) -> DetectorSection:
     """Return a profile without correlation in time, because the scenes are far apart."""
     lives = {"life": 0.0, "scatter_life": 0.0}
     return detector.model_copy(

@@ -25,7 +25,7 @@ from simharness.planning.scene_results import Condition, SceneResult, Scores
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.validation.frame_scores import RULES, score_frames
 from simharness.runtime.frame_pool import map_jobs
-from simharness.scenario.sections.cameras import Faults
+from simharness.scenario.sections.cameras import FaultsSection
 from simharness.scoring.matching import count_groups
 from simharness.scoring.pcp import Part
 from simharness.trial.stages.capture import CaptureFrames
@@ -216,16 +216,16 @@ def _estimates(
     return joints, groups, mixed
 
 
-def _clock_fault(condition: Condition) -> Faults:
+def _clock_fault(condition: Condition) -> FaultsSection:
     """Return the faults that change what the cameras record."""
-    return Faults(clock_offset=condition.level) if condition.fault == "clock_offset" else Faults()
+    return FaultsSection(clock_offset=condition.level) if condition.fault == "clock_offset" else FaultsSection()
 
 
-def _calibration_fault(condition: Condition) -> Faults:
+def _calibration_fault(condition: Condition) -> FaultsSection:
     """Return the faults that change the calibration that the method is given."""
     if condition.fault in ("rotation", "translation"):
-        return Faults.model_validate({condition.fault: condition.level})
-    return Faults()
+        return FaultsSection.model_validate({condition.fault: condition.level})
+    return FaultsSection()
 
 
 def _share_correct(parts: NDArray[np.int8]) -> Floats:

@@ -98,9 +98,9 @@ def pose_pool(activities: Sequence[str] = ACTIVITIES, *, children: float = 0.0, 
 def _pose_pool(activities: tuple[str, ...], children: float, seed: int) -> PosePool:
     from simharness.capture.body_outlines import Outline, even_directions
     from simharness.capture.ray_casting import RayCaster
-    from simharness.scenario.sections.cameras import Cameras
-    from simharness.scenario.sections.people import People
-    from simharness.scenario.sections.room import Clutter, Room
+    from simharness.scenario.sections.cameras import CamerasSection
+    from simharness.scenario.sections.people import PeopleSection
+    from simharness.scenario.sections.room import ClutterSection, RoomSection
     from simharness.scenario.sections.scenario import Scenario
     from simharness.world.rigs.layouts import build_rig
     from simharness.world.scene.build import build
@@ -110,10 +110,12 @@ def _pose_pool(activities: tuple[str, ...], children: float, seed: int) -> PoseP
         name="planning",
         seed=seed,
         duration=_LAST + 0.5,
-        room=Room.model_validate({"size": (2 * _AREA + 2, 2 * _AREA + 2, 3.0), "walls": False}),
-        people=People.model_validate({"count": _BODIES, "activities": activities, "area": _AREA, "children": children}),
-        clutter=Clutter(),
-        cameras=Cameras(),
+        room=RoomSection.model_validate({"size": (2 * _AREA + 2, 2 * _AREA + 2, 3.0), "walls": False}),
+        people=PeopleSection.model_validate(
+            {"count": _BODIES, "activities": activities, "area": _AREA, "children": children}
+        ),
+        clutter=ClutterSection(),
+        cameras=CamerasSection(),
     )
     scene = build(scenario, build_rig(scenario.cameras, seed=seed, room=None))
     ways = even_directions(_EXTREMES).T

@@ -23,7 +23,7 @@ from simharness.reality.detector_fit.consensus import Consensus
 from simharness.reality.detector_fit.frame_sums import lags
 from simharness.reality.detector_fit.tetrachoric import fit_noisy_life
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, SMOOTHING, TrackedPeople
-from simharness.scenario.sections.annotation import Annotation
+from simharness.scenario.sections.annotation import AnnotationSection
 from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
@@ -64,7 +64,7 @@ class AnnotationModel:
         return np.sqrt((self.shift**2).sum(axis=-1) + 3 * self.deviation**2)
 
     @classmethod
-    def drawn(cls, config: Annotation, actors: int, *, seed: int) -> Self:
+    def drawn(cls, config: AnnotationSection, actors: int, *, seed: int) -> Self:
         """Return the errors of a simulated annotation of A actors, whose shifts are drawn.
 
         Args:

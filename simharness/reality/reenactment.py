@@ -23,7 +23,7 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.people_tracks import TrackedPeople
 from simharness.runtime.progress import Silence
 from simharness.runtime.stages import Stages
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import Simulation, capture_trial
@@ -78,7 +78,7 @@ class Film:
         """True joints in the recording's world, COCO-17, (F, P, 17, 3) metres; NaN where absent."""
         return self.sequence.of_skeleton(COCO17) + [0.0, 0.0, self.floor]
 
-    def detected(self, config: Detector, *, seed: int) -> list[Detections]:
+    def detected(self, config: DetectorSection, *, seed: int) -> list[Detections]:
         """Return the detections of a simulated detector in each frame.
 
         The limbs are where the recording's detector found them, so that its bias of limbs is not added once more.

@@ -9,16 +9,16 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from simharness.scenario.sections.cameras import Cameras, Sensor
-from simharness.scenario.sections.detector import Detector
-from simharness.scenario.sections.gate import Gate
+from simharness.scenario.sections.cameras import CamerasSection, SensorSection
+from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.gate import GateSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.size import MOST_TRIALS
 
 Seed = Annotated[int, Field(ge=0, lt=2**53)]
 
 
-class CamerasSection(Cameras):
+class CamerasFileSection(CamerasSection):
     """[cameras] of a file."""
 
     rig: str = Field(
@@ -27,7 +27,7 @@ class CamerasSection(Cameras):
     )
 
 
-class SensorSection(Sensor):
+class SensorFileSection(SensorSection):
     """[sensor] of a file."""
 
     profile: str = Field(
@@ -37,7 +37,7 @@ class SensorSection(Sensor):
     )
 
 
-class DetectorSection(Detector):
+class DetectorFileSection(DetectorSection):
     """[detector] of a file."""
 
     profile: str = Field(
@@ -60,9 +60,9 @@ class ScenarioFile(Scenario):
         | Annotated[tuple[Seed, ...], Field(min_length=1, max_length=MOST_TRIALS)]
     ) = Field(1, description="number of seeds, from the scenario's seed on, or a list of seeds")
     variants: tuple[str, ...] = Field((), max_length=100, description="the same as method.variants")
-    cameras: CamerasSection = CamerasSection()
-    sensor: SensorSection = SensorSection()
-    detector: DetectorSection = DetectorSection()
+    cameras: CamerasFileSection = CamerasFileSection()
+    sensor: SensorFileSection = SensorFileSection()
+    detector: DetectorFileSection = DetectorFileSection()
     sweep: dict[str, Any] = Field({}, description="keys of a scenario, each with a list or a range of values")
     cases: dict[str, dict[str, Any]] = Field({}, description="named changes, each run with every setting of the sweep")
-    gate: Gate = Gate()
+    gate: GateSection = GateSection()

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from simharness.scenario.layers import leaves
-from simharness.scenario.resolution import Plan
+from simharness.scenario.resolution import ScenarioPlan
 from simharness.scenario.sweep import Axis
 from simharness.scenario.toml_files import dumps
 
@@ -18,7 +18,7 @@ _LAID_OUT = ("count", "heights", "spread", "spacing", "positions", "aims", "fov"
 _WITHOUT_EFFECT = {"file": _LAID_OUT, "preset": (*_LAID_OUT, "radius", "height", "start", "aim", "size")}
 
 
-def outline(plan: Plan, note: str = "") -> str:
+def outline(plan: ScenarioPlan, note: str = "") -> str:
     """Return the base as TOML, which :func:`simharness.scenario.load.load` reads back; above it what a study varies.
 
     Args:
@@ -31,7 +31,7 @@ def outline(plan: Plan, note: str = "") -> str:
     return f"{comments}\n{dumps(plan.base)}" if comments else dumps(plan.base)
 
 
-def _unused(plan: Plan) -> list[str]:
+def _unused(plan: ScenarioPlan) -> list[str]:
     """Return lines about the keys of [cameras] that have no effect on a rig of a file or a preset."""
     layout = plan.base.cameras.layout
     if layout not in _WITHOUT_EFFECT:
@@ -42,7 +42,7 @@ def _unused(plan: Plan) -> list[str]:
     return textwrap.wrap(text, _WIDTH)
 
 
-def _lines(plan: Plan, note: str) -> list[str]:
+def _lines(plan: ScenarioPlan, note: str) -> list[str]:
     variants = plan.base.method.variants
     lines = [
         f"{plan.base.name}: {_count(plan.settings, 'setting')} x {_count(len(plan.seeds), 'seed')} = "

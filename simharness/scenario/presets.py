@@ -23,8 +23,8 @@ from mvpose.files.input_files import SETTINGS, read_bytes
 from mvpose.files.message_text import all_in_one_line, listed, shown
 from simharness.scenario.layers import Origins, merge
 from simharness.scenario.named_files import locate_files
-from simharness.scenario.sections.cameras import Cameras, Sensor
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.cameras import CamerasSection, SensorSection
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.scenario.sections.section import Section
 from simharness.scenario.shipped import shipped_folder
 from simharness.scenario.toml_files import ScenarioError, read_toml
@@ -32,7 +32,7 @@ from simharness.scenario.validation_messages import explain_all
 
 
 @dataclass(frozen=True)
-class Kind:
+class PresetKind:
     """Kind of preset.
 
     Attributes:
@@ -67,13 +67,13 @@ class Kind:
         return section.get(self.key, "" if "name" in section else self.default)
 
 
-PROFILES = Kind("detector", "profile", "detector profile", "detectors", Detector, "typical")
-RIGS = Kind("cameras", "rig", "rig", "rigs", Cameras, "")
-SENSORS = Kind("sensor", "profile", "sensor profile", "sensors", Sensor, "machine-vision")
+PROFILES = PresetKind("detector", "profile", "detector profile", "detectors", DetectorSection, "typical")
+RIGS = PresetKind("cameras", "rig", "rig", "rigs", CamerasSection, "")
+SENSORS = PresetKind("sensor", "profile", "sensor profile", "sensors", SensorSection, "machine-vision")
 KINDS = (PROFILES, RIGS, SENSORS)
 
 
-def file_of(kind: Kind, name: str, folders: Sequence[Path], *, near: Path = Path()) -> Path:
+def file_of(kind: PresetKind, name: str, folders: Sequence[Path], *, near: Path = Path()) -> Path:
     """Return the file of a preset.
 
     Args:
@@ -100,7 +100,7 @@ def file_of(kind: Kind, name: str, folders: Sequence[Path], *, near: Path = Path
     )
 
 
-def read_preset(kind: Kind, path: Path, *, above: tuple[Path, ...] = ()) -> dict[str, Any]:
+def read_preset(kind: PresetKind, path: Path, *, above: tuple[Path, ...] = ()) -> dict[str, Any]:
     """Return the settings of a preset's file, merged over those of the preset with which it begins.
 
     Args:
@@ -131,7 +131,7 @@ def read_preset(kind: Kind, path: Path, *, above: tuple[Path, ...] = ()) -> dict
     return settings
 
 
-def read_profile(name: str, *, folder: Path | None = None) -> Detector:
+def read_profile(name: str, *, folder: Path | None = None) -> DetectorSection:
     """Read a detector profile.
 
     Args:
@@ -143,7 +143,7 @@ def read_profile(name: str, *, folder: Path | None = None) -> Detector:
     """
     folder = folder or Path()
     settings = read_preset(PROFILES, file_of(PROFILES, name, [folder], near=folder))
-    return Detector.model_validate_json(json.dumps(settings, default=str), strict=True)
+    return DetectorSection.model_validate_json(json.dumps(settings, default=str), strict=True)
 
 
 def summary_of(path: Path) -> str:
@@ -186,7 +186,7 @@ class Presets:
             data = {**data, kind.section: merge(settings, changes)}
         return data
 
-    def _settings(self, kind: Kind, name: Any, origins: Origins) -> dict[str, Any]:
+    def _settings(self, kind: PresetKind, name: Any, origins: Origins) -> dict[str, Any]:
         if name == "":
             return {}
         origin = origins.get((kind.section, kind.key))

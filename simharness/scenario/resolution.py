@@ -19,7 +19,7 @@ from mvpose.files.message_text import all_in_one_line, shown
 from simharness.scenario.document import Document, read_document
 from simharness.scenario.layers import Origins, leaves, merge, nested, set_origin
 from simharness.scenario.presets import KINDS, Presets, merge_with_presets
-from simharness.scenario.sections.gate import Gate
+from simharness.scenario.sections.gate import GateSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.sections.section import Section
 from simharness.scenario.size import MOST_TRIALS, oversized
@@ -29,7 +29,7 @@ from simharness.scenario.validation_messages import explain_all, origin_of
 
 
 @dataclass(frozen=True)
-class Case:
+class ScenarioCase:
     """Named change of the base; the base itself in a file without cases.
 
     Attributes:
@@ -50,7 +50,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Plan:
+class ScenarioPlan:
     """Resolved scenario file: the base scenario, and what is varied.
 
     Attributes:
@@ -66,8 +66,8 @@ class Plan:
     base: Scenario
     seeds: Sequence[int]
     sweep: Sweep
-    cases: tuple[Case, ...]
-    gate: Gate
+    cases: tuple[ScenarioCase, ...]
+    gate: GateSection
 
     @property
     def settings(self) -> int:
@@ -123,13 +123,13 @@ class Resolver:
         }
         return scenario.model_copy(update=shared)
 
-    def gate(self, data: Any, origins: Origins) -> Gate:
+    def gate(self, data: Any, origins: Origins) -> GateSection:
         """Return the section [gate]."""
         try:
-            return Gate.model_validate_json(json.dumps(data, default=str), strict=True)
+            return GateSection.model_validate_json(json.dumps(data, default=str), strict=True)
         except ValidationError as error:
             self._mistakes += explain_all(error, origins, self._file, section=("gate",))
-            return Gate()
+            return GateSection()
 
 
 def refuse(mistakes: Sequence[str]) -> None:
@@ -148,7 +148,7 @@ def read_plan(
     seeds: int | Sequence[int] | None = None,
     variants: Sequence[str] | None = None,
     folder: Path | None = None,
-) -> Plan:
+) -> ScenarioPlan:
     """Read and resolve a scenario file.
 
     Args:
@@ -188,7 +188,7 @@ def read_plan(
                 resolver.scenario(*vary(data, origins, sweep, dict(zip(axis.keys, values, strict=True))))
     refuse(mistakes)
     assert base is not None
-    return Plan(document, base, all_seeds, sweep, tuple(filter(None, cases)), gate)
+    return ScenarioPlan(document, base, all_seeds, sweep, tuple(filter(None, cases)), gate)
 
 
 def vary(
@@ -231,7 +231,7 @@ def value_at(scenario: Scenario, data: Mapping[str, Any], key: str) -> Value:
 
 def _case(
     name: str, changes: dict[str, Any], data: dict[str, Any], sweep: Sweep, reader: SweepReader, resolver: Resolver
-) -> Case | None:
+) -> ScenarioCase | None:
     origins = dict(reader.origins)
     for key in leaves(changes):
         set_origin(origins, key, reader.origin(("cases", name, *key)))
@@ -240,7 +240,7 @@ def _case(
     if scenario is None:
         return None
     values = {key: value_at(scenario, data, key) for key in sweep.keys}
-    return Case(name, data, origins, changes, scenario, values)
+    return ScenarioCase(name, data, origins, changes, scenario, values)
 
 
 def _seeds(data: dict[str, Any], document: Document, mistakes: list[str]) -> Sequence[int]:

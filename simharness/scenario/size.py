@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from mvpose.detections import MOST_DETECTIONS
-from simharness.scenario.sections.cameras import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
 from simharness.scenario.sections.scenario import Scenario
 
 MOST_FRAMES = 100_000
@@ -21,7 +21,7 @@ MOST_TRIALS = 1_000_000
 """Largest number of trials of a study, and of its seeds."""
 
 
-def camera_count(cameras: Cameras) -> int | None:
+def camera_count(cameras: CamerasSection) -> int | None:
     """Return the number of cameras of a rig; None where a published rig or a file determines it."""
     if cameras.layout in ("preset", "file"):
         return len(cameras.only) or None

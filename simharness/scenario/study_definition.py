@@ -35,8 +35,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from simharness.scenario.resolution import Plan, Resolver, read_plan, refuse, value_at, vary
-from simharness.scenario.sections.gate import Gate
+from simharness.scenario.resolution import Resolver, ScenarioPlan, read_plan, refuse, value_at, vary
+from simharness.scenario.sections.gate import GateSection
 from simharness.scenario.sections.method import wrong_variants
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.size import MOST_TRIALS
@@ -98,7 +98,7 @@ class Study:
     factors: tuple[str, ...]
     one_at_a_time: bool
     settings: tuple[Setting, ...]
-    gate: Gate
+    gate: GateSection
     path: Path
     base: Scenario
     data: Mapping[str, Any] = field(default_factory=dict)
@@ -163,7 +163,7 @@ def load_study(
     )
 
 
-def _settings(plan: Plan) -> Iterator[Setting]:
+def _settings(plan: ScenarioPlan) -> Iterator[Setting]:
     """Yield every setting; at the end, raise the mistakes of all of them."""
     mistakes: list[str] = []
     resolver = Resolver(plan.document, mistakes)
@@ -179,13 +179,13 @@ def _settings(plan: Plan) -> Iterator[Setting]:
     refuse(mistakes)
 
 
-def _check_variants(plan: Plan) -> None:
+def _check_variants(plan: ScenarioPlan) -> None:
     for key, message in wrong_variants(plan.base.method):
         origin = origin_of(("method", *key.split(".")), plan.document.origins, str(plan.document.path))
         raise ScenarioError(f"{origin}: {key if key == 'variants' else f'method.{key}'}: {message}")
 
 
-def _without_descriptors(scenario: Scenario, plan: Plan) -> list[str]:
+def _without_descriptors(scenario: Scenario, plan: ScenarioPlan) -> list[str]:
     """Return a message about variants that need descriptors in a scenario without them."""
     from mvpose.presets import NEED_DESCRIPTORS, without_repair
 
@@ -198,5 +198,5 @@ def _without_descriptors(scenario: Scenario, plan: Plan) -> list[str]:
     ]
 
 
-def _origin_of_variants(plan: Plan) -> str:
+def _origin_of_variants(plan: ScenarioPlan) -> str:
     return origin_of(("method", "variants"), plan.document.origins, str(plan.document.path))

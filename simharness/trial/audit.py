@@ -12,7 +12,8 @@ import numpy as np
 from mvpose import Camera
 from mvpose.arrays import Floats
 from simharness.runtime.errors import RunError
-from simharness.scenario.sections.scenario import Cameras, Faults, Scenario
+from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
+from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.capture import picture_source_of
 from simharness.types.random_streams import stream
 from simharness.types.sequence import Sequence
@@ -71,11 +72,11 @@ def sampled_pictures(exposures: ExposureSchedule, seed: int) -> list[tuple[int, 
 
 
 def check_clocks(
-    faults: Faults,
+    faults: FaultsSection,
     exposures: ExposureSchedule,
     time: Floats,
     *,
-    cameras: Cameras | None = None,
+    cameras: CamerasSection | None = None,
     period: float = 0.0,
 ) -> None:
     """Check that the time of every picture agrees with the parameters of sections [faults] and [cameras].
@@ -90,7 +91,7 @@ def check_clocks(
     Raises:
         AuditError: a picture at another time, a dead camera that delivers, a frozen picture of a later time.
     """
-    cameras = cameras or Cameras()
+    cameras = cameras or CamerasSection()
     taken = exposures.delivered
     nominal = time[np.where(taken, exposures.source, 0)]
     late = np.where(taken, exposures.time - nominal, 0.0)
@@ -120,7 +121,7 @@ def check_clocks(
             raise AuditError(f"clocks: camera {camera} delivers pictures, but faults.dead contains it")
 
 
-def check_calibration(faults: Faults, exposures: ExposureSchedule) -> None:
+def check_calibration(faults: FaultsSection, exposures: ExposureSchedule) -> None:
     """Check that true and believed cameras differ by no more than the parameters of section [faults] allow.
 
     Raises:

@@ -14,7 +14,7 @@ import simharness
 from mvpose.wholebody import read_skeleton
 from simharness.planning.candidates import candidates_in
 from simharness.planning.room_file import read_room
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 
 
 def test_every_block_is_tested_here():
@@ -24,7 +24,9 @@ def test_every_block_is_tested_here():
 
 def test_the_shares_of_the_face_are_valid():
     (block,) = {block for block in blocks("toml") if block.startswith("[keypoints.face]\n")}
-    assert Detector.model_validate(tomllib.loads(block)).keypoints.face.ears[9] == 0.99  # 270 degrees: the far side
+    assert (
+        DetectorSection.model_validate(tomllib.loads(block)).keypoints.face.ears[9] == 0.99
+    )  # 270 degrees: the far side
 
 
 def test_the_room_of_the_plan_is_read_and_has_places(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.sensor import develop
-from simharness.scenario.sections.cameras import Sensor
+from simharness.scenario.sections.cameras import SensorSection
 from tools.reid import code_digest
 from tools.reid.crops import FILL, SIZE, Crops, Recipe, azimuths, crops_of_boxes, crops_of_group, jitter_boxes
 from tools.reid.filming_sites import SIZE as PICTURE
@@ -135,13 +135,13 @@ def test_sensors_are_drawn_around_their_profile():
             assert (np.std(values) > 0) == (getattr(base, key) > 0)
         assert all((sensor.jpeg > 0) == (base.jpeg > 0) for sensor in sensors)
         assert {sensor.mosaic for sensor in sensors} == {base.mosaic}
-    assert draw_sensor(rng, "perfect", 0.0) == Sensor()
+    assert draw_sensor(rng, "perfect", 0.0) == SensorSection()
 
 
 def test_crops_have_the_vignetting_of_their_place_in_the_picture(site):
     """A crop of a developed picture at the edge is darker than one in the middle by the cos^4 law."""
     camera, gray = site.cameras[0], np.full((*PICTURE[::-1], 3), 150, np.uint8)
-    picture = develop(gray, Sensor(vignetting=1.0), seed=0, view=0, frame=0, camera=camera)
+    picture = develop(gray, SensorSection(vignetting=1.0), seed=0, view=0, frame=0, camera=camera)
     middle, corner = crops_of_boxes(picture, np.array([[226.0, 162.0, 60.0, 60.0], [0.0, 0.0, 20.0, 20.0]]))
     angle = np.arctan(np.hypot(255.5 - 9.5, 191.5 - 9.5) / camera.K[0, 0])
     expected = 150 * np.cos(angle) ** (

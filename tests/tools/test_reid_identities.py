@@ -3,7 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scenario.sections.scenario import Cameras, People, Scenario
+from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.scenario import Scenario
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape
 from simharness.world.motion.paths import Spot
@@ -47,9 +49,9 @@ def test_runs_and_counts_out_of_range_are_refused(run, count):
 
 
 def test_identities_are_the_people_of_a_scenario_of_that_seed():
-    people = People(count=3, activities=("stand",), children=CHILDREN, look_alike=0.6)
+    people = PeopleSection(count=3, activities=("stand",), children=CHILDREN, look_alike=0.6)
     scenario = Scenario(name="same", seed=41, duration=0.1, people=people)
-    scene = build(scenario, build_rig(Cameras(count=2)))
+    scene = build(scenario, build_rig(CamerasSection(count=2)))
     for size in (3, 5):
         for person in dressed_people(Group(41, size, look_alike=0.6), range(3)):
             body, shown = scene.bodies[person.person], scene.figures[person.person]

@@ -11,8 +11,8 @@ from functools import lru_cache
 import numpy as np
 
 from mvpose.camera import Camera
-from simharness.scenario.sections.cameras import Sensor
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.cameras import SensorSection
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
@@ -44,13 +44,13 @@ class Site:
     """
 
     seed: int
-    room: Room
+    room: RoomSection
     meshes: tuple[Mesh, ...]
     furniture: tuple[Box, ...]
     lighting: Lighting
     cameras: tuple[Camera, ...]
     profile: str
-    sensors: tuple[Sensor, ...]
+    sensors: tuple[SensorSection, ...]
 
 
 @lru_cache(maxsize=2)  # renderers keep the light of the same meshes
@@ -79,7 +79,7 @@ def make_site(seed: int, *, views: int, casts: tuple[float, float] = (1.0, 1.0))
     )
 
 
-def _cameras(rng: np.random.Generator, room: Room, views: int) -> tuple[Camera, ...]:
+def _cameras(rng: np.random.Generator, room: RoomSection, views: int) -> tuple[Camera, ...]:
     """Draw cameras in independent directions around the centre, within the walls and below the ceiling."""
     bearing = rng.uniform(-np.pi, np.pi, views)
     distance, height, fov = (rng.uniform(*span, views) for span in (_DISTANCE, _HEIGHT, _FOV))

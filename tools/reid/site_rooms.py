@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.camera import Camera, Rig
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.world.scene.objects.geoms import Box
@@ -46,22 +46,22 @@ class SiteRoom:
         furniture: bounding boxes of the furniture.
     """
 
-    room: Room
+    room: RoomSection
     meshes: tuple[Mesh, ...]
     lighting: Lighting
     furniture: tuple[Box, ...]
 
 
-def draw_room(rng: np.random.Generator) -> Room:
+def draw_room(rng: np.random.Generator) -> RoomSection:
     """Draw size, kind and walls of a room; finishes and light are drawn from the seed of the site."""
     x, y = 2 * rng.uniform(*_HALF, 2)
     z = rng.uniform(*_HEIGHT)
     is_open, is_bare_floor = rng.random() < _OPEN, rng.random() < 0.5
     kind = "laboratory" if is_open and is_bare_floor else "outdoors" if is_open else "any"
-    return Room(size=(float(x), float(y), float(z)), walls=not is_open, kind=kind, light="any")
+    return RoomSection(size=(float(x), float(y), float(z)), walls=not is_open, kind=kind, light="any")
 
 
-def furnish(rng: np.random.Generator, room: Room, seed: int, cameras: Sequence[Camera]) -> SiteRoom:
+def furnish(rng: np.random.Generator, room: RoomSection, seed: int, cameras: Sequence[Camera]) -> SiteRoom:
     """Furnish and light a room around the places of people and the cameras, in the order of scenarios.
 
     Args:
@@ -87,7 +87,7 @@ def furnish(rng: np.random.Generator, room: Room, seed: int, cameras: Sequence[C
     )
 
 
-def _free_space(room: Room, rig: Rig) -> FreeSpace:
+def _free_space(room: RoomSection, rig: Rig) -> FreeSpace:
     """Return the space that furniture can use: the area in which people stand must be free and visible."""
     places = np.linspace(-REACH, REACH, 3)
     columns = np.meshgrid(places, places, np.linspace(0.1, _TALL, 6), indexing="ij")

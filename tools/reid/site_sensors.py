@@ -7,12 +7,12 @@ from functools import cache
 import numpy as np
 
 from simharness.scenario.presets import SENSORS, read_preset
-from simharness.scenario.sections.cameras import Sensor
+from simharness.scenario.sections.cameras import SensorSection
 
 PROFILES = {"machine-vision": 0.3, "webcam": 0.25, "phone": 0.2, "action": 0.15, "perfect": 0.1}
 """Fraction of sites whose cameras are like those of a profile."""
 
-SENSOR_SPREAD = Sensor(gain=0.10, white_balance=0.12, exposure=0.35)
+SENSOR_SPREAD = SensorSection(gain=0.10, white_balance=0.12, exposure=0.35)
 """Differences between cameras of one site: contrast 10 %, red and blue 12 %, exposure a third of a stop.
 
 They are larger than those of any profile, as between cameras of several makers or that expose for themselves.
@@ -30,7 +30,7 @@ def draw_profile(rng: np.random.Generator) -> str:
     return str(rng.choice(list(PROFILES), p=list(PROFILES.values())))
 
 
-def draw_sensor(rng: np.random.Generator, profile: str, strength: float) -> Sensor:
+def draw_sensor(rng: np.random.Generator, profile: str, strength: float) -> SensorSection:
     """Draw a sensor around a profile, with ``strength`` times :data:`SENSOR_SPREAD` as the spread of its response.
 
     Pictures of video are compressed by more than the profiles' JPEG, so the quality varies; cameras without
@@ -42,7 +42,7 @@ def draw_sensor(rng: np.random.Generator, profile: str, strength: float) -> Sens
         for key, factor in zip(_VARIED, np.exp(rng.normal(0.0, _SPREAD, len(_VARIED))), strict=True)
     }
     quality, noise, is_noisy = rng.normal(base.jpeg, _JPEG), rng.uniform(*_NOISE), rng.random() < _NOISY
-    return Sensor(
+    return SensorSection(
         **values,
         mosaic=base.mosaic,
         jpeg=int(np.clip(quality, _WORST, 97)) if base.jpeg else 0,
@@ -54,6 +54,6 @@ def draw_sensor(rng: np.random.Generator, profile: str, strength: float) -> Sens
 
 
 @cache
-def shipped_sensor(profile: str) -> Sensor:
+def shipped_sensor(profile: str) -> SensorSection:
     """Return a shipped sensor profile."""
-    return Sensor(**read_preset(SENSORS, SENSORS.shipped / f"{profile}.toml"))
+    return SensorSection(**read_preset(SENSORS, SENSORS.shipped / f"{profile}.toml"))

@@ -27,7 +27,7 @@ from simharness.outputs.study.failure_section import failure_section
 from simharness.outputs.study.losses import LOST, Loss, finding, losses
 from simharness.outputs.study.worst_frames import WorstFramePictures, show, worst_frames
 from simharness.runtime.progress import duration
-from simharness.scenario.sections.cameras import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
 from simharness.scoring.catalogue import SCORES
 from simharness.study.causes.blame_file import read_blame
 from simharness.study.causes.cause_shares import Blame
@@ -169,7 +169,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
     return [*facts, ("time", f"{duration(info['seconds'])}{kept}"), ("version", f"{info['code']}")]
 
 
-def _rig(cameras: Cameras) -> str | int:
+def _rig(cameras: CamerasSection) -> str | int:
     if cameras.layout in ("preset", "file"):
         return cameras.preset or Path(cameras.file).name
     return len(cameras.positions) if cameras.layout == "free" else cameras.count

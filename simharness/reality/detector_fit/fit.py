@@ -19,7 +19,7 @@ from simharness.reality.detector_fit.profile import as_toml, settings
 from simharness.reality.detector_fit.sample import Sample, sample_of
 from simharness.reality.people_tracks import TrackedPeople, track_people
 from simharness.reality.reenactment import Film, film
-from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, Detector
+from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, DetectorSection
 
 _TWINS = 2  # simulated in each round of the calibration
 _FEWEST = 100  # joints behind a value that is calibrated: Shelf has 130 reported shoulders that others hide
@@ -42,7 +42,7 @@ class Fit:
     annotation: AnnotationFit
     people: TrackedPeople
     film: Film
-    profile: Detector
+    profile: DetectorSection
     text: str
 
 
@@ -81,14 +81,14 @@ def fit(
     bias[:3] = face_bias(people.joints, filmed.joints)
 
     def simulate(values: Mapping[str, float]) -> list[Sample]:
-        profile = Detector.model_validate(settings(real.with_values(values), name=name, bias=bias))
+        profile = DetectorSection.model_validate(settings(real.with_values(values), name=name, bias=bias))
         twins = (replace(recording, detections=tuple(filmed.detected(profile, seed=1 + k))) for k in range(_TWINS))
         return [sample_of(twin, people, filmed) for twin in twins]
 
     counted = {key: each.value for key, each in real.values.items() if each.count >= _FEWEST}
     rare = {key: each.value for key, each in real.values.items() if key not in counted}
     calibrated = real.with_values({**calibrate(counted, lambda values: simulate({**values, **rare})), **rare})
-    profile = Detector.model_validate(settings(calibrated, name=name, bias=bias))
+    profile = DetectorSection.model_validate(settings(calibrated, name=name, bias=bias))
     text = as_toml(calibrated, name=name, bias=bias, command=command)
     return Fit(real, annotation, people, filmed, profile, text)
 

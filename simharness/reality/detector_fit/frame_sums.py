@@ -15,12 +15,12 @@ from simharness.detector.error_draws import GROSS
 from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints
 from simharness.reality.detector_fit.tetrachoric import correlation_grid, joint_probability
 from simharness.reality.people_tracks import LIMB_JOINTS
-from simharness.scenario.sections.detector import BEARINGS, KIND_OF_JOINT, KINDS, Keypoints
+from simharness.scenario.sections.detector import BEARINGS, KIND_OF_JOINT, KINDS, KeypointsSection
 from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError
 
 FrameSums = dict[str, Floats]
 
-REACH = 1.15 * float(Keypoints().reach)
+REACH = 1.15 * float(KeypointsSection().reach)
 """Distance, in units, from which a miss is a stray: the reach of misses and 15 % for errors of the unit."""
 
 LOGITS = np.linspace(-5.0, 5.0, 101)

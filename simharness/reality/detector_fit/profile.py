@@ -10,7 +10,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.reality.detector_fit.measure import MeasuredDetector, MeasuredValue
-from simharness.scenario.sections.detector import KINDS, LARGEST_MULTIPLE, Detector
+from simharness.scenario.sections.detector import KINDS, LARGEST_MULTIPLE, DetectorSection
 
 _FACE_DROPS = ("keypoints.drop.visible", "keypoints.drop.self_occluded")
 
@@ -78,7 +78,7 @@ def settings(measurement: MeasuredDetector, *, name: str, bias: Floats | None = 
     if bias is not None:
         rows = np.round(bias, 4) + 0.0  # no minus zero
         result["bias"] = {kind: row.tolist() for kind, row in zip(KINDS, rows, strict=True)}
-    return Detector.model_validate(result).model_dump(mode="json", exclude_unset=True)
+    return DetectorSection.model_validate(result).model_dump(mode="json", exclude_unset=True)
 
 
 def as_toml(measurement: MeasuredDetector, *, name: str, bias: Floats | None = None, command: str = "") -> str:

@@ -9,7 +9,7 @@ from pydantic import Field
 from simharness.scenario.sections.section import Section, Share, Span, Spread
 
 
-class Annotation(Section):
+class AnnotationSection(Section):
     """Errors of an annotated truth, as published data sets have them; the default is the exact truth.
 
     The truth of recordings is clicked by people. These errors change only the truth by which a recording is scored:

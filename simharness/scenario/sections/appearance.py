@@ -9,7 +9,7 @@ from pydantic import Field
 from simharness.scenario.sections.section import Section
 
 
-class Appearance(Section):
+class AppearanceSection(Section):
     """Source of the descriptors of detections."""
 
     source: Literal["none", "pictures", "drawn"] = Field(

@@ -40,7 +40,7 @@ View = Annotated[int, Field(ge=0, lt=MOST_CAMERAS)]
 Term = Annotated[float, Field(ge=-1000.0, le=1000.0)]  # of a lens; those of fisheye lenses are about 10
 
 
-class Cameras(Section):
+class CamerasSection(Section):
     """The rig."""
 
     layout: Layout = Field("ring", description="preset: a published rig; file: a calibration file of the user")
@@ -111,7 +111,7 @@ class Cameras(Section):
     )
 
 
-class Faults(Section):
+class FaultsSection(Section):
     """Faults of the rig that the method does not know of, drawn for each camera.
 
     Errors are in the believed calibration; drifts move the true cameras away from it.
@@ -156,7 +156,7 @@ class Faults(Section):
     )
 
 
-class Sensor(Section):
+class SensorSection(Section):
     """Quality of the pictures; none of it moves anything in them. Spreads are over the cameras.
 
     With all keys at zero the pictures are as rendered. ``profile = "webcam"`` in a scenario's [sensor] takes

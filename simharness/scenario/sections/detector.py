@@ -23,7 +23,7 @@ KIND_OF_JOINT = (0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8)
 """Kind of each COCO-17 joint, an index into :data:`KINDS`."""
 
 BEARINGS = tuple(range(0, 360, 30))
-"""Bearings at which the shares of :class:`Face` are given, degrees."""
+"""Bearings at which the shares of :class:`FaceSection` are given, degrees."""
 
 LARGEST_MULTIPLE = 1000.0
 """Largest factor of hidden joints: hidden hips of a real detector err a few hundred times as often as visible ones."""
@@ -109,7 +109,7 @@ class Means(_ByJoint):
     ankles: Share = 0.5
 
 
-class Bias(Section):
+class BiasSection(Section):
     """Systematic offset of the detector's joints from the anatomical ones: forward, outward, up, metres, body frame.
 
     Up points from the hips to the shoulders, outward away from the middle of the body (for the nose: to the left).
@@ -129,12 +129,12 @@ class Bias(Section):
         """Return the offset of each joint of COCO-17, (17, 3)."""
         return tuple(getattr(self, KINDS[kind]) for kind in KIND_OF_JOINT)
 
-    def of_face(self) -> Bias:
+    def of_face(self) -> BiasSection:
         """Return the bias of nose, eyes and ears alone."""
-        return Bias(nose=self.nose, eyes=self.eyes, ears=self.ears)
+        return BiasSection(nose=self.nose, eyes=self.eyes, ears=self.ears)
 
 
-class Drop(Section):
+class DropSection(Section):
     """Shares of the joints in the picture that are not reported at all, by the cause of their occlusion.
 
     A bottom-up detector (``detector.kind``) reports no joint whose parent in the tree of parts it does not report
@@ -146,7 +146,7 @@ class Drop(Section):
     occluded: Shares = Shares()
 
 
-class Face(Section):
+class FaceSection(Section):
     """Shares of the face's joints that are not reported, by the bearing of the camera from the head.
 
     Each list holds the shares at 0, 30, ..., 330 degrees from straight ahead towards the joint's side (nose: towards
@@ -158,7 +158,7 @@ class Face(Section):
     ears: ByBearing | None = None
 
 
-class Guess(Section):
+class GuessSection(Section):
     """Shares of the reported joints that the detector guesses from the localised joints of the same person."""
 
     visible: Shares = Shares()
@@ -168,7 +168,7 @@ class Guess(Section):
     scatter: Amounts = Amounts()  # standard deviation of guesses about the most likely place, in units
 
 
-class Keypoints(Section):
+class KeypointsSection(Section):
     """Errors of keypoint positions.
 
     Classes of errors are drawn in the order drop, guess, swap, inversion, miss, jitter, and each share refers to the
@@ -186,9 +186,9 @@ class Keypoints(Section):
     inversion: Shares = Shares()  # at the left-right counterpart
     swap: Shares = Shares()  # at the same joint of another person whose box overlaps
     swap_crowded: Shares | None = None  # the same in a crowd (PoseFix); absent: as swap
-    drop: Drop = Drop()
-    face: Face = Face()
-    guess: Guess = Guess()
+    drop: DropSection = DropSection()
+    face: FaceSection = FaceSection()
+    guess: GuessSection = GuessSection()
     border: Factor = Field(
         0.0, description="joints up to this many units outside of the image are reported, at its border"
     )
@@ -206,7 +206,7 @@ class Keypoints(Section):
     scatter_hidden: Factors = Factors()  # on scatter of joints that are not visible
 
 
-class Correlation(Section):
+class CorrelationSection(Section):
     """Correlation of errors over time, views and joints."""
 
     life: Span = Field(0.0, description="mean life of an error, seconds; 0: drawn anew in every frame")
@@ -229,7 +229,7 @@ class Correlation(Section):
     )
 
 
-class HiddenScores(Section):
+class HiddenScoresSection(Section):
     """Factor for each class of keypoints; a single number in the file applies to all classes."""
 
     good: Share = 1.0
@@ -244,7 +244,7 @@ class HiddenScores(Section):
         return _expanded(given, tuple(cls.model_fields))
 
 
-class Scores(Section):
+class ScoresSection(Section):
     """Scores of keypoints: the median of each class, and the spread."""
 
     good: Share = Field(1.0, description="median score of a good keypoint")
@@ -252,7 +252,7 @@ class Scores(Section):
     miss: Share = Field(1.0, description="median score of a miss")
     inversion: Share = Field(1.0, description="median score of an inversion")
     swap: Share = Field(1.0, description="median score of a swap")
-    hidden: HiddenScores = HiddenScores()  # factor on the median scores of joints that are not visible
+    hidden: HiddenScoresSection = HiddenScoresSection()  # factor on the median scores of joints that are not visible
     guess: Shares = Shares.model_validate(1.0)  # median score of guessed joints; hidden and joint do not apply
     outside: Share = Field(1.0, description="factor on the median score of joints that are guessed outside the image")
     deviation: Logits = Field(0.0, description="standard deviation of scores, on the logit scale")
@@ -263,7 +263,7 @@ class Scores(Section):
     joint: Amounts = Amounts.model_validate(1.0)  # factor on the median scores
 
 
-class Boxes(Section):
+class BoxesSection(Section):
     """Detected people and their boxes."""
 
     missed: Share = Field(0.0, description="share of people missed in a view")
@@ -288,7 +288,7 @@ class Boxes(Section):
     deviation: Logits = Field(0.0, description="standard deviation of box scores, on the logit scale")
 
 
-class Phantoms(Section):
+class PhantomsSection(Section):
     """Phantoms: false-positive detections that show no person."""
 
     rate: float = Field(0.0, ge=0.0, le=20.0, description="mean number per view and frame")
@@ -306,7 +306,7 @@ class Phantoms(Section):
     deviation: Logits = Field(0.6, description="standard deviation of their scores, on the logit scale")
 
 
-class DecoyHits(Section):
+class DecoyHitsSection(Section):
     """Detections of decoys: posters, mannequins, coat stands, mirror images."""
 
     share: Share = Field(0.0, description="share of the decoys in a view that are detected as people")
@@ -320,7 +320,7 @@ class DecoyHits(Section):
     deviation: Logits = Field(0.6, description="standard deviation of their scores, on the logit scale")
 
 
-class HeatmapHead(Section):
+class HeatmapHeadSection(Section):
     """Heat maps from which the keypoints are read."""
 
     size: Literal["none", "64x48", "96x72"] = Field(
@@ -337,7 +337,7 @@ class HeatmapHead(Section):
     )
 
 
-class Detector(Section):
+class DetectorSection(Section):
     """Errors of the simulated 2D detector."""
 
     name: str = Field("perfect", description="name of the detector")
@@ -356,17 +356,17 @@ class Detector(Section):
         description="joints that the detector reports; those beyond COCO17, such as feet and hands, belong to the "
         "ankles and wrists and are estimated after the body",
     )
-    keypoints: Keypoints = Keypoints()
-    bias: Bias = Bias()
-    correlation: Correlation = Correlation()
-    scores: Scores = Scores()
-    boxes: Boxes = Boxes()
-    phantoms: Phantoms = Phantoms()
-    decoys: DecoyHits = DecoyHits()
-    heatmaps: HeatmapHead = HeatmapHead()
+    keypoints: KeypointsSection = KeypointsSection()
+    bias: BiasSection = BiasSection()
+    correlation: CorrelationSection = CorrelationSection()
+    scores: ScoresSection = ScoresSection()
+    boxes: BoxesSection = BoxesSection()
+    phantoms: PhantomsSection = PhantomsSection()
+    decoys: DecoyHitsSection = DecoyHitsSection()
+    heatmaps: HeatmapHeadSection = HeatmapHeadSection()
 
     @model_validator(mode="after")
-    def _network_reads_the_body(self) -> Detector:
+    def _network_reads_the_body(self) -> DetectorSection:
         if self.onnx and self.skeleton != "coco17":
             raise ValueError(
                 f'skeleton = "coco17" with the network of onnx, which reads these 17 joints, got "{self.skeleton}": '

@@ -56,7 +56,7 @@ class Improvement(Section):
     idf1: Percent | None = Field(None, description="percentage points")
 
 
-class Gate(Section):
+class GateSection(Section):
     """Rule of ``simharness check``: a change fails it that is significant and larger than allowed."""
 
     level: float = Field(

@@ -17,7 +17,7 @@ NAME = r"^[a-z0-9][a-z0-9_-]*$"
 _PLACE = r"^.+:[A-Za-z_]\w*$"
 
 
-class Estimators(Section):
+class EstimatorsSection(Section):
     """User-defined estimators by name: a file or module, and its attribute with a method ``estimate``."""
 
     model_config = ConfigDict(
@@ -50,7 +50,7 @@ class Estimators(Section):
         return self
 
 
-class Method(Section):
+class MethodSection(Section):
     """Variants of the method that run on the detections."""
 
     variants: tuple[str, ...] = Field(
@@ -65,12 +65,13 @@ class Method(Section):
         description="track and track-fast: time of later frames that an estimate waits for, seconds; 0: none; at least "
         "the duration: the whole recording",
     )
-    estimators: Estimators = Field(
-        Estimators(), description='user-defined estimators: name = "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE"'
+    estimators: EstimatorsSection = Field(
+        EstimatorsSection(),
+        description='user-defined estimators: name = "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE"',
     )
 
 
-def wrong_variants(method: Method) -> Iterator[tuple[str, str]]:
+def wrong_variants(method: MethodSection) -> Iterator[tuple[str, str]]:
     """Yield the faulty keys of section [method], each with a message."""
     from mvpose.presets import PRESETS, without_repair  # only where a method is checked: it imports the whole method
 

@@ -37,7 +37,7 @@ ActivityName = Literal[
 ]
 
 
-class Mocap(Section):
+class MocapSection(Section):
     """Recorded motion of the people whose activity is "mocap"; of all people where no activities are given."""
 
     file: str = Field(
@@ -54,7 +54,7 @@ class Mocap(Section):
         return self.file.lower().endswith(".npz")
 
 
-class Traffic(Section):
+class TrafficSection(Section):
     """People who come and go: through doors in the walls, or over the edge of a room without walls."""
 
     entering: Share = Field(
@@ -67,7 +67,7 @@ class Traffic(Section):
     doors: int = Field(2, ge=1, le=8, description="number of doors, which everyone uses")
 
 
-class People(Section):
+class PeopleSection(Section):
     """The people in the room and their activities."""
 
     count: int = Field(4, ge=0, le=100, description="number of people")
@@ -98,7 +98,7 @@ class People(Section):
         description='time in the booth of "hide", in which no camera sees the person, seconds; at least the time that '
         "the person needs to walk through it",
     )
-    traffic: Traffic = Traffic()
+    traffic: TrafficSection = TrafficSection()
     children: Share = Field(0.0, description="probability that a person is a child of 5 to 12 years")
     look_alike: Share = Field(
         0.0, description="similarity of clothes; 0: all people are dressed differently; 1: all wear one uniform"
@@ -115,10 +115,10 @@ class People(Section):
         le=100_000.0,
         description="dynamic playback: largest force that supports a pelvis, newtons; running needs about 1000",
     )
-    motion: Mocap = Mocap()
+    motion: MocapSection = MocapSection()
 
     @model_validator(mode="after")
-    def _file_and_activity_agree(self) -> People:
+    def _file_and_activity_agree(self) -> PeopleSection:
         if self.motion.file and "activities" not in self.model_fields_set:
             object.__setattr__(self, "activities", ("mocap",))  # a named file is meant to be played
         if ("mocap" in self.activities) != bool(self.motion.file):

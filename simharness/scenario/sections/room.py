@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from simharness.scenario.sections.section import Count, Elements, Length, Section, Share
 
 
-class Room(Section):
+class RoomSection(Section):
     """The room: a floor and four walls around the origin. A kind or look of "any" is drawn from the seed."""
 
     size: Annotated[tuple[Length, Length, Length], Elements(("x", "y", "z"))] = Field(
@@ -52,7 +52,7 @@ class Room(Section):
         return self
 
 
-class Clutter(Section):
+class ClutterSection(Section):
     """Objects that stand in the way: number of each kind."""
 
     boxes: Count = 0
@@ -71,7 +71,7 @@ class Clutter(Section):
     )
 
 
-class Decoys(Section):
+class DecoysSection(Section):
     """Objects that a detector may take for people: number of each kind."""
 
     posters: Count = 0

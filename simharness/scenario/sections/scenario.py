@@ -11,32 +11,14 @@ from typing import Literal
 
 from pydantic import Field
 
-from simharness.scenario.sections.annotation import Annotation
-from simharness.scenario.sections.appearance import Appearance
-from simharness.scenario.sections.cameras import Cameras, Faults, Sensor
-from simharness.scenario.sections.detector import Detector
-from simharness.scenario.sections.method import NAME, Estimators, Method
-from simharness.scenario.sections.people import People
-from simharness.scenario.sections.room import Clutter, Decoys, Room
+from simharness.scenario.sections.annotation import AnnotationSection
+from simharness.scenario.sections.appearance import AppearanceSection
+from simharness.scenario.sections.cameras import CamerasSection, FaultsSection, SensorSection
+from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.method import NAME, MethodSection
+from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.room import ClutterSection, DecoysSection, RoomSection
 from simharness.scenario.sections.section import Section
-
-__all__ = [
-    "FILE_KEYS",
-    "Annotation",
-    "Appearance",
-    "Cameras",
-    "Clutter",
-    "Decoys",
-    "Detector",
-    "Estimators",
-    "Faults",
-    "Method",
-    "People",
-    "Rendering",
-    "Room",
-    "Scenario",
-    "Sensor",
-]
 
 FILE_KEYS: tuple[tuple[str, ...], ...] = (
     ("people", "motion", "file"),
@@ -49,7 +31,7 @@ FILE_KEYS: tuple[tuple[str, ...], ...] = (
 list: the paths are relative to the scenario file, and the contents count in the identity of results."""
 
 
-class Rendering(Section):
+class RenderingSection(Section):
     """Rendering of the pictures."""
 
     renderer: Literal["auto", "raster", "gl", "rays"] = Field(
@@ -72,18 +54,18 @@ class Scenario(Section):
     seed: int = Field(0, ge=0, lt=2**53, description="seed of every random draw; 0 is a seed like any other")
     duration: float = Field(4.0, gt=0.0, le=36_000.0, description="seconds")
     rate: float = Field(10.0, gt=0.0, le=1000.0, description="frames per second")
-    room: Room = Room()
-    people: People = People()
-    clutter: Clutter = Clutter()
-    decoys: Decoys = Decoys()
-    cameras: Cameras = Cameras()
-    faults: Faults = Faults()
-    sensor: Sensor = Sensor()
-    detector: Detector = Detector()
-    appearance: Appearance = Appearance()
-    annotation: Annotation = Annotation()
-    method: Method = Method()
-    rendering: Rendering = Rendering()
+    room: RoomSection = RoomSection()
+    people: PeopleSection = PeopleSection()
+    clutter: ClutterSection = ClutterSection()
+    decoys: DecoysSection = DecoysSection()
+    cameras: CamerasSection = CamerasSection()
+    faults: FaultsSection = FaultsSection()
+    sensor: SensorSection = SensorSection()
+    detector: DetectorSection = DetectorSection()
+    appearance: AppearanceSection = AppearanceSection()
+    annotation: AnnotationSection = AnnotationSection()
+    method: MethodSection = MethodSection()
+    rendering: RenderingSection = RenderingSection()
 
     @property
     def frames(self) -> int:

@@ -14,8 +14,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from mvpose.files.message_text import listed
-from simharness.scenario.sections.detector import Bias, Boxes, Drop, Face, Guess, Keypoints, Scores, Shares
-from simharness.scenario.sections.scenario import Cameras, Faults, Scenario
+from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
+from simharness.scenario.sections.detector import (
+    BiasSection,
+    BoxesSection,
+    DropSection,
+    FaceSection,
+    GuessSection,
+    KeypointsSection,
+    ScoresSection,
+    Shares,
+)
+from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.sections.section import Section
 from simharness.types.views import Visibility
 
@@ -68,7 +78,7 @@ def _defaults(section: type[Section], *keys: str) -> dict[str, Any]:
 def _without_gross_errors(scenario: Scenario) -> Scenario:
     none = Shares()
     return _detector(
-        scenario, "keypoints", miss=none, miss_some=None, miss_few=None, stray=none, guess=Guess(), border=0.0
+        scenario, "keypoints", miss=none, miss_some=None, miss_few=None, stray=none, guess=GuessSection(), border=0.0
     )
 
 
@@ -83,13 +93,15 @@ def _without_phantoms(scenario: Scenario) -> Scenario:
 
 
 def _without_clock_errors(scenario: Scenario) -> Scenario:
-    faults = _defaults(Faults, "clock_offset", "clock_jitter", "rolling_shutter")
-    return _sections(scenario, faults=faults, cameras=_defaults(Cameras, "trigger"))
+    faults = _defaults(FaultsSection, "clock_offset", "clock_jitter", "rolling_shutter")
+    return _sections(scenario, faults=faults, cameras=_defaults(CamerasSection, "trigger"))
 
 
 def _with_all_pictures(scenario: Scenario) -> Scenario:
     return _sections(
-        scenario, faults=_defaults(Faults, "dropped", "frozen", "dead"), cameras=_defaults(Cameras, "every")
+        scenario,
+        faults=_defaults(FaultsSection, "dropped", "frozen", "dead"),
+        cameras=_defaults(CamerasSection, "every"),
     )
 
 
@@ -102,7 +114,7 @@ CAUSES: tuple[Cause, ...] = (
         "dropped-joints",
         "dropped joints",
         "a detector that reports every joint in the picture",
-        lambda scenario: _detector(scenario, "keypoints", drop=Drop(), face=Face()),
+        lambda scenario: _detector(scenario, "keypoints", drop=DropSection(), face=FaceSection()),
     ),
     Cause(
         "gross-errors",
@@ -117,26 +129,26 @@ CAUSES: tuple[Cause, ...] = (
         "noise",
         "noise",
         "keypoints at the true pixel: higher resolution, or a more exact detector",
-        lambda scenario: _detector(scenario, "keypoints", **_defaults(Keypoints, "scatter", "jitter")),
+        lambda scenario: _detector(scenario, "keypoints", **_defaults(KeypointsSection, "scatter", "jitter")),
     ),
     Cause(
         "bias",
         "other joint centres",
         "a detector whose joints are those of the truth",
-        lambda scenario: _sections(scenario, detector={"bias": Bias()}),
+        lambda scenario: _sections(scenario, detector={"bias": BiasSection()}),
     ),
     Cause(
         "boxes",
         "missed and merged boxes",
         "a detector that finds every person once, in one box",
-        lambda scenario: _detector(scenario, "boxes", **_defaults(Boxes, *_BOXES)),
+        lambda scenario: _detector(scenario, "boxes", **_defaults(BoxesSection, *_BOXES)),
     ),
     Cause("phantoms", "phantoms", "a detector that finds nobody where nobody is", _without_phantoms),
     Cause(
         "scores",
         "misleading scores",
         "keypoint scores that say exactly which error a keypoint has",
-        lambda scenario: _detector(scenario, "scores", **_defaults(Scores, *_SCORES)),
+        lambda scenario: _detector(scenario, "scores", **_defaults(ScoresSection, *_SCORES)),
     ),
     Cause(
         "hidden-by-people",
@@ -154,7 +166,7 @@ CAUSES: tuple[Cause, ...] = (
         "calibration",
         "calibration",
         "a true calibration that stays true",
-        lambda scenario: _sections(scenario, faults=_defaults(Faults, *_CALIBRATION)),
+        lambda scenario: _sections(scenario, faults=_defaults(FaultsSection, *_CALIBRATION)),
     ),
     Cause(
         "clocks",

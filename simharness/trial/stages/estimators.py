@@ -42,8 +42,7 @@ from mvpose.checks import as_array
 from mvpose.pipeline import Estimator
 from mvpose.skeleton import Skeleton
 from simharness.runtime.errors import RunError
-from simharness.scenario.sections.method import wrong_variants
-from simharness.scenario.sections.scenario import Method
+from simharness.scenario.sections.method import MethodSection, wrong_variants
 from simharness.trial.stages.tracking import track_frames
 
 _PROTOCOL = "estimate(rig, detections) -> mvpose.Estimate"
@@ -51,7 +50,7 @@ _METHODS = ("estimate", "track")
 
 
 def estimators_of(
-    method: Method, *, appearance: AppearanceAffinity | None = None, period: float | None = None
+    method: MethodSection, *, appearance: AppearanceAffinity | None = None, period: float | None = None
 ) -> dict[str, Estimator]:
     """Return the variants of a scenario, by name.
 

@@ -34,7 +34,7 @@ from typing import TypeVar, get_args
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.people import ActivityName, People
+from simharness.scenario.sections.people import ActivityName, PeopleSection
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop, Spot, Track
 from simharness.world.motion.performance import Performance
@@ -78,7 +78,7 @@ class Activity:
     perform: Callable[..., Performance]
     froude: tuple[float, float] = _STROLL
     fewest: int = 0
-    configured: Callable[[Activity, People], Activity] = lambda each, people: each
+    configured: Callable[[Activity, PeopleSection], Activity] = lambda each, people: each
 
 
 def activity(
@@ -89,7 +89,7 @@ def activity(
     clearance: float = 0.0,
     froude: tuple[float, float] = _STROLL,
     fewest: int = 0,
-    configured: Callable[[Activity, People], Activity] = lambda each, people: each,
+    configured: Callable[[Activity, PeopleSection], Activity] = lambda each, people: each,
 ) -> Callable[[Perform], Perform]:
     """Register the decorated function as an activity; the arguments are the attributes of :class:`Activity`.
 
@@ -166,6 +166,6 @@ def activities_in_place() -> tuple[Activity, ...]:
     return tuple(each for each in activities().values() if each.name not in _ON_THE_WAY)
 
 
-def configured_activities(people: People) -> dict[str, Activity]:
+def configured_activities(people: PeopleSection) -> dict[str, Activity]:
     """Return all registered activities by name, with the parameters of a scenario."""
     return {name: each.configured(each, people) for name, each in activities().items()}

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from mvpose.arrays import Bools, Floats
-from simharness.scenario.sections.people import Traffic
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.people import TrafficSection
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.performance import Prop
 from simharness.world.motion.presence import Presence
@@ -101,7 +101,7 @@ class Visitor:
     away: float
     speed: float
     doors: tuple[Door, ...]
-    room: Room
+    room: RoomSection
     duration: float
 
     def draw(self, rng: np.random.Generator, *, half: float, start: float, free: FreeWay) -> Route | None:
@@ -248,7 +248,7 @@ def _wait(walker: Itinerary) -> Itinerary:
     return walker.stand(_PAUSE)
 
 
-def in_room(room: Room, place: Floats) -> Bools:
+def in_room(room: RoomSection, place: Floats) -> Bools:
     """Return which people with pelvises at places (..., 2) count as in the room, (...).
 
     Behind a wall a person is in the room as long as a foot or a hand may still be; a room without walls ends at once.
@@ -257,7 +257,7 @@ def in_room(room: Room, place: Floats) -> Bools:
     return np.asarray((beyond <= (_GONE if room.walls else 0.0)).all(axis=-1))
 
 
-def draw_doors(seed: int, traffic: Traffic, room: Room, cameras: Floats) -> tuple[Door, ...]:
+def draw_doors(seed: int, traffic: TrafficSection, room: RoomSection, cameras: Floats) -> tuple[Door, ...]:
     """Draw the doors of a room, clear of corners, cameras and each other; one more door changes none of the others.
 
     Args:

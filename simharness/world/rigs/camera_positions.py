@@ -7,14 +7,14 @@ from collections.abc import Callable
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.scenario import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
 
 _WALL_DISTANCE = 0.25  # metres: cameras in the corners of a room
 _GOLDEN = 180.0 * (3.0 - np.sqrt(5.0))  # degrees: the golden angle spreads bearings evenly
 _LOWEST = 1.0 / 3.0  # lowest cameras of a dome, as a share of its height: people stand below
 
 
-def camera_positions(cameras: Cameras, *, room: tuple[float, float, float] | None = None) -> Floats:
+def camera_positions(cameras: CamerasSection, *, room: tuple[float, float, float] | None = None) -> Floats:
     """Return the positions of the cameras of a layout, without jitter.
 
     Bearings are counter-clockwise from the x axis as seen from above; ``start`` is the first one.
@@ -57,7 +57,7 @@ def camera_positions(cameras: Cameras, *, room: tuple[float, float, float] | Non
     return np.column_stack([flat, _heights(cameras)])
 
 
-def _heights(cameras: Cameras) -> Floats:
+def _heights(cameras: CamerasSection) -> Floats:
     return np.resize(np.array(cameras.heights or (cameras.height,)), cameras.count)
 
 
@@ -67,11 +67,11 @@ def _at(bearings: Floats, radius: float | Floats) -> Floats:
     return np.column_stack([radius * np.cos(angles), radius * np.sin(angles)])
 
 
-def _ring(cameras: Cameras) -> Floats:
+def _ring(cameras: CamerasSection) -> Floats:
     return _at(cameras.start + 360.0 * np.arange(cameras.count) / cameras.count, cameras.radius)
 
 
-def _arc(cameras: Cameras) -> Floats:
+def _arc(cameras: CamerasSection) -> Floats:
     if cameras.spread == 360.0:
         raise ValueError(
             "cameras.spread = 360 puts the last camera of the arc on the first: use cameras.layout = 'ring' or a "
@@ -80,13 +80,13 @@ def _arc(cameras: Cameras) -> Floats:
     return _at(cameras.start + cameras.spread * np.arange(cameras.count) / (cameras.count - 1), cameras.radius)
 
 
-def _line(cameras: Cameras) -> Floats:
+def _line(cameras: CamerasSection) -> Floats:
     ahead, left = _at(np.array([cameras.start, cameras.start + 90.0]), 1.0)
     along = cameras.spacing * (np.arange(cameras.count) - (cameras.count - 1) / 2)
     return cameras.radius * ahead + along[:, None] * left
 
 
-def _pairs(cameras: Cameras) -> Floats:
+def _pairs(cameras: CamerasSection) -> Floats:
     if cameras.count % 2:
         raise ValueError(f"cameras.count = {cameras.count}: pairs need an even number of cameras")
     pairs = cameras.count // 2
@@ -96,7 +96,7 @@ def _pairs(cameras: Cameras) -> Floats:
     return np.stack([middles - half, middles + half], axis=1).reshape(-1, 2)
 
 
-_FLAT: dict[str, Callable[[Cameras], Floats]] = {"ring": _ring, "arc": _arc, "line": _line, "pairs": _pairs}
+_FLAT: dict[str, Callable[[CamerasSection], Floats]] = {"ring": _ring, "arc": _arc, "line": _line, "pairs": _pairs}
 
 
 def _corners(count: int, half: Floats) -> Floats:
@@ -112,7 +112,7 @@ def _corners(count: int, half: Floats) -> Floats:
     return np.concatenate(points)[:count]
 
 
-def _dome(cameras: Cameras) -> Floats:
+def _dome(cameras: CamerasSection) -> Floats:
     top, count = cameras.height, cameras.count
     if top <= 0:
         raise ValueError(f"cameras.height = {top:g}: a dome needs a height above 0 m")

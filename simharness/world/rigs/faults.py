@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Camera, Rig
 from mvpose.checks import as_array
-from simharness.scenario.sections.scenario import Cameras, Faults
+from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
 from simharness.types.random_streams import stream
 from simharness.world.rigs.exposure_schedule import ExposureSchedule, moved
 
@@ -26,7 +26,7 @@ MAX_CLOCK_ERROR = 0.9  # seconds from a frame to its picture: motions are planne
 _MINUTE = 60.0
 
 
-def camera_phases(cameras: Cameras, views: int, *, period: float, seed: int) -> Floats:
+def camera_phases(cameras: CamerasSection, views: int, *, period: float, seed: int) -> Floats:
     """Return the time from each frame to the picture of each camera, (V,), seconds, without faults of its clock.
 
     A camera that is not triggered takes its pictures at any time. The picture of a frame is the nearest one, within
@@ -45,7 +45,7 @@ def camera_phases(cameras: Cameras, views: int, *, period: float, seed: int) -> 
 
 def schedule_exposures(
     rig: Rig,
-    faults: Faults,
+    faults: FaultsSection,
     time: ArrayLike,
     *,
     seed: int,
@@ -109,7 +109,7 @@ def schedule_exposures(
     )
 
 
-def _believed(rig: Rig, faults: Faults, seed: int) -> Rig:
+def _believed(rig: Rig, faults: FaultsSection, seed: int) -> Rig:
     """Return the rig with constant calibration errors, and with the readout of its cameras, which data sheets name."""
     if faults.rolling_shutter:
         rig = Rig([replace(camera, readout=faults.rolling_shutter) for camera in rig])
@@ -140,14 +140,14 @@ def _normals(seed: int, fault: str, views: int, count: int = 3) -> Floats:
     return np.stack([stream(seed, "faults", fault, view).standard_normal(count) for view in range(views)])
 
 
-def _clock(faults: Faults, time: Floats, seed: int, view: int, phase: float) -> Floats:
+def _clock(faults: FaultsSection, time: Floats, seed: int, view: int, phase: float) -> Floats:
     """Return the times at which one camera takes the pictures of the frames, (T,) seconds."""
     offset = faults.clock_offset * stream(seed, "faults", "clock offset", view).standard_normal()
     jitter = faults.clock_jitter * stream(seed, "faults", "clock jitter", view).standard_normal(len(time))
     return time + np.clip(phase + offset + jitter, -MAX_CLOCK_ERROR, MAX_CLOCK_ERROR)
 
 
-def _sources(faults: Faults, frames: int, seed: int, view: int, every: int) -> Integers:
+def _sources(faults: FaultsSection, frames: int, seed: int, view: int, every: int) -> Integers:
     """Return the frame of the picture that one camera delivers in every frame, (T,); -1 for none."""
     dropped = stream(seed, "faults", "dropped", view).random(frames) < faults.dropped
     dropped |= np.arange(frames) % every > 0
@@ -159,7 +159,7 @@ def _sources(faults: Faults, frames: int, seed: int, view: int, every: int) -> I
     return np.where(dropped, -1, latest)
 
 
-def _cameras_of_views(faults: Faults, rig: Rig) -> Integers:
+def _cameras_of_views(faults: FaultsSection, rig: Rig) -> Integers:
     """Return the index of the camera that takes the pictures of each view, (V,)."""
     camera_of_view = np.arange(len(rig))
     for a, b in faults.swapped:
@@ -180,7 +180,7 @@ def _cameras_of_views(faults: Faults, rig: Rig) -> Integers:
     return camera_of_view
 
 
-def _dead(faults: Faults, rig: Rig) -> Integers:
+def _dead(faults: FaultsSection, rig: Rig) -> Integers:
     _check_exists(f"faults.dead = {_as_toml(faults.dead)}", faults.dead, rig)
     return np.array(faults.dead, np.int64)
 

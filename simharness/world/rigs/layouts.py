@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.camera import Camera, Rig
 from mvpose.formats.calibration.registry import read_calibration
 from mvpose.formats.views.plausibility import UNKNOWN_SIZE
-from simharness.scenario.sections.scenario import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
 from simharness.types.random_streams import stream
 from simharness.world.rigs.camera_positions import camera_positions
 from simharness.world.rigs.lenses import check_lens, intrinsics
@@ -22,7 +22,7 @@ _OFF_CENTER = 0.2  # of a picture: principal points lie nearer to its middle
 _NO_TURN = 1e-6  # largest deviation of a rotation matrix from the identity
 
 
-def build_rig(cameras: Cameras, *, seed: int = 0, room: tuple[float, float, float] | None = None) -> Rig:
+def build_rig(cameras: CamerasSection, *, seed: int = 0, room: tuple[float, float, float] | None = None) -> Rig:
     """Build the rig of a scenario.
 
     The cameras of a layout stand at the positions of
@@ -63,7 +63,7 @@ def build_rig(cameras: Cameras, *, seed: int = 0, room: tuple[float, float, floa
     return rig
 
 
-def _laid_out(cameras: Cameras, seed: int, room: tuple[float, float, float] | None) -> Rig:
+def _laid_out(cameras: CamerasSection, seed: int, room: tuple[float, float, float] | None) -> Rig:
     centers = camera_positions(cameras, room=room)
     aims = np.array(cameras.aims if cameras.layout == "free" and cameras.aims else [cameras.aim] * len(centers))
     if len(aims) != len(centers):
@@ -84,7 +84,7 @@ def _laid_out(cameras: Cameras, seed: int, room: tuple[float, float, float] | No
     )
 
 
-def _from_file(cameras: Cameras) -> Rig:
+def _from_file(cameras: CamerasSection) -> Rig:
     if not cameras.file:
         raise ValueError(
             "cameras.layout = 'file' needs cameras.file: a calibration file, relative to the folder of the scenario"
@@ -99,14 +99,14 @@ def _from_file(cameras: Cameras) -> Rig:
     return rig
 
 
-def _sized(rig: Rig, cameras: Cameras) -> Rig:
+def _sized(rig: Rig, cameras: CamerasSection) -> Rig:
     """Return the rig with the size of pictures that its file does not state.
 
     Raises:
         ValueError: the default size, where principal points show that it is another one; or a size of the scenario that
             is not that of the file.
     """
-    default = cameras.size == Cameras.model_fields["size"].default  # stated by quickstart as well
+    default = cameras.size == CamerasSection.model_fields["size"].default  # stated by quickstart as well
     unknown = [camera.size == UNKNOWN_SIZE for camera in rig]
     for camera, new in zip(rig, unknown, strict=True):
         if not new and not default and camera.size != cameras.size:

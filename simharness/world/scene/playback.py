@@ -24,7 +24,7 @@ _NOWHERE = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0,
 
 
 @dataclass(frozen=True)
-class State:
+class PlaybackState:
     """Positions of all people and moving solids at one time.
 
     Attributes:
@@ -53,7 +53,7 @@ class Playback:
 
     Attributes:
         scene: scene to play.
-        data: MuJoCo state, that of the last :class:`State` returned.
+        data: MuJoCo state, that of the last :class:`PlaybackState` returned.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -63,11 +63,11 @@ class Playback:
         self._mocap = [int(scene.model.body(solid.name).mocapid[0]) for solid in scene.moving]
         self._empty = np.zeros((0, len(body_model().bones), 3, 4))
 
-    def at(self, time: float) -> State:
+    def at(self, time: float) -> PlaybackState:
         """Return the state of the scene at one time in seconds."""
         return next(self.over([time]))
 
-    def over(self, times: ArrayLike) -> Iterator[State]:
+    def over(self, times: ArrayLike) -> Iterator[PlaybackState]:
         """Yield the states of the scene at times (n,) in seconds."""
         times = np.asarray(times, float)
         motions = [motion.read(times) for motion in self.scene.motions]
@@ -89,7 +89,7 @@ class Playback:
             landmarks = [body.landmarks(pose) for body, pose in zip(self.scene.bodies, bones, strict=True)]
             transforms = np.stack(bones) if bones else self._empty
             transforms[~present[n]] = _NOWHERE
-            yield State(
+            yield PlaybackState(
                 time=float(time),
                 landmarks=np.stack(landmarks) if landmarks else np.zeros((0, len(LANDMARKS), 3)),
                 bones=transforms,

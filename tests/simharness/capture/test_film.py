@@ -15,12 +15,12 @@ from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.film import PictureObserver, film
 from simharness.capture.picture import PictureSource, antialiased, meshes_at
 from simharness.capture.rendering.raster import RasterRenderer
-from simharness.scenario.sections.scenario import Faults, Sensor
+from simharness.scenario.sections.cameras import FaultsSection, SensorSection
 from simharness.types.lighting import Lighting
 from simharness.types.views import LookalikeViews, Views, Visibility
 from simharness.world.rigs.exposure_schedule import ExposureSchedule
 from simharness.world.rigs.faults import schedule_exposures
-from simharness.world.scene.playback import State
+from simharness.world.scene.playback import PlaybackState
 
 RIG = Rig([camera_at(c, (0, 0, 1), size=(200, 150)) for c in ((3.5, 0, 1.8), (0, 3.5, 1.8), (-2.5, -2.5, 1.8))])
 FRAMES, PEOPLE, JOINTS = 4, 2, 17
@@ -63,7 +63,7 @@ class BallPlayback:
             places = start.reshape(-1, 3) + SPEED * time
             turns = np.broadcast_to(np.eye(3), (len(places), 3, 3))
             offsets = np.linspace([0, 0, 0], [0.1, 0, 0.1], JOINTS)
-            yield State(
+            yield PlaybackState(
                 time=float(time),
                 landmarks=places[:, None] + offsets,
                 bones=np.concatenate([turns, places[..., None]], axis=-1)[:, None],
@@ -148,7 +148,7 @@ class TestClocks:
     """Every camera observes the scene at the times of its pictures."""
 
     def test_a_late_camera_sees_what_is_then(self):
-        exposures = schedule_exposures(RIG, Faults(clock_offset=0.05), TIME, seed=1)
+        exposures = schedule_exposures(RIG, FaultsSection(clock_offset=0.05), TIME, seed=1)
         late = exposures.time - TIME[:, None]
         assert np.ptp(late[0]) > 0.01
         views = filmed(exposures)
@@ -161,7 +161,7 @@ class TestClocks:
         assert playback.asked == TIME.tolist()
 
     def test_what_never_arrives_shows_nothing(self):
-        views = filmed(schedule_exposures(RIG, Faults(dead=(1,)), TIME, seed=1))
+        views = filmed(schedule_exposures(RIG, FaultsSection(dead=(1,)), TIME, seed=1))
         assert np.isnan(views.pixels[:, 1]).all()
         assert (views.visibility[:, 1] == Visibility.OUTSIDE).all()
         assert not views.boxes[:, 1].any()
@@ -169,7 +169,7 @@ class TestClocks:
         assert np.isfinite(views.pixels[:, [0, 2]]).all()
 
     def test_a_frozen_picture_is_the_one_before(self):
-        exposures = schedule_exposures(RIG, Faults(frozen=0.5), TIME, seed=3)
+        exposures = schedule_exposures(RIG, FaultsSection(frozen=0.5), TIME, seed=3)
         views = filmed(exposures)
         again = [(t, v) for t, v in np.ndindex(FRAMES, len(RIG)) if exposures.source[t, v] != t]
         assert again
@@ -177,13 +177,13 @@ class TestClocks:
             np.testing.assert_array_equal(views.pixels[t, v], views.pixels[exposures.source[t, v], v])
 
     def test_drift_moves_the_picture_but_not_the_calibration(self):
-        exposures = schedule_exposures(RIG, Faults(rotation_drift=60.0), TIME, seed=1)
+        exposures = schedule_exposures(RIG, FaultsSection(rotation_drift=60.0), TIME, seed=1)
         moved, still = filmed(exposures).pixels, filmed().pixels
         np.testing.assert_array_equal(moved[0], still[0])
         assert np.linalg.norm(moved[-1] - still[-1], axis=-1).max() > 0.5
 
     def test_swapped_cameras_deliver_each_others_pictures(self, views):
-        swapped = filmed(schedule_exposures(RIG, Faults(swapped=((0, 2),)), TIME, seed=1))
+        swapped = filmed(schedule_exposures(RIG, FaultsSection(swapped=((0, 2),)), TIME, seed=1))
         np.testing.assert_array_equal(swapped.pixels[:, [2, 1, 0]], views.pixels)
 
     def test_a_rolling_shutter_takes_each_joint_when_its_row_comes(self):
@@ -215,7 +215,7 @@ def test_boxes_at_the_border_and_beyond():
 class TestStudio:
     @staticmethod
     def picture_source(**sensor) -> PictureSource:
-        return PictureSource(BallPlayback(), RasterRenderer(), sensor=Sensor(**sensor), seed=0)
+        return PictureSource(BallPlayback(), RasterRenderer(), sensor=SensorSection(**sensor), seed=0)
 
     def test_a_picture_for_people_is_smooth_and_true(self):
         exposures = ExposureSchedule.ideal(RIG, TIME)
@@ -235,7 +235,7 @@ class TestStudio:
         np.testing.assert_allclose(blurred[floor].mean(), sharp[floor].mean(), atol=1.0)
 
     def test_a_picture_that_never_arrives_is_black(self):
-        exposures = schedule_exposures(RIG, Faults(dead=(1,)), TIME, seed=1)
+        exposures = schedule_exposures(RIG, FaultsSection(dead=(1,)), TIME, seed=1)
         assert not self.picture_source().picture(exposures, 0, 1).any()
         with pytest.raises(ValueError, match="view 1 delivers no picture in frame 0"):
             self.picture_source().image(exposures, 0, 1)

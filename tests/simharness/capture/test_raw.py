@@ -12,7 +12,7 @@ from simharness.capture.raw import BLACK, WHITE, raw_picture
 from simharness.capture.sensor import develop
 from simharness.scenario.load import load
 from simharness.scenario.presets import SENSORS, summary_of
-from simharness.scenario.sections.cameras import Sensor
+from simharness.scenario.sections.cameras import SensorSection
 from simharness.types.random_streams import stream
 from simharness.types.srgb import from_linear, to_linear
 
@@ -24,7 +24,7 @@ WHITE_PICTURE = np.full((150, 200, 3), 255, np.uint8)
 
 def light(rgb, *, exposure=1.0, camera=CAMERA, draw=0, **dials):
     """The linear light that a sensor reads, (h, w, 3)."""
-    raw = raw_picture(rgb, Sensor(**dials), stream(0, "test", draw), camera=camera, exposure=exposure)
+    raw = raw_picture(rgb, SensorSection(**dials), stream(0, "test", draw), camera=camera, exposure=exposure)
     return (raw.astype(float) - BLACK) / (WHITE - BLACK)
 
 
@@ -131,7 +131,7 @@ def test_an_exposure_clips_at_white():
 def test_an_aberration_needs_a_camera():
     for dial in ("vignetting", "aberration"):
         with pytest.raises(ValueError, match="expected a camera"):
-            develop(WHITE_PICTURE, Sensor(**{dial: 0.01}), seed=0, view=0, frame=0)
+            develop(WHITE_PICTURE, SensorSection(**{dial: 0.01}), seed=0, view=0, frame=0)
 
 
 DIALS = {
@@ -151,23 +151,23 @@ DIALS = {
 @pytest.mark.parametrize("dial", DIALS)
 def test_each_dial_changes_the_picture_and_none_at_zero(dial):
     picture, where = smooth_picture(), {"seed": 3, "view": 1, "frame": 2, "camera": CAMERA}
-    assert (develop(picture, Sensor(**{dial: DIALS[dial]}), **where) != picture).any()
-    assert develop(picture, Sensor(**{dial: type(DIALS[dial])(0)}), **where) is picture
+    assert (develop(picture, SensorSection(**{dial: DIALS[dial]}), **where) != picture).any()
+    assert develop(picture, SensorSection(**{dial: type(DIALS[dial])(0)}), **where) is picture
     others = {key: value for key, value in DIALS.items() if key != dial}
     np.testing.assert_array_equal(
-        develop(picture, Sensor(**others), **where),
-        develop(picture, Sensor(**others, **{dial: type(DIALS[dial])(0)}), **where),
+        develop(picture, SensorSection(**others), **where),
+        develop(picture, SensorSection(**others, **{dial: type(DIALS[dial])(0)}), **where),
     )
 
 
 def test_the_raw_path_without_lens_and_noise_is_the_identity():
     """A blur that is too small to see leaves all 256 values as they are: linear light and back, through 16 bits."""
     ramp = np.tile(np.arange(256, dtype=np.uint8)[None, :, None], (4, 1, 3))
-    np.testing.assert_array_equal(develop(ramp, Sensor(softness=1e-6), seed=0, view=0, frame=0), ramp)
+    np.testing.assert_array_equal(develop(ramp, SensorSection(softness=1e-6), seed=0, view=0, frame=0), ramp)
 
 
 def test_draws_belong_to_camera_and_picture():
-    picture, sensor = smooth_picture(), Sensor(shot_noise=0.03, mosaic=True)
+    picture, sensor = smooth_picture(), SensorSection(shot_noise=0.03, mosaic=True)
 
     def noise(**key):
         where = {"seed": 0, "view": 0, "frame": 0, **key}
@@ -175,14 +175,14 @@ def test_draws_belong_to_camera_and_picture():
 
     base = noise()
     np.testing.assert_array_equal(base, noise())
-    fixed = develop(picture, Sensor(mosaic=True), seed=0, view=0, frame=0, camera=CAMERA).astype(float) - picture
+    fixed = develop(picture, SensorSection(mosaic=True), seed=0, view=0, frame=0, camera=CAMERA).astype(float) - picture
     for other in (noise(frame=1), noise(view=1), noise(seed=1)):
         assert abs(np.corrcoef((base - fixed).ravel(), (other - fixed).ravel())[0, 1]) < 0.02
 
 
 def test_a_reduced_picture_has_the_noise_of_means():
     """Reduced after the sensor or before it: the same light with the same variance, for noise without a mosaic."""
-    picture, sensor = np.full((300, 400, 3), 130, np.uint8), Sensor(shot_noise=0.05, read_noise=0.01)
+    picture, sensor = np.full((300, 400, 3), 130, np.uint8), SensorSection(shot_noise=0.05, read_noise=0.01)
     full = to_linear(develop(picture, sensor, seed=0, view=0, frame=0, camera=CAMERA))
     means = full.reshape(150, 2, 200, 2, 3).mean(axis=(1, 3))
     small = to_linear(develop(picture[:150, :200], sensor, seed=1, view=0, frame=0, camera=CAMERA, scale=0.5))
@@ -190,7 +190,9 @@ def test_a_reduced_picture_has_the_noise_of_means():
     assert small.std() == pytest.approx(means.std(), rel=0.02)
     half = scaled(CAMERA, 0.5)
     bright, dark = (
-        develop(np.full((h, w, 3), 200, np.uint8), Sensor(vignetting=1.0), seed=0, view=0, frame=0, camera=camera)
+        develop(
+            np.full((h, w, 3), 200, np.uint8), SensorSection(vignetting=1.0), seed=0, view=0, frame=0, camera=camera
+        )
         for h, w, camera in ((150, 200, CAMERA), (75, 100, half))
     )
     np.testing.assert_allclose(bright[::2, ::2].astype(int), dark, atol=3)
@@ -198,17 +200,19 @@ def test_a_reduced_picture_has_the_noise_of_means():
 
 def test_tone_darkens_shadows_and_brightens_lights():
     ramp = np.tile(np.arange(256, dtype=np.uint8)[None, :, None], (4, 1, 3))
-    out = develop(ramp, Sensor(tone=1.0), seed=0, view=0, frame=0)[0, :, 0]
+    out = develop(ramp, SensorSection(tone=1.0), seed=0, view=0, frame=0)[0, :, 0]
     share = np.arange(256) / 255
     np.testing.assert_allclose(out, 255 * (3 * share**2 - 2 * share**3), atol=0.51)
     assert (np.diff(out.astype(int)) >= 0).all()
-    np.testing.assert_array_equal(out, develop(ramp, Sensor(tone=1.0, softness=1e-6), seed=0, view=0, frame=0)[0, :, 0])
+    np.testing.assert_array_equal(
+        out, develop(ramp, SensorSection(tone=1.0, softness=1e-6), seed=0, view=0, frame=0)[0, :, 0]
+    )
 
 
 def test_sharpening_steepens_an_edge_and_keeps_flat_places():
     edge = np.full((40, 40, 3), 100, np.uint8)
     edge[:, 20:] = 150
-    out = develop(edge, Sensor(sharpening=1.0), seed=0, view=0, frame=0).astype(int)
+    out = develop(edge, SensorSection(sharpening=1.0), seed=0, view=0, frame=0).astype(int)
     assert (out[:, :14] == 100).all()
     assert (out[:, 26:] == 150).all()
     assert out[20, 19, 0] < 95
@@ -230,7 +234,7 @@ class TestProfiles:
     def test_scenarios_have_a_real_camera_unless_they_name_another(self):
         assert load("quickstart").sensor == load("quickstart", overrides=["sensor.profile=machine-vision"]).sensor
         assert load("quickstart").sensor.jpeg == 92
-        assert load("quickstart", overrides=["sensor.profile=perfect"]).sensor == Sensor()
+        assert load("quickstart", overrides=["sensor.profile=perfect"]).sensor == SensorSection()
         changed = load("quickstart", overrides=["sensor.profile=webcam", "sensor.jpeg=0"]).sensor
         assert changed == load("quickstart", overrides=["sensor.profile=webcam"]).sensor.model_copy(update={"jpeg": 0})
 

@@ -10,7 +10,7 @@ import pytest
 from mesh_shapes import _mesh, ball, box, chequered, crowd, disc, room, sheet, with_parts
 
 from simharness.capture.rendering.renderer import NEAR, make_renderer
-from simharness.scenario.sections.scenario import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
 from simharness.types.lighting import Lighting
 from simharness.world.rigs.layouts import build_rig, intrinsics, look_at
 
@@ -234,7 +234,7 @@ def assert_agree(one, other, *, share=1e-4):
 def test_the_renderers_agree_on_a_crowd(raster, gl):
     scene = crowd(32)
     seen = set()
-    for camera in build_rig(Cameras(count=3, radius=3.4, height=2.2, size=(640, 480))):
+    for camera in build_rig(CamerasSection(count=3, radius=3.4, height=2.2, size=(640, 480))):
         one, other = raster.render(camera, scene), gl.render(camera, scene)
         assert_agree(one, other)
         seen |= set(np.unique(one.ids))
@@ -244,16 +244,18 @@ def test_the_renderers_agree_on_a_crowd(raster, gl):
 def test_the_renderers_agree_on_people_of_a_scenario(raster, gl):
     from simharness.capture.joint_visibility import label_joints
     from simharness.capture.picture import meshes_at
-    from simharness.scenario.sections.scenario import Clutter, People, Scenario
+    from simharness.scenario.sections.people import PeopleSection
+    from simharness.scenario.sections.room import ClutterSection
+    from simharness.scenario.sections.scenario import Scenario
     from simharness.world.scene.build import build
     from simharness.world.scene.playback import Playback
 
     scenario = Scenario(
         name="agree",
         duration=0.1,
-        people=People(count=3, activities=("walk", "wave", "point"), spacing=0.6),
-        clutter=Clutter(boxes=2, shelves=1),
-        cameras=Cameras(count=2, size=(800, 600)),
+        people=PeopleSection(count=3, activities=("walk", "wave", "point"), spacing=0.6),
+        clutter=ClutterSection(boxes=2, shelves=1),
+        cameras=CamerasSection(count=2, size=(800, 600)),
     )
     rig = build_rig(scenario.cameras)
     scene = build(scenario, rig)
@@ -277,7 +279,7 @@ def test_the_renderers_agree_on_colours(raster, gl, lighting):
     scene = crowd(24)
     board = chequered((2.0, 2.0))
     scene[4:4] = [board.moved(board.vertices + np.float32([-1.5, 1.5, 0.3]))]
-    for camera in build_rig(Cameras(count=2, radius=3.4, height=2.2, size=(640, 480))):
+    for camera in build_rig(CamerasSection(count=2, radius=3.4, height=2.2, size=(640, 480))):
         one, other = (each.render(camera, scene, lighting=lighting).rgb.astype(int) for each in (raster, gl))
         apart = np.abs(one - other).max(axis=-1)
         assert (apart <= 2).mean() > 0.995  # the levels of detail of the board change a few pixels apart

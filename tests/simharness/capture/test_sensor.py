@@ -9,7 +9,7 @@ from test_renderers import VIEWS
 
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.sensor import blur, compressed, develop, draw_response, from_linear, to_linear
-from simharness.scenario.sections.cameras import Sensor
+from simharness.scenario.sections.cameras import SensorSection
 
 GRAY = np.full((120, 160, 3), 128, np.uint8)
 RAMP = np.tile(np.arange(256, dtype=np.uint8)[None, :, None], (4, 1, 3))
@@ -22,12 +22,12 @@ def picture():
 
 def test_with_all_parameters_at_zero_the_picture_is_unchanged(picture):
     for view in range(3):
-        assert develop(picture, Sensor(), seed=1, view=view, frame=2) is picture
+        assert develop(picture, SensorSection(), seed=1, view=view, frame=2) is picture
 
 
 @pytest.mark.parametrize("amount", [1.0, 4.0, 12.0])
 def test_noise_has_the_given_standard_deviation(amount):
-    noisy = develop(GRAY, Sensor(noise=amount), seed=3, view=0, frame=0).astype(float)
+    noisy = develop(GRAY, SensorSection(noise=amount), seed=3, view=0, frame=0).astype(float)
     apart = noisy - GRAY
     n = apart.size
     assert abs(apart.mean()) < 4 * amount / np.sqrt(n) + 1e-3
@@ -39,30 +39,30 @@ def test_noise_has_the_given_standard_deviation(amount):
 
 def test_noise_differs_between_frames_and_views_and_repeats():
     def noise(**key):
-        return develop(GRAY, Sensor(noise=5), **{"seed": 0, "view": 0, "frame": 0, **key}).astype(int) - 128
+        return develop(GRAY, SensorSection(noise=5), **{"seed": 0, "view": 0, "frame": 0, **key}).astype(int) - 128
 
     base = noise()
     np.testing.assert_array_equal(base, noise())
     for other in (noise(frame=1), noise(view=1), noise(seed=1)):
         assert abs(np.corrcoef(base.ravel(), other.ravel())[0, 1]) < 0.02
-    stronger = develop(GRAY, Sensor(noise=10), seed=0, view=0, frame=0).astype(int) - 128
+    stronger = develop(GRAY, SensorSection(noise=10), seed=0, view=0, frame=0).astype(int) - 128
     assert np.corrcoef(base.ravel(), stronger.ravel())[0, 1] > 0.99
 
 
 @given(st.integers(0, 10_000), st.floats(0.1, 1.5))
 def test_exposure_multiplies_light(seed, amount):
     """Stops are powers of two of linear light, until it clips."""
-    sensor = Sensor(exposure=amount)
+    sensor = SensorSection(exposure=amount)
     stops = draw_response(sensor, seed=seed, view=0).stops
     out = develop(RAMP, sensor, seed=seed, view=0, frame=0)[0, :, 0]
     wanted = from_linear(np.minimum(to_linear(np.arange(256)) * 2.0**stops, 1.0))
     assert np.abs(out - wanted).max() <= 0.51
-    twice = draw_response(Sensor(exposure=2 * amount), seed=seed, view=0).stops
+    twice = draw_response(SensorSection(exposure=2 * amount), seed=seed, view=0).stops
     assert twice == pytest.approx(2 * stops)
 
 
 def test_white_balance_leaves_green_and_scales_light_of_red_and_blue():
-    sensor = Sensor(white_balance=0.1)
+    sensor = SensorSection(white_balance=0.1)
     response = draw_response(sensor, seed=5, view=1)
     assert response.balance[1] == 1.0
     out = develop(RAMP, sensor, seed=5, view=1, frame=0)
@@ -73,7 +73,7 @@ def test_white_balance_leaves_green_and_scales_light_of_red_and_blue():
 
 
 def test_contrast_leaves_middle_gray():
-    sensor = Sensor(gain=0.2)
+    sensor = SensorSection(gain=0.2)
     response = draw_response(sensor, seed=2, view=0)
     out = develop(RAMP, sensor, seed=2, view=0, frame=0)[0, :, 0].astype(float)
     free = (out > 0) & (out < 255)
@@ -83,7 +83,7 @@ def test_contrast_leaves_middle_gray():
 
 
 def test_spreads_are_over_cameras():
-    sensor = Sensor(gain=0.05, white_balance=0.1, exposure=0.3)
+    sensor = SensorSection(gain=0.05, white_balance=0.1, exposure=0.3)
     many = [draw_response(sensor, seed=0, view=view) for view in range(800)]
     wanted = [
         (np.array([response.contrast - 1 for response in many]), 0.05),
@@ -98,7 +98,7 @@ def test_spreads_are_over_cameras():
 
 
 def test_parameters_do_not_shift_draws_of_others():
-    alone, all_of_them = Sensor(exposure=0.4), Sensor(exposure=0.4, gain=0.1, white_balance=0.2, noise=3)
+    alone, all_of_them = SensorSection(exposure=0.4), SensorSection(exposure=0.4, gain=0.1, white_balance=0.2, noise=3)
     for view in range(4):
         one, other = (draw_response(sensor, seed=9, view=view) for sensor in (alone, all_of_them))
         assert one.stops == other.stops
@@ -107,7 +107,7 @@ def test_parameters_do_not_shift_draws_of_others():
 def test_jpeg_changes_little_and_less_at_higher_quality(picture):
     error = {}
     for quality in (30, 60, 95):
-        out = develop(picture, Sensor(jpeg=quality), seed=0, view=0, frame=0)
+        out = develop(picture, SensorSection(jpeg=quality), seed=0, view=0, frame=0)
         assert out.shape == picture.shape
         assert out.dtype == np.uint8
         assert (out != picture).any()

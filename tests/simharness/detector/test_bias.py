@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose import COCO17, Camera, Rig
 from simharness.detector.bias import body_axes, pixel_offsets, world_offsets
-from simharness.scenario.sections.detector import Bias
+from simharness.scenario.sections.detector import BiasSection
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape
 
@@ -24,7 +24,7 @@ def test_axes_of_a_standing_person(standing):
 
 
 def test_offsets_turn_with_the_body_and_are_mirrored(standing):
-    bias = Bias(hips=(0.01, 0.02, 0.03), nose=(0.0, 0.01, 0.0))
+    bias = BiasSection(hips=(0.01, 0.02, 0.03), nose=(0.0, 0.01, 0.0))
     turn = Rotation.from_rotvec([0.3, -0.5, 1.1]).as_matrix()
     at_rest = world_offsets(standing, bias)
     np.testing.assert_allclose(world_offsets(standing @ turn.T + [3, 1, 0], bias), at_rest @ turn.T, atol=1e-12)
@@ -42,7 +42,7 @@ def test_pixel_offsets_are_those_of_the_moved_joints(standing):
         for angle in (0.0, 25.0)
     ])  # fmt: skip
     joints = np.stack([standing, standing + [0.2, 0.1, 0.0]])[None]
-    bias = Bias(knees=(0.0, 0.0, 0.05))
+    bias = BiasSection(knees=(0.0, 0.0, 0.05))
     pixels = pixel_offsets(joints, bias, rig)
     assert pixels.shape == (1, 2, 2, 17, 2)
     for view, camera in enumerate(rig):

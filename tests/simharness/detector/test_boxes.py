@@ -10,7 +10,7 @@ from simharness.detector.boxes import DUPLICATE_SCATTER, DUPLICATE_SCORE, UPPER_
 from simharness.detector.conditions import BOX_SHARE, overlaps
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import LIMB_OF_JOINT, KeyedDraws
-from simharness.scenario.sections.detector import Boxes
+from simharness.scenario.sections.detector import BoxesSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility
 
@@ -51,7 +51,7 @@ def crowd(frames=400, views=3, people=2, *, apart=200.0):
 def find(world, *, seed=5, **parameters):
     people, views, rig = world
     draws = KeyedDraws(seed, STEP * np.arange(len(views)), len(rig))
-    return apply_box_errors(people, views, rig, Boxes(**parameters), draws)
+    return apply_box_errors(people, views, rig, BoxesSection(**parameters), draws)
 
 
 def within(events, trials, probability):

@@ -10,7 +10,7 @@ from mvpose import Camera, Rig
 from simharness.detector.decoys import draw_decoy_hits
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.false_positives import MIN_JOINTS
-from simharness.scenario.sections.detector import DecoyHits
+from simharness.scenario.sections.detector import DecoyHitsSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import LookalikeViews, Views
 
@@ -47,7 +47,7 @@ def filmed(frames=300, visible=None, names=NAMES) -> Views:
 def drawn(pictures=None, /, *, seed=2, **parameters):
     pictures = filmed() if pictures is None else pictures
     draws = KeyedDraws(seed, STEP * np.arange(len(pictures)), len(RIG))
-    return draw_decoy_hits(pictures, RIG, DecoyHits(**parameters), draws)
+    return draw_decoy_hits(pictures, RIG, DecoyHitsSection(**parameters), draws)
 
 
 def within(count, trials, probability):

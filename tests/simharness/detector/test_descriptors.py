@@ -13,7 +13,7 @@ from simharness.detector.descriptor_model import DescriptorModel
 from simharness.detector.descriptors import DescriptorSettings
 from simharness.detector.detect import detect
 from simharness.detector.view_geometry import bearings, hidden_shares
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.types.views import LookalikeViews, Visibility
 
 PEOPLE, VIEWS = 12, 5
@@ -205,7 +205,7 @@ class TestDetections:
     @staticmethod
     def described(model, *, look_alike=0.0, alike=0, people=4, frames=40, **sections):
         where = with_decoys(world(frames=frames, people=people))
-        config = Detector.model_validate(sections)
+        config = DetectorSection.model_validate(sections)
         settings = DescriptorSettings(model, look_alike, alike)
         return detect(where.sequence, where.views, where.rig, config, seed=3, descriptors=settings)
 
@@ -316,7 +316,7 @@ class TestDetections:
     def test_without_settings_there_are_no_descriptors_and_nothing_else_changes(self, model):
         where = with_decoys(world(frames=40, people=4))
         sections = {"keypoints": {"scatter": 0.3}, "phantoms": {"rate": 0.5}}
-        plain = detect(where.sequence, where.views, where.rig, Detector.model_validate(sections), seed=3)
+        plain = detect(where.sequence, where.views, where.rig, DetectorSection.model_validate(sections), seed=3)
         for one, other in zip(plain, self.described(model, **sections), strict=True):
             assert one.detections.descriptors is None
             np.testing.assert_array_equal(one.detections.keypoints, other.detections.keypoints)

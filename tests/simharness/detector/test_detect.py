@@ -11,7 +11,7 @@ from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
 from simharness.scenario.load import load
 from simharness.scenario.presets import PROFILES, read_profile
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import CaptureFrames
 from simharness.types.truth import MISS_FROM, KeypointError
@@ -20,7 +20,7 @@ from simharness.world.scene.playback import simulate
 
 
 def run(where, *, seed=3, **sections):
-    return detect(where.sequence, where.views, where.rig, Detector.model_validate(sections), seed=seed)
+    return detect(where.sequence, where.views, where.rig, DetectorSection.model_validate(sections), seed=seed)
 
 
 def by_person(frames, views, people):

@@ -7,7 +7,7 @@ from worlds import world
 from mvpose.wholebody import skeleton_by_name
 from simharness.detector.conditions import BOX_SHARE
 from simharness.detector.detect import detect
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility
 from simharness.types.whole_body import OuterTruth, OuterViews
@@ -30,7 +30,9 @@ def outer_of(where, visibility=Visibility.VISIBLE):
 
 def found(where, outer, **detector):
     """Return keypoints (T, V, P, 26, 2) and scores of everybody; NaN where not detected."""
-    detected = detect(where.sequence, where.views, where.rig, Detector.model_validate(detector), seed=2, outer=outer)
+    detected = detect(
+        where.sequence, where.views, where.rig, DetectorSection.model_validate(detector), seed=2, outer=outer
+    )
     keypoints = np.full((*where.views.pixels.shape[:3], 26, 2), np.nan)
     scores = np.zeros(keypoints.shape[:-1])
     for frame, each in enumerate(detected):
@@ -52,7 +54,7 @@ def test_a_perfect_detector_reports_the_true_pixels_and_the_body_unchanged():
 
 def test_nothing_of_the_body_depends_on_feet():
     where = world(frames=20, together=True)
-    config = Detector.model_validate(
+    config = DetectorSection.model_validate(
         {
             "keypoints": {"scatter": 0.3, "miss": 0.1, "swap": 0.2, "drop": {"visible": 0.1}},
             "boxes": {"merged": 0.3, "split": 0.1, "duplicates": 0.1},

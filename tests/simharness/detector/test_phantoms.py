@@ -13,8 +13,8 @@ from simharness.detector.birth_death import BirthDeathProcess, assign_slots, fra
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.phantom_poses import NORMALS, postures, project_upright
 from simharness.detector.phantoms import draw_phantoms, viewed_area
-from simharness.scenario.sections.detector import Phantoms
-from simharness.scenario.sections.scenario import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.detector import PhantomsSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility
 from simharness.world.rigs.layouts import build_rig
@@ -23,7 +23,7 @@ STEP = 0.1  # seconds
 
 
 def ring(count=4, **more) -> Rig:
-    return build_rig(Cameras(count=count, radius=3.7, height=1.8, **more))
+    return build_rig(CamerasSection(count=count, radius=3.7, height=1.8, **more))
 
 
 def filmed(frames=400, views=4, people=2, seed=0) -> Views:
@@ -47,7 +47,7 @@ def drawn(rig=None, pictures=None, /, *, seed=3, **parameters):
     rig = rig or ring()
     pictures = filmed(views=len(rig)) if pictures is None else pictures
     draws = KeyedDraws(seed, STEP * np.arange(len(pictures)), len(rig))
-    return draw_phantoms(pictures, rig, Phantoms(**parameters), draws)
+    return draw_phantoms(pictures, rig, PhantomsSection(**parameters), draws)
 
 
 def poses(found, frames=None) -> set[tuple[int, int, bytes]]:

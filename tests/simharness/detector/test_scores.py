@@ -7,7 +7,7 @@ from simharness.detector.conditions import Conditions
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.keypoints import find_keypoints
 from simharness.detector.scores import MIN_SCORE, score_keypoints
-from simharness.scenario.sections.detector import KINDS, Correlation, Keypoints, Scores
+from simharness.scenario.sections.detector import KINDS, CorrelationSection, KeypointsSection, ScoresSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import Visibility
 
@@ -24,12 +24,14 @@ def scored(where=None, *, seed=1, parameters=None, **config):
         "swap": 0.2,
         "drop": {"visible": 0.1},
     }
-    conditions, tie = Conditions.of(where.views), Correlation()
+    conditions, tie = Conditions.of(where.views), CorrelationSection()
     draws = KeyedDraws(seed, where.sequence.time, len(where.rig))
     found = find_keypoints(
-        where.views, conditions, where.sequence, where.rig, Keypoints.model_validate(parameters), tie, draws
+        where.views, conditions, where.sequence, where.rig, KeypointsSection.model_validate(parameters), tie, draws
     )
-    return found, score_keypoints(found.error, found.guessed, conditions, Scores.model_validate(config), tie, draws)
+    return found, score_keypoints(
+        found.error, found.guessed, conditions, ScoresSection.model_validate(config), tie, draws
+    )
 
 
 def test_by_default_all_scores_are_one():

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from mvpose import Camera, Detections, Pipeline, Rig
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.heatmaps import ASPECT, PADDING, Peaks, drop_outside_crops
-from simharness.scenario.sections.detector import HeatmapHead
+from simharness.scenario.sections.detector import HeatmapHeadSection
 from simharness.types.truth import KeypointError
 
 SIZES = ("64x48", "96x72")
@@ -19,7 +19,7 @@ def peaks(m=6, *, seed=0, scores=None, contested=0.0, **head):
     keypoints, others = low[:, None] + rng.random((2, m, 17, 2)) * size[:, None]
     scores = rng.uniform(0.1, 1.0, (m, 17)) if scores is None else np.full((m, 17), scores)
     others[rng.random((m, 17)) >= contested] = np.nan
-    return Peaks(np.hstack([low, size]), keypoints, scores, others, HeatmapHead(**{"size": "64x48", **head}))
+    return Peaks(np.hstack([low, size]), keypoints, scores, others, HeatmapHeadSection(**{"size": "64x48", **head}))
 
 
 class TestKeypoints:
@@ -50,7 +50,7 @@ class TestKeypoints:
         assert maps.values.max() <= score + 1e-6
 
     def test_crops_are_those_of_top_down_heads(self):
-        head = HeatmapHead(size="64x48")
+        head = HeatmapHeadSection(size="64x48")
         boxes = np.array([[100.0, 50, 60, 200], [10, 20, 300, 100], [400, 300, 0, 0]])
         nowhere = np.full((3, 17, 2), np.nan)
         maps = Peaks(boxes, nowhere, np.zeros((3, 17)), nowhere, head).heatmaps()
@@ -168,7 +168,7 @@ def test_the_method_uses_rivals():
     keypoints[1, knees], rivals[1, knees] = pixels[1, knees[::-1]], pixels[1, knees]
     spread = []
     for others in (none, rivals):
-        maps = Peaks(boxes, keypoints, scores, others, HeatmapHead(size="96x72")).heatmaps()
+        maps = Peaks(boxes, keypoints, scores, others, HeatmapHeadSection(size="96x72")).heatmaps()
         detections = Detections(np.arange(4), keypoints, scores, boxes, np.full(4, 0.9), likelihoods=maps)
         found = Pipeline.preset("full").estimate(rig, detections)
         assert len(found.joints) == 1

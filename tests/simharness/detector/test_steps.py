@@ -11,7 +11,7 @@ from simharness.detector.detect import detect
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.error_classes import MIRROR
 from simharness.detector.steps import Context, StepStage, registered_steps, step
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.scenario.sections.section import Section
 from simharness.types.truth import KeypointError
 from simharness.types.views import Visibility
@@ -26,7 +26,7 @@ def registry(monkeypatch):
 
 
 def run(where, *, seed=3, **sections):
-    return detect(where.sequence, where.views, where.rig, Detector.model_validate(sections), seed=seed)
+    return detect(where.sequence, where.views, where.rig, DetectorSection.model_validate(sections), seed=seed)
 
 
 def keypoints(frames):
@@ -50,7 +50,7 @@ def test_the_order_does_not_depend_on_the_order_of_imports(registry):
 
 
 def test_every_section_of_the_detector_is_read_by_a_step():
-    sections = {name for name, value in Detector() if isinstance(value, Section)}
+    sections = {name for name, value in DetectorSection() if isinstance(value, Section)}
     assert sections == {section for each in registered_steps() for section in each.sections}
 
 
@@ -108,7 +108,7 @@ def test_without_steps_detections_are_perfect(registry):
     seen = np.full((5, 3, 2, 17), Visibility.SELF_OCCLUDED)
     seen[..., 16] = Visibility.OUTSIDE
     where = world(frames=5, visibility=seen)
-    context = Context(where.sequence, where.views, where.rig, Detector(), None)
+    context = Context(where.sequence, where.views, where.rig, DetectorSection(), None)
     block = DetectionBlock.of_people(where.views)
     for each in registered_steps():
         block = each.apply(block, context)
@@ -128,7 +128,7 @@ def test_steps_do_not_change_the_block_they_get():
         "phantoms": {"rate": 1.0},
         "heatmaps": {"size": "64x48"},
     }
-    config = Detector.model_validate(sections)
+    config = DetectorSection.model_validate(sections)
     context = Context(where.sequence, where.views, where.rig, config, steps.KeyedDraws(1, where.sequence.time, 3))
     block = DetectionBlock.of_people(where.views)
     for each in registered_steps():

@@ -9,7 +9,7 @@ from mvpose import Camera, Rig
 from simharness.detector.conditions import Conditions
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.keypoints import find_keypoints
-from simharness.scenario.sections.detector import Correlation, Keypoints
+from simharness.scenario.sections.detector import CorrelationSection, KeypointsSection
 from simharness.types.landmarks import LANDMARKS
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views, Visibility
@@ -51,9 +51,9 @@ def within(count, trials, probability):
 
 def find(where, *, seed=3, correlation=None, kind="top-down", **parameters):
     """Return the keypoints that a detector with some parameters of [detector.keypoints] finds."""
-    config = Keypoints.model_validate(parameters)
+    config = KeypointsSection.model_validate(parameters)
     draws = KeyedDraws(seed, where.sequence.time, len(where.rig))
-    tie = Correlation.model_validate(correlation or {})
+    tie = CorrelationSection.model_validate(correlation or {})
     conditions = Conditions.of(where.views)
     return find_keypoints(where.views, conditions, where.sequence, where.rig, config, tie, draws, kind=kind)
 

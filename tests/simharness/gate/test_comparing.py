@@ -9,10 +9,10 @@ import pytest
 from simharness.gate.baseline import FRAMES, GATED, TIME, Measurement
 from simharness.gate.compare import compare
 from simharness.gate.trial_command import TrialKey
-from simharness.scenario.sections.gate import Gate
+from simharness.scenario.sections.gate import GateSection
 from simharness.scoring.catalogue import SCORES
 
-GATE = Gate()
+GATE = GateSection()
 USUAL = {
     "pcp": 92.0,
     "recall": 97.0,
@@ -100,10 +100,10 @@ def test_a_gain_beyond_its_bound_is_unexpected(score):
     assert named(improvements(lambda trial: {score: gain}, **size)) == {
         (score, variant, case) for variant in ("fast", "full") for case in (None, *CASES[:2])
     }
-    wide = Gate.model_validate({"improvement": {score: abs(3 * gain)}})
+    wide = GateSection.model_validate({"improvement": {score: abs(3 * gain)}})
     assert not improvements(lambda trial: {score: gain}, wide, **size)
     assert not regressions(lambda trial: {score: gain}, **size)
-    narrow = Gate.model_validate({"improvement": {score: abs(0.1 * gain)}})
+    narrow = GateSection.model_validate({"improvement": {score: abs(0.1 * gain)}})
     assert improvements(lambda trial: {score: 0.2 * gain}, narrow, **size)  # less than the tolerance
 
 
@@ -170,13 +170,13 @@ def test_on_another_processor_a_frame_may_take_longer():
     there = as_measurement(measured(lambda trial: {TIME: 0.4}).scores, "b")
     assert not compare(here, there, GATE).with_verdict("worse")
     assert compare(here, as_measurement(there.scores, "a"), GATE).with_verdict("worse")
-    assert compare(here, there, Gate(slowdown_elsewhere=1.3)).with_verdict("worse")
+    assert compare(here, there, GateSection(slowdown_elsewhere=1.3)).with_verdict("worse")
 
 
 def test_a_certain_loss_within_its_tolerance_is_no_regression():
     assert not regressions(lambda trial: {key: 0.9 * bad_step(key) for key in GATED})
     assert regressions(lambda trial: {"pcp": -0.6})
-    assert not regressions(lambda trial: {"pcp": -0.6}, Gate.model_validate({"tolerance": {"pcp": 1.5}}))
+    assert not regressions(lambda trial: {"pcp": -0.6}, GateSection.model_validate({"tolerance": {"pcp": 1.5}}))
 
 
 def test_a_small_mean_of_large_changes_is_within_its_tolerance():
@@ -263,7 +263,7 @@ def flipped(signs, size):
 @pytest.mark.parametrize("score", ["pcp", TIME])
 def test_random_changes_of_whole_seeds_are_called_regressions_no_more_often_than_the_level(score):
     """All sign patterns of six seeds: the share that fails is at most the level."""
-    gate = Gate(level=0.07)
+    gate = GateSection(level=0.07)
 
     def size(case, seed, sign):
         moved = sign * (4.0 + 0.5 * seed + 0.1 * case)
@@ -333,7 +333,7 @@ def test_time_is_compared_by_the_middle_half_of_its_ratios():
     held_up = np.random.default_rng(0).permutation(11 * 12) < 25  # the machine was busy, a fifth of the time
     busy = {(case, seed): held_up[12 * index + seed] for index, case in enumerate(CASES) for seed in range(12)}
     assert not regressions(lambda trial: {TIME: math.log(20.0) if busy[trial[:2]] else 0.0})
-    assert not regressions(lambda trial: {TIME: math.log(2.0)}, Gate(slowdown=2.5))
+    assert not regressions(lambda trial: {TIME: math.log(2.0)}, GateSection(slowdown=2.5))
 
 
 def test_a_slowdown_in_one_case_is_found_in_that_case():
@@ -372,6 +372,6 @@ def test_regressions_come_whole_suite_first_and_worst_first():
 
 
 def test_a_tolerance_of_zero_is_valid():
-    strict = Gate.model_validate({"tolerance": {"pcp": 0.0}})
+    strict = GateSection.model_validate({"tolerance": {"pcp": 0.0}})
     assert not regressions(lambda trial: {}, strict)
     assert named(regressions(lambda trial: {"pcp": -0.01}, strict)) >= {("pcp", "full", None)}

@@ -16,7 +16,7 @@ from simharness.gate.gate_result import FailedCase, GateResult
 from simharness.gate.junit import SPEED, WHOLE, junit
 from simharness.gate.markdown import markdown
 from simharness.gate.trial_command import TrialKey
-from simharness.scenario.sections.gate import Gate
+from simharness.scenario.sections.gate import GateSection
 from simharness.scoring.catalogue import SCORES
 
 COMMAND = "simharness run a.toml --set 'cases={}' --seed 3"
@@ -43,8 +43,8 @@ def made(change=lambda trial: {}, *, failed=(), cases=("base", "a<b|c", "crowd")
     trials = [TrialKey(case, seed, variant) for case in cases for seed in range(seeds) for variant in ("full", "fast")]
     before = Measurement("ci", "0" * 10, "1", "zen", {trial: dict(usual) for trial in trials})
     after = {trial: {key: value + change(trial).get(key, 0) for key, value in usual.items()} for trial in trials}
-    comparison = compare(before, Measurement("ci", "0" * 10, "1", "zen", after), Gate())
-    return GateResult("ci", ("full", "fast"), Gate(), comparison, tuple(failed), 36, trials[0], COMMAND, 61.25)
+    comparison = compare(before, Measurement("ci", "0" * 10, "1", "zen", after), GateSection())
+    return GateResult("ci", ("full", "fast"), GateSection(), comparison, tuple(failed), 36, trials[0], COMMAND, 61.25)
 
 
 def crowded(trial):

@@ -11,7 +11,7 @@ from suites import QUICKSTART
 from simharness.gate.baseline import FRAMES, TIME
 from simharness.gate.compare import compare
 from simharness.gate.suite import run_suite
-from simharness.scenario.sections.gate import Gate
+from simharness.scenario.sections.gate import GateSection
 from simharness.scenario.study_definition import load_study
 
 SUITE = f"""
@@ -126,7 +126,7 @@ def measured(tmp_path_factory):
 
 def verdicts(before, after):
     """Return verdict by score, of scores with one; times of a few frames are left out."""
-    changes = compare(before, after, Gate()).changes
+    changes = compare(before, after, GateSection()).changes
     return {change.score: change.verdict for change in changes if change.verdict != "same" and change.score != TIME}
 
 

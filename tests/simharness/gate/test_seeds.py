@@ -8,7 +8,7 @@ from simharness.gate.required_seeds import least_corrected_p, least_seeds
 from simharness.gate.runner import baseline_of
 from simharness.gate.suite import fingerprint
 from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
-from simharness.scenario.sections.gate import Gate
+from simharness.scenario.sections.gate import GateSection
 from simharness.scenario.study_definition import load_study
 
 
@@ -24,7 +24,7 @@ def test_no_comparison_has_a_smaller_p_value_than_the_least(seeds, cases):
         }
         return Measurement("few", "0123456789", "1", "zen", scores)
 
-    changes = compare(measured(0.0), measured(-9.0), Gate()).changes
+    changes = compare(measured(0.0), measured(-9.0), GateSection()).changes
     p = min(change.p for change in changes if change.score == "pcp")
     least = least_corrected_p(seeds, cases=cases)
     assert least <= p <= 4 * least

@@ -8,7 +8,9 @@ import pytest
 from mvpose import Detections, Estimate, Matching
 from simharness.outputs.run.page import joint_errors, person_errors, render
 from simharness.outputs.run.result_folder import score_table
-from simharness.scenario.sections.scenario import Cameras, People, Scenario
+from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import score_variant
 from simharness.scoring.summary import summarize
 from simharness.trial.run_folder import Record
@@ -25,7 +27,7 @@ def make_record(*, people: int = 3, lost: bool = True, absent: int | None = None
     Person 0 is missed in frame 2 unless ``lost`` is false; person ``absent`` is there in the first frame alone.
     """
     rng = np.random.default_rng(0)
-    rig = build_rig(Cameras(count=2))
+    rig = build_rig(CamerasSection(count=2))
     truth, estimates, detections = [], [], []
     for frame in range(FRAMES):
         joints = rng.uniform(-0.2, 0.2, (people, 17, 3)) + [1.0, 0, 1.0] * np.arange(people)[:, None, None]
@@ -51,7 +53,7 @@ def make_record(*, people: int = 3, lost: bool = True, absent: int | None = None
         estimates.append(Estimate(answer, np.ones(answer.shape[:2]), Matching(np.zeros(0, np.int64))))
     time = np.arange(FRAMES) / 10
     scores = {"full": score_variant(Recording(time, rig, tuple(detections), tuple(truth)), estimates)}
-    settings = Scenario(name="made", people=People(count=people), **scenario)
+    settings = Scenario(name="made", people=PeopleSection(count=people), **scenario)
     return Record(
         scenario=settings,
         rig=rig,

@@ -10,7 +10,7 @@ import pytest
 from mvpose.report.svg_plots import STAGE_COLORS
 from simharness.outputs.run import plots
 from simharness.outputs.study import plots as study_plots
-from simharness.scenario.sections.scenario import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval
 from simharness.world.rigs.layouts import build_rig
@@ -29,7 +29,7 @@ def draw_all(people: int = 3, frames: int = 6) -> list[str]:
         plots.visibility_shares([f"cam{k}" for k in range(5)], shares, labels=list("abcde")),
         plots.stage_times({"full": {"affinity": 1.0, "matching": 2.0, "total": 3.1}, "other": {"affinity": 4.0}}),
         plots.floor_plan(
-            build_rig(Cameras()),
+            build_rig(CamerasSection()),
             (8.0, 8.0),
             things=[np.array([[0, 0], [1, 0], [1, 1.0]])],
             paths=rng.normal(size=(frames, people, 2)),
@@ -90,7 +90,7 @@ def test_empty_data_gives_a_plot():
     assert "<svg" in plots.error_over_time(np.arange(4.0), missed, np.ones((4, 2), bool), colors=COLORS)
     assert "<svg" in plots.error_distribution({"full": np.zeros(0)})
     assert "<svg" in plots.stage_times({})
-    rig = build_rig(Cameras())
+    rig = build_rig(CamerasSection())
     empty = {"things": [], "paths": np.zeros((4, 0, 2)), "estimates": np.zeros((0, 2)), "colors": []}
     assert "<svg" in plots.floor_plan(rig, (8, 8), **empty)
 

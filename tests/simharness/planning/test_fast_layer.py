@@ -11,11 +11,11 @@ from simharness.planning.joint_error import covariance, expected_distance, infor
 from simharness.planning.standing_people import APART, bearings_of, pose_pool, standing_scenes
 from simharness.planning.visibility import see, seen_joints
 from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.detector import Correlation, Detector, Factors
+from simharness.scenario.sections.detector import CorrelationSection, DetectorSection, Factors
 from simharness.types.views import Visibility
 from simharness.world.rigs.layouts import look_at
 
-PERFECT = Detector()
+PERFECT = DetectorSection()
 
 
 def camera(x, y, z=1.5, *, at=(0.0, 0.0, 0.9), name="", focal=500.0, size=(800, 600)):
@@ -254,7 +254,7 @@ class TestSightings:
         shared = PERFECT.model_copy(
             update={
                 "keypoints": read_profile("typical").keypoints.model_copy(update={"quality": 0.0}),
-                "correlation": Correlation(scatter_views=1.0, gross_views=1.0, views=1.0),
+                "correlation": CorrelationSection(scatter_views=1.0, gross_views=1.0, views=1.0),
             }
         )
         layer = FastLayer.of(Volume.box(1, 1), detector=shared, people=1, spacing=1.0, orientations=32)

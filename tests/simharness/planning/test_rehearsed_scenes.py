@@ -15,7 +15,7 @@ from simharness.planning.simulation import SceneBatch, simulate_scenes
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.room import Clutter
+from simharness.scenario.sections.room import ClutterSection
 
 WHOLE = (0, 1, 2, 3, 4)
 WORSE = Condition(WHOLE, "rotation", 2.0)
@@ -95,7 +95,7 @@ def test_a_crowd_that_does_not_fit_is_left_out_beside_people_who_do():
 
 
 def test_clutter_hides_people_in_one_long_take():
-    cluttered = simulated([Condition(WHOLE)], clutter=Clutter(boxes=3))
+    cluttered = simulated([Condition(WHOLE)], clutter=ClutterSection(boxes=3))
     assert cluttered.places.shape[0] == 16
     assert 50 < cluttered.scores[Condition(WHOLE)].pcp <= 100
 

@@ -15,7 +15,7 @@ from simharness.reality.reenactment import Film
 from simharness.runtime.progress import Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.load import load
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import capture_trial
 from simharness.types.sequence import Sequence
@@ -37,7 +37,7 @@ class FilmedPeople:
 
     def detections(self, *, seed: int = 1, **parameters) -> tuple[Detections, ...]:
         """Return the detections of a detector with some parameters of [detector]; perfect without any."""
-        config = Detector.model_validate(parameters)
+        config = DetectorSection.model_validate(parameters)
         found = detect(self.sequence, self.views, self.rig, config, seed=seed)
         return tuple(each.detections for each in found)
 

@@ -12,7 +12,7 @@ from simharness.reality.detector_fit.fit import fit
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.sample import sample_of
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, track_people
-from simharness.scenario.sections.annotation import Annotation
+from simharness.scenario.sections.annotation import AnnotationSection
 from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS
 
 LIMBS = slice(0, 12)  # of SHELF14
@@ -108,7 +108,7 @@ class TestDrawn:
         np.testing.assert_array_equal(partly[50:], whole[50:])
 
     def test_the_section_of_a_scenario_has_drawn_shifts(self):
-        config = Annotation(shift=0.03, random=0.01, life=0.5, noise=0.1)
+        config = AnnotationSection(shift=0.03, random=0.01, life=0.5, noise=0.1)
         drawn = AnnotationModel.drawn(config, 200, seed=1)
         assert drawn.shift.std() == pytest.approx(0.03, rel=0.05)
         assert (drawn.deviation == 0.01).all()

@@ -10,7 +10,7 @@ from turning_people import walkers
 from mvpose import Rig
 from simharness.reality.people_tracks import LIMB_JOINTS, TrackedPeople
 from simharness.reality.reenactment import cut_takes, film, floor_height
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.types.views import Visibility
 
 SHIFT = np.array([0.0, 0.0, -0.14])
@@ -129,7 +129,7 @@ def test_pictures_are_those_of_the_recording(filmed, made, recording, people):
 def test_absent_people_are_in_no_picture(made, recording):
     assert (made.views.visibility[30:, :, 2] == Visibility.OUTSIDE).all()
     assert (made.views.boxes[30:, :, 2] == 0).all()
-    found = made.detected(Detector(), seed=0)
+    found = made.detected(DetectorSection(), seed=0)
     assert len(found) == len(recording)
     assert max(np.bincount(each.view).max() for each in found[30:]) == 2
     assert max(np.bincount(each.view).max() for each in found[:30]) == 3

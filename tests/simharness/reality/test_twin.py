@@ -14,9 +14,9 @@ from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS
 from simharness.reality.seed_evaluation import PcpInterval
 from simharness.reality.twin import TwinModel, detected_twin, simulate_twins
 from simharness.reality.twin_comparison import TwinComparison, compare
-from simharness.scenario.sections.detector import Bias, Detector
+from simharness.scenario.sections.detector import BiasSection, DetectorSection
 
-DETECTOR = Detector.model_validate(
+DETECTOR = DetectorSection.model_validate(
     {"name": "known", "kind": "bottom-up", "keypoints": {"scatter": 0.3}, "boxes": {"missed": 0.1}}
 )
 
@@ -76,7 +76,7 @@ class TestTwin:
 
     def test_the_bias_of_limbs_is_in_the_film_already(self, model, twin):
         """Bodies re-enact joints as detected: hips that the detector raises are raised in the film."""
-        bias = Bias(hips=(0.0, 0.01, 0.05), ankles=(0.0, 0.0, 0.03))
+        bias = BiasSection(hips=(0.0, 0.01, 0.05), ankles=(0.0, 0.0, 0.03))
         biased = detected_twin(
             replace(model, detector=DETECTOR.model_copy(update={"bias": bias})), model.films[0], seed=0
         )

@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 
 from simharness.scenario.load import ScenarioError, fingerprint, load
 from simharness.scenario.resolution import read_plan
-from simharness.scenario.sections.scenario import Cameras, People, Scenario
+from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_files import dumps
 
 SHIPPED = sorted((Path(__file__).parents[3] / "scenarios").glob("*.toml"))
@@ -257,7 +259,9 @@ class TestOverrides:
         assert getattr(getattr(loaded, section), key) == value
 
     def test_only_the_named_key_changes(self, base):
-        assert load(base, overrides=["people.count=6"]) == load(base).model_copy(update={"people": People(count=6)})
+        assert load(base, overrides=["people.count=6"]) == load(base).model_copy(
+            update={"people": PeopleSection(count=6)}
+        )
 
     def test_the_last_of_two_counts(self, base):
         assert load(base, overrides=["people.count=6", "people.count=1"]).people.count == 1
@@ -309,9 +313,9 @@ SCENARIOS = st.builds(
     name=st.from_regex(r"[a-z0-9][a-z0-9_-]{0,99}", fullmatch=True),
     description=st.text(max_size=1000),
     seed=st.integers(0, 2**53 - 1),
-    people=st.builds(People, count=st.integers(0, 100)),
+    people=st.builds(PeopleSection, count=st.integers(0, 100)),
     cameras=st.builds(
-        Cameras,
+        CamerasSection,
         fov=st.floats(1.0, 170.0, exclude_min=True, exclude_max=True),
         start=st.floats(-360.0, 360.0),
     ),

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from simharness.scenario.load import ScenarioError, load
 from simharness.scenario.presets import PROFILES, read_profile
-from simharness.scenario.sections.detector import KINDS, Detector, Keypoints
+from simharness.scenario.sections.detector import KINDS, DetectorSection, KeypointsSection
 from simharness.scenario.toml_files import dumps
 
 
@@ -89,12 +89,12 @@ def test_every_shipped_profile_is_named_as_its_file(path):
 
 
 def test_without_settings_a_detector_is_perfect():
-    assert read_profile("perfect") == Detector()
+    assert read_profile("perfect") == DetectorSection()
 
 
 @given(st.floats(0, 1), st.sampled_from(KINDS))
 def test_a_number_is_meant_for_all_joints(share, kind):
-    assert getattr(Keypoints.model_validate({"miss": share}).miss, kind) == share
+    assert getattr(KeypointsSection.model_validate({"miss": share}).miss, kind) == share
 
 
 def test_a_date_in_the_place_of_text_or_a_number_is_read_as_text(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 
 from simharness.scenario.load import ScenarioError, load
 from simharness.scenario.presets import RIGS, summary_of
-from simharness.scenario.sections.scenario import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
 from simharness.scenario.study_definition import load_study
 from simharness.world.rigs.layouts import build_rig
 
@@ -53,18 +53,18 @@ def test_ring5_is_quickstarts_rig(scenario):
 
 
 def test_there_is_no_rig_where_none_is_named(scenario):
-    assert load(scenario("")).cameras == Cameras()
-    assert load(scenario('[cameras]\nrig = ""\ncount = 4')).cameras == Cameras(count=4)
+    assert load(scenario("")).cameras == CamerasSection()
+    assert load(scenario('[cameras]\nrig = ""\ncount = 4')).cameras == CamerasSection(count=4)
 
 
 def test_other_keys_change_a_rig(scenario):
     cameras = load(scenario('[cameras]\nrig = "mine"\ncount = 3'), overrides=["cameras.height=1.5"]).cameras
-    assert cameras == Cameras(layout="arc", count=3, fov=50.0, height=1.5)
+    assert cameras == CamerasSection(layout="arc", count=3, fov=50.0, height=1.5)
 
 
 def test_a_rig_may_begin_with_another_and_name_files_beside_it(scenario, tmp_path):
     (tmp_path / "rigs" / "other.toml").write_text('rig = "mine"\ncount = 2\n')
-    assert load(scenario('[cameras]\nrig = "other"')).cameras == Cameras(layout="arc", count=2, fov=50.0)
+    assert load(scenario('[cameras]\nrig = "other"')).cameras == CamerasSection(layout="arc", count=2, fov=50.0)
     (tmp_path / "rigs" / "real.toml").write_text('layout = "file"\nfile = "calibration.json"\n')
     cameras = load(scenario('[cameras]\nrig = "real"')).cameras
     assert cameras.file == str(tmp_path / "rigs" / "calibration.json")
@@ -77,19 +77,19 @@ class TestCamerasThatWereWrittenOut:
 
     def test_they_make_way_for_one_on_the_command_line(self, scenario):
         cameras = load(scenario(self.WRITTEN), overrides=["cameras.fov=60", "cameras.rig=mine"]).cameras
-        assert cameras == Cameras(layout="arc", count=7, fov=60.0)
+        assert cameras == CamerasSection(layout="arc", count=7, fov=60.0)
 
     def test_they_make_way_for_one_of_a_file_that_extends_them(self, scenario, tmp_path):
         scenario(self.WRITTEN)
         top = tmp_path / "top.toml"
         top.write_text('extends = "room.toml"\n[cameras]\nrig = "mine"\nfov = 60')
-        assert load(top).cameras == Cameras(layout="arc", count=7, fov=60.0)
+        assert load(top).cameras == CamerasSection(layout="arc", count=7, fov=60.0)
 
     def test_they_make_way_for_one_of_a_case(self, scenario):
         study = load_study(scenario(self.WRITTEN + '[cases.a]\n[cases.b]\ncameras.rig = "mine"'))
         assert [setting.scenario.cameras for setting in study.settings] == [
-            Cameras(count=4, heights=(1.0, 2.0)),
-            Cameras(layout="arc", count=7, fov=50.0),
+            CamerasSection(count=4, heights=(1.0, 2.0)),
+            CamerasSection(layout="arc", count=7, fov=50.0),
         ]
 
     def test_they_would_change_all_rigs_of_a_sweep(self, scenario):

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from mvpose import Rig
-from simharness.scenario.sections.scenario import Cameras, Clutter, Faults, People, Rendering, Scenario
+from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
+from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.scenario import RenderingSection, Scenario
 from simharness.scenario.study_definition import load_study
 from simharness.study.runner import run_study
 from simharness.trial.audit import AuditError, audit, check_calibration, check_clocks, sampled_pictures
@@ -17,7 +20,7 @@ from simharness.types.views import Visibility
 from simharness.world.rigs.faults import schedule_exposures
 from simharness.world.scene.playback import simulate
 
-ALL_FAULTS = Faults(
+ALL_FAULTS = FaultsSection(
     focal=0.01, center=3.0, rotation=0.3, translation=0.01, rotation_drift=0.5, translation_drift=0.02,
     clock_offset=0.05, clock_jitter=0.01, dropped=0.1, frozen=0.2, dead=(1,), swapped=((0, 2),),
 )  # fmt: skip
@@ -25,9 +28,9 @@ ALL_FAULTS = Faults(
 
 def small(**sections) -> Scenario:
     defaults = {
-        "people": People(count=2, activities=("wave", "walk")),
-        "cameras": Cameras(count=3, size=(320, 240)),
-        "clutter": Clutter(boxes=1),
+        "people": PeopleSection(count=2, activities=("wave", "walk")),
+        "cameras": CamerasSection(count=3, size=(320, 240)),
+        "clutter": ClutterSection(boxes=1),
     }
     return Scenario(name="small", seed=5, duration=0.6, rate=10.0, **{**defaults, **sections})
 
@@ -65,10 +68,10 @@ def test_a_correct_trial_passes(ready):
     "sections",
     [
         {"faults": ALL_FAULTS},
-        {"faults": Faults(rolling_shutter=0.03)},
-        {"cameras": Cameras(count=3, size=(320, 240), distortion=(-0.3, 0.1, 0.001, -0.001, 0.0))},
-        {"rendering": Rendering(renderer="rays")},
-        {"people": People(count=0)},
+        {"faults": FaultsSection(rolling_shutter=0.03)},
+        {"cameras": CamerasSection(count=3, size=(320, 240), distortion=(-0.3, 0.1, 0.001, -0.001, 0.0))},
+        {"rendering": RenderingSection(renderer="rays")},
+        {"people": PeopleSection(count=0)},
     ],
     ids=["faults", "rolling shutter", "distortion", "rays", "nobody"],
 )
@@ -97,15 +100,15 @@ def test_hidden_joints_that_are_labelled_visible_are_found(ready):
 @pytest.mark.parametrize(
     ("actual", "expected", "message"),
     [
-        (Faults(clock_offset=0.1), Faults(), "clocks: the picture of view .* ms late"),
-        (Faults(clock_jitter=0.1), Faults(clock_jitter=0.001), "clocks: the picture of view"),
-        (Faults(dropped=0.5), Faults(), "clocks: pictures are missing"),
+        (FaultsSection(clock_offset=0.1), FaultsSection(), "clocks: the picture of view .* ms late"),
+        (FaultsSection(clock_jitter=0.1), FaultsSection(clock_jitter=0.001), "clocks: the picture of view"),
+        (FaultsSection(dropped=0.5), FaultsSection(), "clocks: pictures are missing"),
         (
-            Faults(frozen=0.5),
-            Faults(dropped=0.5),
+            FaultsSection(frozen=0.5),
+            FaultsSection(dropped=0.5),
             "clocks: pictures are missing or repeated, but the scenario .* faults.frozen",
         ),
-        (Faults(), Faults(dead=(1,)), "clocks: camera 1 delivers"),
+        (FaultsSection(), FaultsSection(dead=(1,)), "clocks: camera 1 delivers"),
     ],
 )
 def test_clocks_that_differ_from_the_scenario_are_found(ready, actual, expected, message):
@@ -119,13 +122,13 @@ def test_clocks_that_differ_from_the_scenario_are_found(ready, actual, expected,
 @pytest.mark.parametrize(
     ("actual", "quantity"),
     [
-        (Faults(focal=0.01), "focal length"),
-        (Faults(center=2.0), "principal point"),
-        (Faults(rotation=0.2), "orientation"),
-        (Faults(translation=0.01), "position"),
-        (Faults(rotation_drift=3.0), "orientation"),
-        (Faults(translation_drift=0.1), "position"),
-        (Faults(swapped=((0, 1),)), "position"),
+        (FaultsSection(focal=0.01), "focal length"),
+        (FaultsSection(center=2.0), "principal point"),
+        (FaultsSection(rotation=0.2), "orientation"),
+        (FaultsSection(translation=0.01), "position"),
+        (FaultsSection(rotation_drift=3.0), "orientation"),
+        (FaultsSection(translation_drift=0.1), "position"),
+        (FaultsSection(swapped=((0, 1),)), "position"),
     ],
 )
 def test_a_calibration_that_differs_from_the_scenario_is_found(ready, actual, quantity):
@@ -134,17 +137,17 @@ def test_a_calibration_that_differs_from_the_scenario_is_found(ready, actual, qu
     with pytest.raises(
         AuditError, match=f"calibration: camera .* differs in .*{quantity if quantity != 'position' else ''}"
     ):
-        check_calibration(Faults(), exposures)
+        check_calibration(FaultsSection(), exposures)
 
 
 @pytest.mark.parametrize("share", [0.01, 0.1, 0.5])
 def test_errors_of_focal_length_pass_up_to_the_allowed_size(ready, share):
     """The error is log-normal: three deviations up are more than three down."""
     time = np.arange(3) / 10.0
-    faults = Faults(focal=share)
+    faults = FaultsSection(focal=share)
     for seed in range(150):
         check_calibration(faults, schedule_exposures(ready.exposures.true_cameras, faults, time, seed=seed))
-    exposures = schedule_exposures(ready.exposures.true_cameras, Faults(), time, seed=0)
+    exposures = schedule_exposures(ready.exposures.true_cameras, FaultsSection(), time, seed=0)
     for length in np.exp([7 * share, -7 * share]):
         scale = np.diag([length, length, 1.0])
         wide = Rig([replace(camera, K=camera.K @ scale) for camera in exposures.believed_rig])
@@ -181,7 +184,7 @@ def test_a_wrong_projection_fails_the_trials_of_a_study(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("until", ["detect", "estimate", "score", "classify", "blame"])
 def test_every_goal_is_audited(monkeypatch, until):
-    scenario = small(rendering=Rendering(renderer="rays"))
+    scenario = small(rendering=RenderingSection(renderer="rays"))
     moved_projections(monkeypatch, 0.5)
     with pytest.raises(AuditError, match=r"^audit: projection"):
         run_trial(scenario, until=until)

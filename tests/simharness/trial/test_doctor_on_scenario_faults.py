@@ -6,7 +6,7 @@ from mvpose.calibration import diagnose
 from simharness.runtime.progress import Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.load import load
-from simharness.scenario.sections.cameras import Faults
+from simharness.scenario.sections.cameras import FaultsSection
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import capture_trial, detect_trial
 
@@ -60,7 +60,7 @@ def diagnosed(tmp_path, *overrides):
 
 
 def test_every_fault_of_scenario_files_has_a_case():
-    assert set(CASES) == {"none", *Faults.model_fields}
+    assert set(CASES) == {"none", *FaultsSection.model_fields}
 
 
 @pytest.mark.parametrize(

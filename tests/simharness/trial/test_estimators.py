@@ -25,7 +25,7 @@ from simharness.outputs.study.worst_frames import _command
 from simharness.runtime.errors import RunError
 from simharness.runtime.frame_pool import map_frames
 from simharness.scenario.load import load
-from simharness.scenario.sections.scenario import Estimators, Method
+from simharness.scenario.sections.method import EstimatorsSection, MethodSection
 from simharness.scenario.study_definition import load_study
 from simharness.study.runner import run_study
 from simharness.trial.run_folder import read_run
@@ -188,7 +188,7 @@ class TestLoading:
     )
     def test_errors_of_loading_are_reported(self, file, text, name, message):
         file.unlink() if text is None else file.write_text(text)
-        method = Method(variants=("custom",), estimators=Estimators(custom=f"{file}:{name}"))
+        method = MethodSection(variants=("custom",), estimators=EstimatorsSection(custom=f"{file}:{name}"))
         with pytest.raises(ValueError, match=rf"^method\.estimators\.custom: .*{message}"):
             estimators_of(method)
 
@@ -203,17 +203,17 @@ class TestLoading:
     @pytest.mark.parametrize("name", PRESETS)
     def test_no_name_of_a_preset_is_free(self, name):
         with pytest.raises(ValueError, match=rf"^method\.estimators\.{name}: this is the name of a preset"):
-            estimators_of(Method(estimators=Estimators(**{name: "custom.py:Custom"})))
+            estimators_of(MethodSection(estimators=EstimatorsSection(**{name: "custom.py:Custom"})))
 
     def test_the_nearest_variant_is_named_even_if_user_defined(self):
-        method = Method(variants=("cutsom",), estimators=Estimators(custom="custom.py:Custom"))
+        method = MethodSection(variants=("cutsom",), estimators=EstimatorsSection(custom="custom.py:Custom"))
         with pytest.raises(
             ValueError, match=r"^method\.variants: unknown variant 'cutsom'; did you mean custom\? .*full.*custom"
         ):
             estimators_of(method)
 
     def test_an_estimator_that_is_not_requested_is_not_loaded(self):
-        method = Method(variants=("fast",), estimators=Estimators(custom="nowhere.py:Custom"))
+        method = MethodSection(variants=("fast",), estimators=EstimatorsSection(custom="nowhere.py:Custom"))
         assert isinstance(estimators_of(method)["fast"], Pipeline)
 
 

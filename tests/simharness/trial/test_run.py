@@ -14,7 +14,12 @@ from simharness.outputs.run.result_folder import run
 from simharness.runtime.errors import RunError
 from simharness.scenario.load import fingerprint
 from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.scenario import Cameras, Clutter, Detector, Method, People, Rendering, Scenario
+from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.method import MethodSection
+from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.scenario import RenderingSection, Scenario
 from simharness.scoring.summary import VariantScores
 from simharness.trial import run_trial
 from simharness.trial.run_folder import read_run
@@ -28,11 +33,11 @@ FILES = {*SAME_BYTES, "timings.parquet", "summary.json", "mosaic.png", "film.mp4
 
 def tiny(**sections) -> Scenario:
     defaults = {
-        "people": People(count=2, activities=("wave", "talk")),
-        "cameras": Cameras(count=2, size=(160, 120)),
-        "clutter": Clutter(boxes=1),
+        "people": PeopleSection(count=2, activities=("wave", "talk")),
+        "cameras": CamerasSection(count=2, size=(160, 120)),
+        "clutter": ClutterSection(boxes=1),
         "detector": read_profile("typical"),
-        "method": Method(variants=("full", "no-3dps")),
+        "method": MethodSection(variants=("full", "no-3dps")),
     }
     return Scenario(name="tiny", seed=5, duration=0.3, rate=10.0, **{**defaults, **sections})
 
@@ -106,9 +111,9 @@ def test_another_seed_gives_other_detections(done, tmp_path):
 @pytest.mark.parametrize(
     ("sections", "people"),
     [
-        ({"people": People(count=0)}, 0),
-        ({"people": People(count=0), "detector": Detector(), "clutter": Clutter()}, 0),
-        ({"detector": Detector.model_validate({"boxes": {"missed": 1.0}})}, 2),
+        ({"people": PeopleSection(count=0)}, 0),
+        ({"people": PeopleSection(count=0), "detector": DetectorSection(), "clutter": ClutterSection()}, 0),
+        ({"detector": DetectorSection.model_validate({"boxes": {"missed": 1.0}})}, 2),
     ],
     ids=["an empty room", "an empty room and no phantoms", "a detector that finds nothing"],
 )
@@ -156,9 +161,9 @@ class TestPrepare:
     @pytest.mark.parametrize(
         ("scenario", "message"),
         [
-            (tiny(cameras=Cameras(count=1)), "expected at least 2"),
-            (tiny(cameras=Cameras(count=2, radius=4.0)), "cam0.*wall"),
-            (tiny(method=Method(variants=("full", "best"))), "method.variants: .*'best'"),
+            (tiny(cameras=CamerasSection(count=1)), "expected at least 2"),
+            (tiny(cameras=CamerasSection(count=2, radius=4.0)), "cam0.*wall"),
+            (tiny(method=MethodSection(variants=("full", "best"))), "method.variants: .*'best'"),
         ],
     )
     def test_a_scenario_that_cannot_be_built_is_a_value_error(self, scenario, message):
@@ -173,7 +178,7 @@ class TestPrepare:
 
         monkeypatch.setattr(trial, "renderer_of", nothing)
         with pytest.raises(ValueError, match=r"rendering\.renderer: no EGL here"):
-            build_trial(tiny(rendering=Rendering(renderer="gl")))
+            build_trial(tiny(rendering=RenderingSection(renderer="gl")))
 
 
 class TestScoring:
@@ -194,6 +199,6 @@ class TestScoring:
 
 
 def test_without_colour_there_is_no_film_and_the_same_detections(tmp_path, done):
-    folder = run(tiny(rendering=Rendering(color=False)), out=tmp_path)
+    folder = run(tiny(rendering=RenderingSection(color=False)), out=tmp_path)
     assert {path.name for path in folder.iterdir()} == FILES - {"film.mp4"}
     assert (folder / "detections.npz").read_bytes() == (done / "detections.npz").read_bytes()

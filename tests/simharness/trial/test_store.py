@@ -7,7 +7,8 @@ import polars as pl
 import pytest
 
 from mvpose import Camera, Detections, Estimate, Matching, Rig
-from simharness.scenario.sections.scenario import Method, Scenario
+from simharness.scenario.sections.method import MethodSection
+from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.run_folder import Record, read_run, write_run
 from simharness.types.truth import Truth
 
@@ -39,7 +40,7 @@ def make_record(*, people: int, empty: bool = False, seed: int = 0) -> Record:
         )
         estimates.append(_estimate(rng, count))
     return Record(
-        scenario=Scenario(name="x", method=Method(variants=("full",))),
+        scenario=Scenario(name="x", method=MethodSection(variants=("full",))),
         rig=rig,
         time=np.arange(FRAMES) / 10,
         detections=tuple(detections),

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from simharness.scenario.sections.people import People
+from simharness.scenario.sections.people import PeopleSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.activities.route_walking import LOOKAHEAD, walk_route
 from simharness.world.motion.paths import Spot
@@ -28,7 +28,7 @@ _GRAVITY = 9.81
 _REST = (0.3, 2.0)  # seconds of standing beside the booth
 
 
-def _configured(each: Activity, people: People) -> Activity:
+def _configured(each: Activity, people: PeopleSection) -> Activity:
     return replace(each, perform=partial(_perform, hidden=people.hidden))
 
 
@@ -37,7 +37,7 @@ def hide(
     performers: Sequence[Kinematics], spot: Spot, time: np.ndarray, *, rng: np.random.Generator, pace: float
 ) -> Performance:
     """Walk through the booth, turn round on the other side, and come back, again and again."""
-    return _perform(performers, spot, time, rng=rng, pace=pace, hidden=People().hidden)
+    return _perform(performers, spot, time, rng=rng, pace=pace, hidden=PeopleSection().hidden)
 
 
 def _perform(

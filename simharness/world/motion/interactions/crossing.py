@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.people import People
+from simharness.scenario.sections.people import PeopleSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.activities.route_walking import LOOKAHEAD, walk_route
 from simharness.world.motion.paths import Spot
@@ -47,14 +47,14 @@ def _lanes(count: int, passing: float) -> list[_Lane]:
     return [_Lane((k - (count - 1) / 2) * passing, 1.0 - 2.0 * (k % 2)) for k in range(count)]
 
 
-def _configured(each: Activity, people: People) -> Activity:
+def _configured(each: Activity, people: PeopleSection) -> Activity:
     """Return the activity for the group and the distance of a scenario."""
     clearance = float(np.hypot(_LENGTH, (people.group - 1) * people.passing)) / 2
     perform = partial(_perform, name=each.name, passing=people.passing)
     return replace(each, performers=people.group, fewest=2, clearance=clearance, perform=perform)
 
 
-_CLEARANCE = float(np.hypot(_LENGTH, People().passing)) / 2
+_CLEARANCE = float(np.hypot(_LENGTH, PeopleSection().passing)) / 2
 
 
 @activity("cross", performers=2, clearance=_CLEARANCE, configured=_configured)
@@ -62,7 +62,7 @@ def cross(
     performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:
     """Walk to the other end of the lane, turn, and come back, again and again."""
-    return _perform(performers, spot, time, rng=rng, pace=pace, name="cross", passing=People().passing)
+    return _perform(performers, spot, time, rng=rng, pace=pace, name="cross", passing=PeopleSection().passing)
 
 
 @activity("swap", performers=2, clearance=_CLEARANCE, configured=_configured)
@@ -70,7 +70,7 @@ def swap(
     performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:
     """Swap places with those opposite, turn round, stand face to face for a while, and swap again."""
-    return _perform(performers, spot, time, rng=rng, pace=pace, name="swap", passing=People().passing)
+    return _perform(performers, spot, time, rng=rng, pace=pace, name="swap", passing=PeopleSection().passing)
 
 
 def _perform(

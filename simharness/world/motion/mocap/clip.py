@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.people import Mocap
+from simharness.scenario.sections.people import MocapSection
 from simharness.world.motion.mocap.asf import read_amc, read_asf
 from simharness.world.motion.mocap.bvh import read_bvh
 from simharness.world.motion.mocap.retarget import SourceMotion, pelvis_path, retarget, source_motion
@@ -132,7 +132,7 @@ def back_and_forth(time: Floats, *, start: float, end: float) -> Floats:
     return np.clip(low + np.where(away > span / 2, span - eased, eased), 0.0, end)
 
 
-def load_clip(mocap: Mocap) -> Clip:
+def load_clip(mocap: MocapSection) -> Clip:
     """Load the recorded motion of a scenario.
 
     Args:
@@ -151,7 +151,7 @@ def load_clip(mocap: Mocap) -> Clip:
     return Clip(read_amc(file, read_asf(_skeleton(mocap, file))), mocap.start)
 
 
-def _skeleton(mocap: Mocap, file: Path) -> Path:
+def _skeleton(mocap: MocapSection, file: Path) -> Path:
     if mocap.skeleton:
         skeleton = Path(mocap.skeleton)
         if not os.path.isfile(skeleton):

@@ -16,7 +16,7 @@ from mvpose.arrays import Floats
 from mvpose.files.archives import arrays_of
 from mvpose.files.input_files import read_bytes
 from mvpose.skeleton import COCO17
-from simharness.scenario.sections.people import People
+from simharness.scenario.sections.people import PeopleSection
 from simharness.world.humans.body_size import body_lengths
 
 _TRUNK = (0.15, 0.9)  # metres: least and greatest trunk of children and adults, with much tolerance
@@ -132,7 +132,7 @@ def read_joint_tracks(path: Path) -> PeopleTracks:
     return PeopleTracks(str(path), joints, float(content["rate"].item()))
 
 
-def load_tracks(people: People) -> PeopleTracks:
+def load_tracks(people: PeopleSection) -> PeopleTracks:
     """Load the joint tracks that the people of a scenario re-enact.
 
     Raises:

@@ -95,7 +95,7 @@ def track(
     """
     if not motions:
         return ()
-    tracker = Tracker(model, bodies, motions, assist=assist, solids=solids, pushes=pushes)
+    tracker = MotionServos(model, bodies, motions, assist=assist, solids=solids, pushes=pushes)
     configurations = np.array(list(tracker.run()))
     return tuple(
         Motion(tracker.time, configurations[:, person.root], configurations[:, person.hinges])
@@ -125,7 +125,7 @@ class _Person:
     strength: Floats
 
 
-class Tracker:
+class MotionServos:
     """Simulation of people that track their plans; it can be run once.
 
     Attributes:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simharness.scenario.sections.room import Clutter, Room
+from simharness.scenario.sections.room import ClutterSection, RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.fixtures import draw_partition, draw_pillar
 from simharness.world.scene.objects.furniture import draw_chair, draw_table
@@ -41,7 +41,7 @@ class ClutterKind:
 
     name: str
     plural: str
-    draw: Callable[[np.random.Generator, Room], ObjectModel]
+    draw: Callable[[np.random.Generator, RoomSection], ObjectModel]
     sample_place: PlaceSampler
     fills: bool = True
 
@@ -59,7 +59,7 @@ CLUTTER_KINDS = (
 )
 
 
-def place_clutter(seed: int, clutter: Clutter, space: FreeSpace) -> tuple[Solid, ...]:
+def place_clutter(seed: int, clutter: ClutterSection, space: FreeSpace) -> tuple[Solid, ...]:
     """Draw the clutter and find a place for each object.
 
     Each object is drawn and placed by a separate stream, so one more box moves none of the objects placed before it.

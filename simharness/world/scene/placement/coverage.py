@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from mvpose.arrays import Bools, Floats
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.solids import ObjectModel, Solid
 from simharness.world.scene.placement.free_space import FreeSpace, Site
 from simharness.world.scene.placement.sight_lines import SightLines, lines_of_sight
 
-Draw = Callable[[np.random.Generator, Room], ObjectModel]
+Draw = Callable[[np.random.Generator, RoomSection], ObjectModel]
 
 WITHIN = 0.05  # accepted deviation from the requested share
 _AIM = 0.02  # targeted deviation on the sample of lines, smaller because the sample is not complete

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.room import Decoys
+from simharness.scenario.sections.room import DecoysSection
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
 from simharness.types.random_streams import stream
@@ -49,7 +49,7 @@ _COAT = np.array(
 _FOLDS = 7
 
 
-def place_decoys(seed: int, decoys: Decoys, space: FreeSpace) -> tuple[Solid, ...]:
+def place_decoys(seed: int, decoys: DecoysSection, space: FreeSpace) -> tuple[Solid, ...]:
     """Draw the decoys and find a place for each: on a wall, or near the paths of people.
 
     Each is drawn and placed by a separate stream, so one more moves none of those placed before it.

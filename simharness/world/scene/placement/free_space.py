@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.solids import Kind, ObjectModel, Solid
 from simharness.world.scene.placement.sight_lines import PictureFill
@@ -47,7 +47,7 @@ class FreeSpace:
         around: radius around the origin that people keep free, metres.
     """
 
-    room: Room
+    room: RoomSection
     area: float
     time: Floats
     pelvises: Floats

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import quad_mesh
@@ -27,7 +27,7 @@ _COLORS = np.array([[0.16, 0.20, 0.42], [0.62, 0.14, 0.12], [0.12, 0.12, 0.13], 
 _PALE = np.array([[0.93, 0.93, 0.91], [0.90, 0.80, 0.25]])
 
 
-def make_court(room: Room, seed: int) -> tuple[Solid, ...]:
+def make_court(room: RoomSection, seed: int) -> tuple[Solid, ...]:
     """Return the lines on the floor of a gym with a sports floor; nothing for other rooms.
 
     Args:

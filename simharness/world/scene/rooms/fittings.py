@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.furnishing import Furnishing
 from simharness.world.scene.objects.geoms import Box
@@ -32,7 +32,9 @@ _LEAVES = np.array([[0.84, 0.83, 0.80], [0.62, 0.48, 0.34], [0.55, 0.60, 0.64], 
 _FRAMES = np.array([[0.90, 0.90, 0.88], [0.90, 0.90, 0.88], [0.36, 0.37, 0.39], [0.60, 0.46, 0.32]])
 
 
-def make_fittings(room: Room, seed: int, openings: Sequence[Opening], solids: Sequence[Solid]) -> tuple[Solid, ...]:
+def make_fittings(
+    room: RoomSection, seed: int, openings: Sequence[Opening], solids: Sequence[Solid]
+) -> tuple[Solid, ...]:
     """Return the fittings of a room as solids without geoms; none without walls, or behind the curtains of a stage.
 
     Args:
@@ -75,7 +77,7 @@ def make_fittings(room: Room, seed: int, openings: Sequence[Opening], solids: Se
 Taken = list[tuple[float, float, float, float]]  # left, right, lower and upper edge of parts of a wall
 
 
-def _plain(room: Room) -> bool:
+def _plain(room: RoomSection) -> bool:
     """Return whether nothing can hang on the walls."""
     return room.size[2] < 1.8
 
@@ -159,7 +161,7 @@ def _sockets(f: Furnishing, wall: Wall, taken: Taken) -> None:
                 f.block((0.008, y - 0.012, 0.272), (0.0085, y + 0.012, 0.288), 0.25 * _WHITE)
 
 
-def _prints(f: Furnishing, room: Room, rng: np.random.Generator, wall: Wall, taken: Taken) -> None:
+def _prints(f: Furnishing, room: RoomSection, rng: np.random.Generator, wall: Wall, taken: Taken) -> None:
     """Hang prints on a wall where it is free: each by chance, framed if it is a picture."""
     for name, width, height in ROOM_KINDS[room.kind].prints:
         chance, tries, shade = rng.uniform(), rng.uniform(size=8), rng.uniform()

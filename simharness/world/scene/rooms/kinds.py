@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects import gym, home, office, park, shop, stage, ward
 from simharness.world.scene.objects.furnishing import Furnishing
@@ -183,7 +183,7 @@ ROOM_KINDS: Mapping[str, RoomKind] = MappingProxyType(
 """Kinds of rooms by their names in the scenario."""
 
 
-def settled(room: Room, seed: int) -> Room:
+def settled(room: RoomSection, seed: int) -> RoomSection:
     """Return the room with its kind, floor and wall drawn where the scenario leaves them to the seed.
 
     A kind of "any" is drawn among those with walls, or is "outdoors" without walls. Finishes of "usual" are drawn among
@@ -204,7 +204,7 @@ def settled(room: Room, seed: int) -> Room:
     )
 
 
-def check_size(room: Room) -> None:
+def check_size(room: RoomSection) -> None:
     """Check that a room is large enough for its kind.
 
     Raises:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.light_sources import AreaLight, Sun, Vector
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import box_mesh, quad_mesh
@@ -72,12 +72,12 @@ MOODS: Mapping[str, Mood] = MappingProxyType(
 """Moods of the lightings of :data:`~simharness.world.scene.rooms.lighting.LIGHTS`, by their names."""
 
 
-def has_ceiling(room: Room, rig: Rig) -> bool:
+def has_ceiling(room: RoomSection, rig: Rig) -> bool:
     """Return whether a room has a ceiling: it has walls, and all cameras hang below their upper edge."""
     return room.walls and bool(rig.centers[:, 2].max(initial=0.0) < room.size[2] - _BELOW_CEILING)
 
 
-def make_ceiling(room: Room) -> Solid:
+def make_ceiling(room: RoomSection) -> Solid:
     """Return the ceiling of a room, for pictures alone: no ray and no person reaches it."""
     x, y, z = room.size[0] / 2, room.size[1] / 2, room.size[2]
     columns, rows = (np.linspace(-half, half, max(1, round(2 * half / _CELL)) + 1) for half in (x, y))
@@ -89,7 +89,7 @@ def make_ceiling(room: Room) -> Solid:
     return Solid("room", "ceiling", mesh, (), Box((0.0, 0.0, z), (x, y, 0.0)))
 
 
-def ceiling_lamps(room: Room, mood: Mood) -> tuple[AreaLight, ...]:
+def ceiling_lamps(room: RoomSection, mood: Mood) -> tuple[AreaLight, ...]:
     """Return square panels in a grid below the ceiling."""
     counts = [min(max(1, round(side / _PITCH)), _MOST_LAMPS) for side in room.size[:2]]
     places = [((np.arange(n) + 0.5) / n - 0.5) * side for n, side in zip(counts, room.size[:2], strict=True)]
@@ -102,7 +102,7 @@ def ceiling_lamps(room: Room, mood: Mood) -> tuple[AreaLight, ...]:
     return tuple(lamps[mood.every // 2 :: mood.every]) if any(mood.lamp) else ()
 
 
-def wall_windows(room: Room, mood: Mood, towards: Sequence[float]) -> tuple[AreaLight, ...]:
+def wall_windows(room: RoomSection, mood: Mood, towards: Sequence[float]) -> tuple[AreaLight, ...]:
     """Return windows in a row in the wall that lies most in a direction (x, y); none where they do not fit."""
     x, y, z = room.size
     axis = 0 if abs(towards[0]) * y > abs(towards[1]) * x else 1

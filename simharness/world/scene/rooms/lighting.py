@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.light_sources import AreaLight, LightSources, Sun, Vector
 from simharness.types.lighting import Lighting
 from simharness.types.random_streams import stream
@@ -39,7 +39,7 @@ LIGHTS: Mapping[str, Lighting] = MappingProxyType(
 """Lightings by name: daylight; lamps in the evening; a low sun from one side; little light."""
 
 
-def room_lighting(room: Room, seed: int, areas: Sequence[AreaLight] | None = None) -> Lighting:
+def room_lighting(room: RoomSection, seed: int, areas: Sequence[AreaLight] | None = None) -> Lighting:
     """Return the lighting of a room; for "any" one of ``LIGHTS`` with a random bearing, drawn by the seed.
 
     Args:
@@ -59,14 +59,14 @@ def room_lighting(room: Room, seed: int, areas: Sequence[AreaLight] | None = Non
     return replace(light, sources=sources, panorama=view_outside(name, light, seed, mood.window))
 
 
-def room_areas(room: Room, seed: int) -> tuple[AreaLight, ...]:
+def room_areas(room: RoomSection, seed: int) -> tuple[AreaLight, ...]:
     """Return the windows and lamps of a room with a ceiling whose kind has none of its own."""
     name, light = _named(room, seed)
     mood = MOODS[name]
     return (*ceiling_lamps(room, mood), *wall_windows(room, mood, light.direction))
 
 
-def mood_of(room: Room, seed: int) -> Mood:
+def mood_of(room: RoomSection, seed: int) -> Mood:
     """Return how strong windows and lamps of a room are."""
     return MOODS[_named(room, seed)[0]]
 
@@ -78,7 +78,7 @@ def _towards(direction: Vector, sun: Sun) -> Vector:
     return direction[0] / reach * across, direction[1] / reach * across, sun.direction[2]
 
 
-def _named(room: Room, seed: int) -> tuple[str, Lighting]:
+def _named(room: RoomSection, seed: int) -> tuple[str, Lighting]:
     """Return the name of a lighting and the lighting in closed form."""
     if room.light != "any":
         return room.light, LIGHTS[room.light]

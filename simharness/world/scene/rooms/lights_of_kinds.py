@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.light_sources import AreaLight, Vector
 from simharness.world.scene.objects.furnishing import Furnishing
 from simharness.world.scene.objects.geoms import Box
@@ -35,7 +35,7 @@ _MOST = 4  # lamps along a side of the room
 _DARK, _SHADE = np.array([0.14, 0.14, 0.15]), np.array([0.92, 0.90, 0.84])
 
 
-def lights_of(room: Room, seed: int, openings: Sequence[Opening]) -> tuple[AreaLight, ...]:
+def lights_of(room: RoomSection, seed: int, openings: Sequence[Opening]) -> tuple[AreaLight, ...]:
     """Return the lamps and windows of a room with a drawn kind and a ceiling; at least one lamp is on."""
     mood = mood_of(room, seed)
     windows = tuple(
@@ -52,7 +52,7 @@ def _window_light(opening: Opening, mood: Mood) -> AreaLight:
     return AreaLight(_vector(middle), _vector(along), (0.0, 0.0, (high - low) / 2), mood.window, kind="window")
 
 
-def _lamps(room: Room, mood: Mood) -> tuple[AreaLight, ...]:
+def _lamps(room: RoomSection, mood: Mood) -> tuple[AreaLight, ...]:
     kind = ROOM_KINDS[room.kind].lamps
     if kind == "none" or not any(mood.lamp):
         return ()
@@ -71,7 +71,7 @@ def _lamps(room: Room, mood: Mood) -> tuple[AreaLight, ...]:
     return tuple(lamps[mood.every // 2 :: mood.every])
 
 
-def shown_lights_of(room: Room, seed: int, areas: Sequence[AreaLight]) -> tuple[Solid, ...]:
+def shown_lights_of(room: RoomSection, seed: int, areas: Sequence[AreaLight]) -> tuple[Solid, ...]:
     """Return what pictures show of the lamps: glowing fronts, and their bodies."""
     lamps = [area for area in areas if area.kind == "lamp"]
     shown = [fixture(lamp, f"lamp{k}") for k, lamp in enumerate(lamps)]

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.solids import Solid
@@ -49,7 +49,7 @@ class Opening:
         return self.wall.box(self.span, self.heights, depth).gap_on_floor(hull) > 0.0
 
 
-def draw_openings(room: Room, seed: int, solids: Sequence[Solid] = ()) -> tuple[Opening, ...]:
+def draw_openings(room: RoomSection, seed: int, solids: Sequence[Solid] = ()) -> tuple[Opening, ...]:
     """Draw the windows and the door of a room; those that a solid on the wall would cover are left out.
 
     The first wall with windows is that from which the light comes.

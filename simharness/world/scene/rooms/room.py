@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from mvpose.arrays import Bools, Floats
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
@@ -38,7 +38,7 @@ _RIM = 0.25  # metres: approximate cell size of that ground, which fades into th
 _TONES = {"x": (0.93, 0.97, 1.0), "y": (1.0, 0.98, 0.93)}
 
 
-def make_room(room: Room, seed: int, openings: Sequence[Opening] = ()) -> tuple[Solid, ...]:
+def make_room(room: RoomSection, seed: int, openings: Sequence[Opening] = ()) -> tuple[Solid, ...]:
     """Return floor and walls of a room around the origin, floor at z = 0; without walls, floor and ground around it.
 
     Finishes of floor and walls are drawn by separate streams: the size of the room changes neither, and neither changes
@@ -101,7 +101,7 @@ def _cut(ticks: Floats, edges: Sequence[float]) -> Floats:
     return both[np.concatenate([[True], np.diff(both) > 1e-3])]
 
 
-def _ground(room: Room, seed: int, finish: Finish) -> Solid:
+def _ground(room: RoomSection, seed: int, finish: Finish) -> Solid:
     """Return the ground around an open floor, in the mean colour of the floor and fading outwards as in haze."""
     half = np.array(room.size[:2]) / 2
     light = room_lighting(room, seed)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.light_sources import Vector
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
@@ -39,7 +39,7 @@ _PATCH, _PIXELS = 30.0, 512  # metres and pixels of the texture of the meadow
 _TREES, _SHRUBS = (9, 16), (8, 14)
 
 
-def make_surroundings(room: Room, seed: int, rig: Rig) -> tuple[Solid, ...]:
+def make_surroundings(room: RoomSection, seed: int, rig: Rig) -> tuple[Solid, ...]:
     """Return the surroundings of an open floor outdoors, for pictures alone.
 
     Args:

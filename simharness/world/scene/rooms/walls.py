@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.world.scene.objects.geoms import Box
 
 
@@ -52,7 +52,7 @@ class Wall:
         return Box((float(middle[0]), float(middle[1]), float(middle[2])), half, float(np.arctan2(*self.along[::-1])))
 
 
-def walls_of(room: Room) -> tuple[Wall, ...]:
+def walls_of(room: RoomSection) -> tuple[Wall, ...]:
     """Return the four walls of a room."""
     x, y, z = room.size[0] / 2, room.size[1] / 2, room.size[2]
     corners = {"+x": ((x, y), (0.0, -1.0), 2 * y), "-x": ((-x, -y), (0.0, 1.0), 2 * y)}

@@ -5,17 +5,20 @@ from __future__ import annotations
 import pytest
 
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
-from simharness.scenario.sections.scenario import Cameras, Clutter, Faults, People, Rendering, Scenario
+from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
+from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.scenario import RenderingSection, Scenario
 from simharness.trial.stages.build_trial import build_trial
 
 
 def tiny(**sections) -> Scenario:
     defaults = {
-        "people": People(count=3, activities=("walk", "stand")),
-        "cameras": Cameras(count=3, size=(320, 240), distortion=(-0.12, 0.02, 0.001, -0.002, 0.0)),
-        "clutter": Clutter(boxes=1),
-        "faults": Faults(rotation=1.0, translation=0.02),
-        "rendering": Rendering(renderer="rays"),
+        "people": PeopleSection(count=3, activities=("walk", "stand")),
+        "cameras": CamerasSection(count=3, size=(320, 240), distortion=(-0.12, 0.02, 0.001, -0.002, 0.0)),
+        "clutter": ClutterSection(boxes=1),
+        "faults": FaultsSection(rotation=1.0, translation=0.02),
+        "rendering": RenderingSection(renderer="rays"),
     }
     return Scenario(name="tiny", seed=5, duration=0.3, rate=10.0, **{**defaults, **sections})
 

@@ -17,7 +17,7 @@ from mvpose.wholebody import skeleton_by_name
 from simharness.formats.panoptic_poses import body_scene, confidences
 from simharness.outputs.benchmark.cameras import hd_names
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.types.views import Visibility
 
 HIDDEN = (Visibility.SELF_OCCLUDED, Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)
@@ -128,7 +128,7 @@ def test_feet_are_written_where_they_are_detected(name):
 
 def test_an_export_holds_the_feet_that_its_detector_reports(tmp_path, scenario):
     plan = ExportPlan(tmp_path / "feet", pictures=False)
-    folder = export_sequence(scenario(detector=Detector(skeleton="halpe26")), plan)
+    folder = export_sequence(scenario(detector=DetectorSection(skeleton="halpe26")), plan)
     files = sorted((folder / "openpose").rglob("*.json"))
     people = [person for file in files for person in json.loads(file.read_text())["people"]]
     feet = np.array([person["pose_keypoints_2d"] for person in people]).reshape(-1, 25, 3)[:, 19:]

@@ -7,7 +7,7 @@ from trials import simulated
 from mvpose import COCO17, SHELF14
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
 from simharness.reality.recording_file import read_recording
-from simharness.scenario.sections.scenario import Faults
+from simharness.scenario.sections.cameras import FaultsSection
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def test_the_cameras_are_those_that_a_method_is_given(folder, trial):
 
 def test_without_faults_and_with_every_second_frame(scenario, tmp_path):
     plan = ExportPlan(tmp_path / "tiny", every=2, pictures=False)
-    sequence, _ = simulated(given := scenario(faults=Faults()))
+    sequence, _ = simulated(given := scenario(faults=FaultsSection()))
     recording = read_recording(export_sequence(given, plan))
     assert recording.rate == given.rate / 2
     assert recording.frames.tolist() == [0, 1]

@@ -20,7 +20,9 @@ from mvpose.skeleton import PANOPTIC19
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
 from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
-from simharness.scenario.sections.scenario import Cameras, Faults, People, Room
+from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
+from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.room import RoomSection
 from simharness.trial.provenance import PROVENANCE
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import picture_source_of
@@ -228,7 +230,7 @@ def test_skipped_frames_keep_the_numbers_of_the_others(trial, folder, tmp_path):
 
 
 def test_without_faults_there_is_one_calibration(scenario, tmp_path):
-    made, content = exported(scenario(faults=Faults()), tmp_path / "tiny", pictures=False)
+    made, content = exported(scenario(faults=FaultsSection()), tmp_path / "tiny", pictures=False)
     assert content["files"]["calibration_believed"] is None
     assert [file.name for file in made.glob("calibration*")] == ["calibration_tiny.json"]
     assert content["cameras"][0]["clock"] == {"mean": 0.0, "deviation": 0.0}
@@ -237,7 +239,7 @@ def test_without_faults_there_is_one_calibration(scenario, tmp_path):
 
 def test_swapped_and_dead_cameras_and_clocks_are_in_the_manifest(scenario, tmp_path):
     """The calibration of a view is that of the camera that takes its pictures, also where cameras are swapped."""
-    faults = Faults(swapped=((0, 1),), dead=(2,), clock_offset=0.05, rotation_drift=60.0)
+    faults = FaultsSection(swapped=((0, 1),), dead=(2,), clock_offset=0.05, rotation_drift=60.0)
     trial = build_trial(scenario(faults=faults))
     made, content = exported(trial.scenario, tmp_path / "tiny")
     true, believed = (read_calibration(made / f"calibration_{kind}tiny.json") for kind in ("", "believed_"))
@@ -256,7 +258,7 @@ def test_swapped_and_dead_cameras_and_clocks_are_in_the_manifest(scenario, tmp_p
 
 
 def test_repeated_pictures_are_in_the_manifest(scenario, tmp_path):
-    made, content = exported(scenario(faults=Faults(frozen=1.0)), tmp_path / "tiny")
+    made, content = exported(scenario(faults=FaultsSection(frozen=1.0)), tmp_path / "tiny")
     for camera in content["cameras"]:
         assert camera["repeated"] == [[1, 0], [2, 0]]
         assert camera["lost"] == []
@@ -270,7 +272,7 @@ def test_repeated_pictures_are_in_the_manifest(scenario, tmp_path):
 
 def test_cameras_of_panoptic_keep_their_names(scenario, tmp_path):
     """Loaders list cameras by number: a twin of CMU0 has HD cameras 3, 6, 12, 13 and 23."""
-    cmu0 = scenario(cameras=Cameras(layout="preset", preset="cmu0"), room=Room(walls=False))
+    cmu0 = scenario(cameras=CamerasSection(layout="preset", preset="cmu0"), room=RoomSection(walls=False))
     made, _ = exported(cmu0, tmp_path / "tiny", pictures=False)
     entries = json.loads((made / "calibration_tiny.json").read_text())["cameras"]
     assert {(entry["panel"], entry["node"]) for entry in entries} == {(0, node) for node in (3, 6, 12, 13, 23)}
@@ -278,7 +280,7 @@ def test_cameras_of_panoptic_keep_their_names(scenario, tmp_path):
 
 
 def test_an_empty_room_can_be_exported(scenario, tmp_path):
-    made, content = exported(scenario(people=People(count=0)), tmp_path / "tiny", pictures=False)
+    made, content = exported(scenario(people=PeopleSection(count=0)), tmp_path / "tiny", pictures=False)
     assert bodies(made, 0) == {}
     assert content["people"] == []
 

@@ -5,14 +5,17 @@ import numpy as np
 import pytest
 
 from simharness.outputs.benchmark.render import RenderPlan, render
-from simharness.scenario.sections.scenario import Cameras, Clutter, Faults, People, Scenario
+from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
+from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.scenario import Scenario
 
 
 def tiny(**sections) -> Scenario:
     defaults = {
-        "people": People(count=2, activities=("wave", "talk")),
-        "cameras": Cameras(count=2, size=(160, 120)),
-        "clutter": Clutter(boxes=1),
+        "people": PeopleSection(count=2, activities=("wave", "talk")),
+        "cameras": CamerasSection(count=2, size=(160, 120)),
+        "clutter": ClutterSection(boxes=1),
     }
     return Scenario(name="tiny", seed=5, duration=0.3, rate=10.0, **{**defaults, **sections})
 
@@ -59,7 +62,9 @@ def test_a_film_holds_every_frame(plain, tmp_path):
 
 
 def test_a_dead_camera_is_black(tmp_path):
-    folder = render(tiny(faults=Faults(dead=(1,))), RenderPlan(every=3, overlay=frozenset({"truth"})), out=tmp_path)
+    folder = render(
+        tiny(faults=FaultsSection(dead=(1,))), RenderPlan(every=3, overlay=frozenset({"truth"})), out=tmp_path
+    )
     assert not cv2.imread(str(folder / "cam1" / "0000.png")).any()
     assert cv2.imread(str(folder / "cam0" / "0000.png")).any()
 

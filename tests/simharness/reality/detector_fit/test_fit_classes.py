@@ -8,7 +8,7 @@ from simharness.detector.bias import pixel_offsets
 from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
 from simharness.detector.error_classes import MIRROR, classify, opposite_hits
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.types.truth import KeypointError
 
 GOOD, JITTER, MISS, INVERSION, SWAP, ABSENT = KeypointError
@@ -75,7 +75,7 @@ def test_isotropic_misses_fall_on_a_place_as_often_as_opposite_to_it():
 @pytest.mark.parametrize("seed", [0, 1])
 def test_drawn_labels_and_distances_agree(filmed, seed):
     """At least 95 % of the reported joints have the drawn class when classified by distance."""
-    config = Detector.model_validate(
+    config = DetectorSection.model_validate(
         {
             "keypoints": {"scatter": 0.4, "jitter": 0.15, "miss": 0.1, "inversion": 0.06, "swap": 0.06},
             "bias": {"hips": [0.0, 0.01, 0.03]},

@@ -14,7 +14,7 @@ from simharness.reality.detector_fit.frame_sums import frame_sums
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.measure import MeasuredValue, agreement, measure, point_estimates
 from simharness.reality.detector_fit.profile import as_toml, settings
-from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, Detector
+from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, DetectorSection
 
 LIMB_KINDS = KINDS[3:]
 EARS = [0.3, 0.1, 0.05, 0.05, 0.05, 0.08, 0.1, 0.6, 0.95, 0.97, 0.97, 0.8]
@@ -389,8 +389,8 @@ def test_the_profile_contains_the_measured_values(dropping):
     bias = np.zeros((9, 3))
     bias[KINDS.index("hips")] = [0.01, 0.02, 0.03]
     text = as_toml(dropping, name="fitted", bias=bias, command="a command")
-    profile = Detector.model_validate(tomllib.loads(text))
-    assert profile == Detector.model_validate(settings(dropping, name="fitted", bias=bias))
+    profile = DetectorSection.model_validate(tomllib.loads(text))
+    assert profile == DetectorSection.model_validate(settings(dropping, name="fitted", bias=bias))
     assert (profile.name, profile.kind) == ("fitted", "bottom-up")
     for kind in LIMB_KINDS:
         measured = dropping[f"keypoints.drop.occluded.{kind}"].value

@@ -15,7 +15,7 @@ from mvpose.estimate import Matching
 from mvpose.matching import Matcher
 from mvpose.reconstruction import PictorialStructure, Triangulation
 from simharness.scenario.load import load
-from simharness.scenario.sections.scenario import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.scoring.catalogue import SCORES
 from simharness.scoring.failures.failure_classes import FailureKind, find_failures
 from simharness.scoring.failures.stage_blame import FAILURE_SCHEMA, Stage, blame, failure_scores, failure_table
@@ -187,7 +187,7 @@ class TestSubstitution:
         settings = ["rendering.renderer=rays", "duration=0.4", "rate=5", "people.count=3", "cameras.count=3"]
         scenario = load("scenarios/quickstart.toml", overrides=settings)
         _, real = simulated(scenario)
-        _, perfect = simulated(scenario.model_copy(update={"detector": Detector()}))
+        _, perfect = simulated(scenario.model_copy(update={"detector": DetectorSection()}))
         hidden = 0
         for noisy, exact in zip(real, perfect, strict=True):
             detections, truth = perfect_detections(noisy.detections, noisy.truth)

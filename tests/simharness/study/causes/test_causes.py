@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simharness.scenario.load import load
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import DetectorSection
 from simharness.statistics.intervals import Interval
 from simharness.study.causes.blame_text import conclusion, heading, points
 from simharness.study.causes.cause_catalogue import CAUSES, causes_by_name, present_causes
@@ -137,7 +137,7 @@ def test_every_error_of_a_scenario_has_its_cause(key, cause):
     assert changes == [cause]
     mended = causes_by_name([cause])[0].change(scenario)
     perfect = load("quickstart", overrides=['detector.profile="perfect"'])
-    for section in (*Detector.model_fields.keys() - {"name"},):
+    for section in (*DetectorSection.model_fields.keys() - {"name"},):
         assert getattr(mended.detector, section) == getattr(perfect.detector, section)
     assert (mended.faults, mended.cameras) == (perfect.faults, perfect.cameras)
 

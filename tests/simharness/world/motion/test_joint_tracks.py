@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mvpose.skeleton import COCO17
-from simharness.scenario.sections.people import Mocap, People
+from simharness.scenario.sections.people import MocapSection, PeopleSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.mocap.joint_tracks import load_tracks, read_joint_tracks, tracks_file
 
@@ -85,16 +85,16 @@ def test_other_files_are_refused(path):
 
 def test_the_number_of_people_and_the_start_must_fit(path):
     tracks_file(path, JOINTS, 25)
-    motion = Mocap(file=str(path), start=0.2)
-    assert load_tracks(People(count=2, motion=motion)).people == 2
+    motion = MocapSection(file=str(path), start=0.2)
+    assert load_tracks(PeopleSection(count=2, motion=motion)).people == 2
     with pytest.raises(ValueError, match=r"people.count = 3, but .*tracks.npz has the tracks of 2 people"):
-        load_tracks(People(count=3, motion=motion))
+        load_tracks(PeopleSection(count=3, motion=motion))
     with pytest.raises(ValueError, match=r"people.motion.start = 0.3 s is not within .*: expected 0 to 0.2 s"):
-        load_tracks(People(count=2, motion=Mocap(file=str(path), start=0.3)))
+        load_tracks(PeopleSection(count=2, motion=MocapSection(file=str(path), start=0.3)))
 
 
 def test_everybody_re_enacts(path):
-    motion = Mocap(file=str(path))
-    assert People(motion=motion).activities == ("mocap",)
+    motion = MocapSection(file=str(path))
+    assert PeopleSection(motion=motion).activities == ("mocap",)
     with pytest.raises(ValueError, match=r"people.activities = \[\"mocap\"\] with the joint tracks"):
-        People(activities=("mocap", "walk"), motion=motion)
+        PeopleSection(activities=("mocap", "walk"), motion=motion)

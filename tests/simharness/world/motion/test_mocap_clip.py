@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from simharness.scenario.sections.people import Mocap
+from simharness.scenario.sections.people import MocapSection
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape
@@ -44,7 +44,7 @@ def bodies():
 def played(request, bodies, shared_data) -> Played:
     name, which = request.param
     kinematics = bodies[which]
-    clip = load_clip(Mocap(file=str(shared_data / "motion" / name)))
+    clip = load_clip(MocapSection(file=str(shared_data / "motion" / name)))
     time = np.arange(0.0, min(clip.time[-1], 5.0), 1 / 60)
     motion = clip.perform(kinematics, time, place=(1.0, -2.0), bearing=0.7)
     body = kinematics.body
@@ -82,7 +82,7 @@ def test_feet_stand_and_do_not_slide(played):
 def test_uneven_ground_is_made_flat(bodies, shared_data, which):
     """Subject 03 walks over ground that rises and falls by 25 cm; the pelvis moves as on a level floor."""
     kinematics = bodies[which]
-    clip = load_clip(Mocap(file=str(shared_data / "motion/cmu/03/03_01.amc")))
+    clip = load_clip(MocapSection(file=str(shared_data / "motion/cmu/03/03_01.amc")))
     motion = clip.perform(kinematics, clip.time[:-1], place=(0.0, 0.0), bearing=0.0)
     assert np.ptp(motion.root[:, 2]) < 0.2
     assert motion.root[:, 2].min() > 0.75 * kinematics.standing_height
@@ -141,7 +141,7 @@ def test_path_agrees_with_the_pelvis(played):
 
 
 def test_a_small_body_takes_small_steps(bodies, shared_data):
-    clip = load_clip(Mocap(file=str(shared_data / "motion/cmu/02/02_01.amc")))
+    clip = load_clip(MocapSection(file=str(shared_data / "motion/cmu/02/02_01.amc")))
     ways = [np.linalg.norm(np.ptp(clip.path(kinematics), axis=0)) for kinematics in bodies]
     legs = [sum(kinematics.leg_parts) for kinematics in bodies]
     assert ways[1] / ways[0] == pytest.approx(legs[1] / legs[0], rel=0.01)
@@ -150,7 +150,7 @@ def test_a_small_body_takes_small_steps(bodies, shared_data):
 
 def test_a_clip_starts_at_its_start_and_plays_back_and_forth(bodies, shared_data):
     file = str(shared_data / "motion/cmu/02/02_01.amc")
-    whole, later = load_clip(Mocap(file=file)), load_clip(Mocap(file=file, start=1.0))
+    whole, later = load_clip(MocapSection(file=file)), load_clip(MocapSection(file=file, start=1.0))
     (kinematics, _) = bodies
     time = np.arange(-60, 600) / 60
     motion = later.perform(kinematics, time, place=(0.0, 0.0), bearing=0.0)
@@ -171,7 +171,7 @@ def test_a_clip_starts_at_its_start_and_plays_back_and_forth(bodies, shared_data
 
 
 def test_motion_does_not_depend_on_the_duration(bodies, shared_data):
-    clip = load_clip(Mocap(file=str(shared_data / "motion/cmu/02/02_03.amc"), start=0.4))
+    clip = load_clip(MocapSection(file=str(shared_data / "motion/cmu/02/02_03.amc"), start=0.4))
     long = clip.perform(bodies[0], np.arange(-60, 300) / 60, place=(0.0, 0.0), bearing=0.0)
     short = clip.perform(bodies[0], np.arange(0, 90) / 60, place=(0.0, 0.0), bearing=0.0)
     np.testing.assert_array_equal(short.angles, long.angles[60:150])
@@ -187,7 +187,7 @@ def test_motion_does_not_depend_on_the_duration(bodies, shared_data):
 )
 def test_missing_and_unknown_files_are_refused(mocap, message):
     with pytest.raises(ValueError, match=message):
-        load_clip(Mocap(**mocap))
+        load_clip(MocapSection(**mocap))
 
 
 def test_the_skeleton_beside_the_motion(tmp_path, shared_data):
@@ -195,14 +195,14 @@ def test_the_skeleton_beside_the_motion(tmp_path, shared_data):
     (tmp_path / "walk.amc").write_bytes((source / "02_03.amc").read_bytes())
     file = str(tmp_path / "walk.amc")
     with pytest.raises(ValueError, match=r"expected one ASF file .*, found 0: set people.motion.skeleton"):
-        load_clip(Mocap(file=file))
+        load_clip(MocapSection(file=file))
     with pytest.raises(ValueError, match=r"people.motion.skeleton = 'none.asf': no such file"):
-        load_clip(Mocap(file=file, skeleton="none.asf"))
+        load_clip(MocapSection(file=file, skeleton="none.asf"))
     (tmp_path / "one.ASF").write_bytes((source / "02.asf").read_bytes())
-    assert len(load_clip(Mocap(file=file)).recording) == 173
+    assert len(load_clip(MocapSection(file=file)).recording) == 173
     (tmp_path / "two.asf").write_bytes((source / "02.asf").read_bytes())
     with pytest.raises(ValueError, match=r"expected one ASF file .*, found 2"):
-        load_clip(Mocap(file=file))
-    assert len(load_clip(Mocap(file=file, skeleton=str(tmp_path / "two.asf"))).recording) == 173
+        load_clip(MocapSection(file=file))
+    assert len(load_clip(MocapSection(file=file, skeleton=str(tmp_path / "two.asf"))).recording) == 173
     with pytest.raises(ValueError, match=r"people.motion.start = 9 s is not within walk.amc: expected 0 to 1.433 s"):
-        load_clip(Mocap(file=file, skeleton=str(tmp_path / "two.asf"), start=9.0))
+        load_clip(MocapSection(file=file, skeleton=str(tmp_path / "two.asf"), start=9.0))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from casting import performer
 
-from simharness.scenario.sections.people import People
+from simharness.scenario.sections.people import PeopleSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.choreography import assign_activities
 from simharness.world.motion.contact import penetration
@@ -20,7 +20,7 @@ SPOT = Spot(np.array([0.4, -0.3]), 0.8)
 
 
 def played(name, count, *, seed=0, **keys):
-    activity = configured_activities(People(**keys))[name]
+    activity = configured_activities(PeopleSection(**keys))[name]
     cast = [performer(k) for k in range(count)]
     return activity, cast, activity.perform(cast, SPOT, TIME, rng=stream(seed, name), pace=1.15)
 
@@ -78,7 +78,7 @@ def test_who_hides_is_inside_the_booth_for_the_seconds_that_are_asked_for(hidden
 
 
 def test_groups_take_as_many_as_are_left_but_never_one_alone():
-    known = configured_activities(People(group=4))
+    known = configured_activities(PeopleSection(group=4))
     groups = assign_activities([known["cross"], known["walk"]], 8, fallback=known["stand"])
     assert [(group.activity.name, len(group.people)) for group in groups] == [("cross", 4), ("walk", 1), ("cross", 3)]
     alone = assign_activities([known["cross"]], 5, fallback=known["stand"])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simharness.scenario.sections.people import Traffic
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.people import TrafficSection
+from simharness.scenario.sections.room import RoomSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
@@ -16,12 +16,12 @@ from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.trajectory import motion_clock
 from simharness.world.motion.visits import Visitor, draw_doors
 
-ROOM = Room(size=(8.0, 7.0, 3.0))
+ROOM = RoomSection(size=(8.0, 7.0, 3.0))
 DURATION = 30.0
 
 
 def visitor(seed=0, *, room=ROOM, **how):
-    doors = draw_doors(seed, Traffic(doors=2), room, np.zeros((0, 3)))
+    doors = draw_doors(seed, TrafficSection(doors=2), room, np.zeros((0, 3)))
     given = {"entering": True, "leaving": True, "away": 0.0, "speed": 1.0, **how}
     return Visitor(doors=doors, room=room, duration=DURATION, **given)
 
@@ -47,7 +47,7 @@ def test_visitors_come_and_go_through_doors(seed):
 
 
 def test_a_room_without_walls_ends_at_its_edge():
-    open_room = Room(size=(8.0, 7.0, 3.0), walls=False)
+    open_room = RoomSection(size=(8.0, 7.0, 3.0), walls=False)
     route = drawn(2, room=open_room)
     ((came, went),) = route.presence.intervals
     beyond = (np.abs(route.position([came, went])) - [4.0, 3.5]).max(axis=1)
@@ -88,9 +88,9 @@ def test_a_visitor_for_whom_no_way_is_free_gets_no_route():
 
 def test_doors_keep_clear_of_cameras_corners_and_each_other():
     for seed in range(20):
-        free = draw_doors(seed, Traffic(doors=3), ROOM, np.zeros((0, 3)))
+        free = draw_doors(seed, TrafficSection(doors=3), ROOM, np.zeros((0, 3)))
         camera = np.append(free[0].place + 0.3 * free[0].inward, 2.0)[None]
-        moved = draw_doors(seed, Traffic(doors=3), ROOM, camera)
+        moved = draw_doors(seed, TrafficSection(doors=3), ROOM, camera)
         assert np.linalg.norm(moved[0].place - free[0].place) > 0.5
         for doors in (free, moved):
             for k, door in enumerate(doors):
@@ -99,10 +99,12 @@ def test_doors_keep_clear_of_cameras_corners_and_each_other():
                 assert abs(door.place[1 - axis]) <= ROOM.size[1 - axis] / 2 - 0.9
                 assert door.place @ door.inward < 0
                 assert all(np.linalg.norm(door.place - other.place) >= 1.5 for other in doors[:k])
-    fewer = draw_doors(5, Traffic(doors=1), ROOM, np.zeros((0, 3)))
-    np.testing.assert_array_equal(fewer[0].place, draw_doors(5, Traffic(doors=3), ROOM, np.zeros((0, 3)))[0].place)
+    fewer = draw_doors(5, TrafficSection(doors=1), ROOM, np.zeros((0, 3)))
+    np.testing.assert_array_equal(
+        fewer[0].place, draw_doors(5, TrafficSection(doors=3), ROOM, np.zeros((0, 3)))[0].place
+    )
     with pytest.raises(ValueError, match=r"people\.traffic\.doors = 8: no place for door"):
-        draw_doors(0, Traffic(doors=8), Room(size=(2.5, 2.5, 3.0)), np.zeros((0, 3)))
+        draw_doors(0, TrafficSection(doors=8), RoomSection(size=(2.5, 2.5, 3.0)), np.zeros((0, 3)))
 
 
 def scenario(seed=0, **people):

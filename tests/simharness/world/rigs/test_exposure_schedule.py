@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from simharness.scenario.sections.scenario import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
 from simharness.world.rigs.exposure_schedule import ExposureSchedule, moved
 from simharness.world.rigs.layouts import build_rig
 
 TIME = np.arange(4) / 10
-RIG = build_rig(Cameras(count=3))
+RIG = build_rig(CamerasSection(count=3))
 
 
 def test_the_ideal_schedule_has_every_picture_at_its_frame():
@@ -35,7 +35,10 @@ def test_the_ideal_schedule_has_every_picture_at_its_frame():
         ({"rotation_rate": np.zeros((2, 3))}, "rotation_rate must be"),
         ({"velocity": np.full((3, 3), np.inf)}, "velocity must be finite"),
         ({"readout": -0.1}, "readout must be finite and not negative"),
-        ({"true_cameras": build_rig(Cameras(count=4))}, "expected as many true cameras as believed ones, 3, got 4"),
+        (
+            {"true_cameras": build_rig(CamerasSection(count=4))},
+            "expected as many true cameras as believed ones, 3, got 4",
+        ),
     ],
 )
 def test_an_invalid_schedule_is_refused(change, message):

@@ -5,14 +5,14 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mvpose.camera import Rig
-from simharness.scenario.sections.scenario import Cameras, Faults
+from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
 from simharness.world.rigs.exposure_schedule import ExposureSchedule
 from simharness.world.rigs.faults import MAX_CLOCK_ERROR, schedule_exposures
 from simharness.world.rigs.layouts import build_rig
 
 TIME = np.arange(40) / 10
-RIG = build_rig(Cameras(count=5))
-MANY = build_rig(Cameras(count=64, distortion=(-0.1, 0.0, 0.0, 0.0, 0.0)))
+RIG = build_rig(CamerasSection(count=5))
+MANY = build_rig(CamerasSection(count=64, distortion=(-0.1, 0.0, 0.0, 0.0, 0.0)))
 
 FAULTS = {
     "focal": 0.01,
@@ -49,7 +49,7 @@ def same(one, two):
 
 
 def test_without_faults_the_schedule_is_ideal():
-    assert all(same(schedule_exposures(RIG, Faults(), TIME, seed=5), ExposureSchedule.ideal(RIG, TIME)))
+    assert all(same(schedule_exposures(RIG, FaultsSection(), TIME, seed=5), ExposureSchedule.ideal(RIG, TIME)))
 
 
 @pytest.mark.parametrize(
@@ -72,15 +72,16 @@ def test_a_fault_changes_nothing_else(fault, touched):
     unlike = [
         not equal
         for equal in same(
-            schedule_exposures(RIG, Faults(**{fault: FAULTS[fault]}), TIME, seed=0), ExposureSchedule.ideal(RIG, TIME)
+            schedule_exposures(RIG, FaultsSection(**{fault: FAULTS[fault]}), TIME, seed=0),
+            ExposureSchedule.ideal(RIG, TIME),
         )
     ]
     assert unlike == [touched == name for name in ("believed", "time", "source", "true", "readout")]
 
 
 def test_the_method_is_given_the_readout_of_a_rolling_shutter():
-    faults = Faults(rolling_shutter=0.02, rotation=1.0)
-    without = schedule_exposures(RIG, Faults(rotation=1.0), TIME, seed=0).believed_rig
+    faults = FaultsSection(rolling_shutter=0.02, rotation=1.0)
+    without = schedule_exposures(RIG, FaultsSection(rotation=1.0), TIME, seed=0).believed_rig
     believed = schedule_exposures(RIG, faults, TIME, seed=0).believed_rig
     assert [camera.readout for camera in believed] == [0.02] * len(RIG)
     assert [camera.readout for camera in without] == [0.0] * len(RIG)
@@ -92,7 +93,7 @@ def test_a_fault_among_others_changes_nothing_else(fault):
     """With all other faults present: their draws do not shift."""
     rest = {key: value for key, value in FAULTS.items() if key != fault and key not in ("swapped", "frozen")}
     without, with_fault = (
-        schedule_exposures(RIG, Faults(**rest, **extra), TIME, seed=2) for extra in ({}, {fault: FAULTS[fault]})
+        schedule_exposures(RIG, FaultsSection(**rest, **extra), TIME, seed=2) for extra in ({}, {fault: FAULTS[fault]})
     )
     if fault in ("focal", "center", "rotation", "translation"):
         assert same(without, with_fault) == [False, True, True, True, True]
@@ -114,11 +115,11 @@ def test_a_fault_among_others_changes_nothing_else(fault):
 def test_a_higher_chance_only_adds_events(seed, lower, more):
     higher = lower + (1 - lower) * more
     few, many = (
-        schedule_exposures(RIG, Faults(dropped=chance), TIME, seed=seed).delivered for chance in (lower, higher)
+        schedule_exposures(RIG, FaultsSection(dropped=chance), TIME, seed=seed).delivered for chance in (lower, higher)
     )
     assert not (many & ~few).any()
     fresh = [
-        schedule_exposures(RIG, Faults(frozen=chance), TIME, seed=seed).source == np.arange(len(TIME))[:, None]
+        schedule_exposures(RIG, FaultsSection(frozen=chance), TIME, seed=seed).source == np.arange(len(TIME))[:, None]
         for chance in (lower, higher)
     ]
     assert not (fresh[1] & ~fresh[0]).any()
@@ -133,14 +134,15 @@ def test_errors_scale_with_their_parameters():
         ("rotation", lambda rig: rotations(rig, RIG)),
     ):
         once, twice = (
-            of(schedule_exposures(RIG, Faults(**{fault: size}), TIME, seed=1).believed_rig) for size in (0.01, 0.02)
+            of(schedule_exposures(RIG, FaultsSection(**{fault: size}), TIME, seed=1).believed_rig)
+            for size in (0.01, 0.02)
         )
         assert np.abs(once).min() > 0
         np.testing.assert_allclose(twice, 2 * once, rtol=1e-6)
 
 
 def test_another_camera_and_more_frames_change_no_draws():
-    faults = Faults(**{key: value for key, value in FAULTS.items() if key not in ("dead", "swapped")})
+    faults = FaultsSection(**{key: value for key, value in FAULTS.items() if key not in ("dead", "swapped")})
     few = schedule_exposures(RIG, faults, TIME, seed=3)
     more = schedule_exposures(Rig([*RIG, MANY[0]]), faults, np.arange(50) / 10, seed=3)
     for a, b in zip(fields(few), fields(more), strict=True):
@@ -155,7 +157,7 @@ def rotations(rig, other):
 
 def test_errors_have_the_requested_spread():
     """Over 64 cameras and 4 seeds: within 4 standard errors of the standard deviation, 4 / sqrt(2 n)."""
-    faults = Faults(focal=0.01, center=3.0, rotation=0.2, translation=0.008, clock_offset=0.05)
+    faults = FaultsSection(focal=0.01, center=3.0, rotation=0.2, translation=0.008, clock_offset=0.05)
     found = {"focal": [], "center": [], "rotation": [], "translation": [], "clock_offset": []}
     for seed in range(4):
         exposures = schedule_exposures(MANY, faults, TIME[:2], seed=seed)
@@ -176,23 +178,25 @@ def test_errors_have_the_requested_spread():
 
 def test_faults_and_cameras_are_independent_of_each_other():
     """No two of them are correlated by more than 4.5 standard errors, 1 / sqrt(n)."""
-    faults = Faults(rotation=0.2, translation=0.008, rotation_drift=3.0, translation_drift=0.1, clock_offset=0.05)
+    faults = FaultsSection(
+        rotation=0.2, translation=0.008, rotation_drift=3.0, translation_drift=0.1, clock_offset=0.05
+    )
     exposures = schedule_exposures(MANY, faults, np.arange(300.0), seed=0)
     moves = np.array([a.center - b.center for a, b in zip(exposures.believed_rig, MANY, strict=True)])
     turns = rotations(exposures.believed_rig, MANY)
     constant = np.column_stack([moves, turns, exposures.rotation_rate, exposures.velocity, exposures.time[0]])
     assert (np.abs(np.corrcoef(constant.T) - np.eye(13)) < 4.5 / np.sqrt(64)).all()
     time = np.arange(300.0)
-    dropped = schedule_exposures(RIG, Faults(dropped=0.5), time, seed=0).delivered
-    frozen = schedule_exposures(RIG, Faults(frozen=0.5), time, seed=0).source != np.arange(300)[:, None]
-    jitter = schedule_exposures(RIG, Faults(clock_jitter=0.1), time, seed=0).time - time[:, None]
+    dropped = schedule_exposures(RIG, FaultsSection(dropped=0.5), time, seed=0).delivered
+    frozen = schedule_exposures(RIG, FaultsSection(frozen=0.5), time, seed=0).source != np.arange(300)[:, None]
+    jitter = schedule_exposures(RIG, FaultsSection(clock_jitter=0.1), time, seed=0).time - time[:, None]
     of_pictures = np.column_stack([dropped, frozen, jitter])
     assert (np.abs(np.corrcoef(of_pictures.T) - np.eye(15)) < 4.5 / np.sqrt(300)).all()
 
 
 def test_drift_grows_with_time_and_has_its_spread_after_a_minute():
     time = np.array([0.0, 30.0, 60.0])
-    exposures = schedule_exposures(MANY, Faults(rotation_drift=3.0, translation_drift=0.05), time, seed=0)
+    exposures = schedule_exposures(MANY, FaultsSection(rotation_drift=3.0, translation_drift=0.05), time, seed=0)
     still, half, whole = ([exposures.camera(t, v) for v in range(64)] for t in range(3))
     assert all(a is b for a, b in zip(still, MANY, strict=True))
     turns = np.degrees(rotations(whole, MANY))
@@ -204,14 +208,14 @@ def test_drift_grows_with_time_and_has_its_spread_after_a_minute():
 
 
 def test_clock_errors_stay_within_the_planned_motions():
-    exposures = schedule_exposures(MANY, Faults(clock_offset=5.0, clock_jitter=1.0), TIME, seed=0)
+    exposures = schedule_exposures(MANY, FaultsSection(clock_offset=5.0, clock_jitter=1.0), TIME, seed=0)
     off = exposures.time - TIME[:, None]
     assert np.abs(off).max() <= MAX_CLOCK_ERROR + 1e-12
     assert (np.abs(off) > 0.85).any()
 
 
 def test_jitter_is_drawn_for_every_picture():
-    off = schedule_exposures(MANY, Faults(clock_jitter=0.01), TIME, seed=0).time - TIME[:, None]
+    off = schedule_exposures(MANY, FaultsSection(clock_jitter=0.01), TIME, seed=0).time - TIME[:, None]
     assert off.std() == pytest.approx(0.01, rel=4 / np.sqrt(2 * off.size))
     assert abs(np.corrcoef(off[:-1].ravel(), off[1:].ravel())[0, 1]) < 4 / np.sqrt(off.size)
 
@@ -219,10 +223,14 @@ def test_jitter_is_drawn_for_every_picture():
 @given(seed=st.integers(0, 10**6), dropped=st.floats(0, 1), frozen=st.floats(0, 1))
 def test_a_frozen_camera_repeats_the_last_picture_that_arrived(seed, dropped, frozen):
     """Compared with a frame-by-frame simulation of a camera."""
-    exposures = schedule_exposures(RIG, Faults(dropped=dropped, frozen=frozen, clock_jitter=0.01), TIME, seed=seed)
-    lost = ~schedule_exposures(RIG, Faults(dropped=dropped), TIME, seed=seed).delivered
-    clock = schedule_exposures(RIG, Faults(clock_jitter=0.01), TIME, seed=seed).time
-    stuck = schedule_exposures(RIG, Faults(frozen=frozen), TIME, seed=seed).source != np.arange(len(TIME))[:, None]
+    exposures = schedule_exposures(
+        RIG, FaultsSection(dropped=dropped, frozen=frozen, clock_jitter=0.01), TIME, seed=seed
+    )
+    lost = ~schedule_exposures(RIG, FaultsSection(dropped=dropped), TIME, seed=seed).delivered
+    clock = schedule_exposures(RIG, FaultsSection(clock_jitter=0.01), TIME, seed=seed).time
+    stuck = (
+        schedule_exposures(RIG, FaultsSection(frozen=frozen), TIME, seed=seed).source != np.arange(len(TIME))[:, None]
+    )
     for view in range(len(RIG)):
         last = -1
         for frame in range(len(TIME)):
@@ -240,16 +248,16 @@ def test_a_frozen_camera_repeats_the_last_picture_that_arrived(seed, dropped, fr
 
 def test_loss_rates_are_as_requested():
     time = np.arange(400) / 30
-    exposures = schedule_exposures(RIG, Faults(dropped=0.1, frozen=0.3), time, seed=0)
+    exposures = schedule_exposures(RIG, FaultsSection(dropped=0.1, frozen=0.3), time, seed=0)
     lost = ~exposures.delivered
     repeated = exposures.delivered & (exposures.source < np.arange(400)[:, None])
     assert lost.mean() == pytest.approx(0.1, abs=4 * np.sqrt(0.09 / 2000))
     assert repeated.mean() == pytest.approx(0.27, abs=4 * np.sqrt(0.2 / 2000))
-    assert not schedule_exposures(RIG, Faults(dropped=1.0, frozen=1.0), time, seed=0).delivered.any()
+    assert not schedule_exposures(RIG, FaultsSection(dropped=1.0, frozen=1.0), time, seed=0).delivered.any()
 
 
 def test_dead_cameras_deliver_nothing_and_others_everything():
-    exposures = schedule_exposures(RIG, Faults(dead=(1, 3)), TIME, seed=0)
+    exposures = schedule_exposures(RIG, FaultsSection(dead=(1, 3)), TIME, seed=0)
     assert exposures.delivered.all(axis=0).tolist() == [True, False, True, False, True]
     assert exposures.delivered.any(axis=0).tolist() == [True, False, True, False, True]
 
@@ -263,8 +271,8 @@ def test_swapped_cameras_deliver_pictures_times_and_losses_of_the_other():
         "rotation_drift": 9.0,
         "dead": (4,),
     }
-    unswapped = schedule_exposures(RIG, Faults(**faults), TIME, seed=0)
-    exposures = schedule_exposures(RIG, Faults(**faults, swapped=((0, 4), (1, 2))), TIME, seed=0)
+    unswapped = schedule_exposures(RIG, FaultsSection(**faults), TIME, seed=0)
+    exposures = schedule_exposures(RIG, FaultsSection(**faults, swapped=((0, 4), (1, 2))), TIME, seed=0)
     for view, camera in enumerate((4, 2, 1, 3, 0)):
         np.testing.assert_array_equal(exposures.time[:, view], unswapped.time[:, camera])
         np.testing.assert_array_equal(exposures.source[:, view], unswapped.source[:, camera])
@@ -284,15 +292,15 @@ def test_swapped_cameras_deliver_pictures_times_and_losses_of_the_other():
 )
 def test_unknown_cameras_are_named(faults, message):
     with pytest.raises(ValueError, match=message):
-        schedule_exposures(RIG, Faults(**faults), TIME, seed=0)
+        schedule_exposures(RIG, FaultsSection(**faults), TIME, seed=0)
 
 
 def test_cameras_of_different_sizes_are_not_swapped():
-    rig = Rig([RIG[0], build_rig(Cameras(size=(640, 480)))[1]])
+    rig = Rig([RIG[0], build_rig(CamerasSection(size=(640, 480)))[1]])
     with pytest.raises(ValueError, match=r"faults\.swapped: .* different sizes, 800 x 600 and 640 x 480"):
-        schedule_exposures(rig, Faults(swapped=((0, 1),)), TIME, seed=0)
+        schedule_exposures(rig, FaultsSection(swapped=((0, 1),)), TIME, seed=0)
 
 
 def test_a_sequence_without_frames_has_no_pictures():
-    exposures = schedule_exposures(RIG, Faults(**FAULTS), np.zeros(0), seed=0)
+    exposures = schedule_exposures(RIG, FaultsSection(**FAULTS), np.zeros(0), seed=0)
     assert exposures.time.shape == exposures.source.shape == (0, 5)

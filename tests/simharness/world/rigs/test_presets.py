@@ -5,8 +5,7 @@ import pytest
 
 from mvpose import Rig
 from mvpose.formats.calibration import panoptic, voxelpose
-from simharness.scenario.sections.cameras import Preset
-from simharness.scenario.sections.scenario import Cameras
+from simharness.scenario.sections.cameras import CamerasSection, Preset
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.rigs.lenses import check_lens
 from simharness.world.rigs.presets import PRESETS, preset_rig
@@ -15,7 +14,7 @@ from simharness.world.rigs.presets import PRESETS, preset_rig
 def test_a_scenario_can_name_every_preset():
     assert set(get_args(Preset)) == set(PRESETS)
     for name in PRESETS:
-        assert len(build_rig(Cameras(layout="preset", preset=name))) >= 3
+        assert len(build_rig(CamerasSection(layout="preset", preset=name))) >= 3
 
 
 @pytest.mark.parametrize(
@@ -84,7 +83,7 @@ def test_unknown_cameras_are_named(only, message):
 
 
 def test_cameras_are_selected_in_the_given_order():
-    rig = build_rig(Cameras(layout="preset", preset="shelf", only=("3", "0")))
+    rig = build_rig(CamerasSection(layout="preset", preset="shelf", only=("3", "0")))
     assert [camera.name for camera in rig] == ["3", "0"]
 
 

@@ -6,10 +6,10 @@ from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, vo
 from mvpose.formats.calibration.file_storage import write_storage
 from mvpose.formats.calibration.registry import read_calibration
 from simharness.scenario.load import load
-from simharness.scenario.sections.scenario import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
 from simharness.world.rigs.layouts import aligned, build_rig, look_at
 
-RIG = build_rig(Cameras(count=3, size=(640, 480), distortion=(-0.1, 0.01, 0.001, 0.002, 0.0)))
+RIG = build_rig(CamerasSection(count=3, size=(640, 480), distortion=(-0.1, 0.01, 0.001, 0.002, 0.0)))
 FORMATS = {
     "voxelpose.json": voxelpose.write_calibration,
     "panoptic.json": panoptic.write_calibration,
@@ -102,7 +102,7 @@ def stereo_files(folder):
 @pytest.mark.parametrize("name", ["intrinsics.yml", "extrinsics.yml"])
 def test_a_stereo_pair_hangs_where_the_first_camera_of_a_ring_would(tmp_path, name):
     stereo_files(tmp_path)
-    cameras = Cameras(layout="file", file=str(tmp_path / name), size=(640, 480), radius=4, height=2, start=90)
+    cameras = CamerasSection(layout="file", file=str(tmp_path / name), size=(640, 480), radius=4, height=2, start=90)
     first, second = build_rig(cameras)
     np.testing.assert_allclose(first.center, (0, 4, 2), atol=1e-12)
     np.testing.assert_allclose(first.project(cameras.aim), (320, 240), atol=1e-9)
@@ -128,4 +128,4 @@ def test_a_lens_that_folds_in_a_file_is_refused(tmp_path):
     bad = Camera(K=RIG[0].K, R=RIG[0].R, t=RIG[0].t, distortion=np.array([-0.9, 0, 0, 0, 0]), size=(640, 480), name="x")
     opencv.write_calibration(tmp_path / "a.yml", Rig([bad, RIG[1]]))
     with pytest.raises(ValueError, match=r"a\.yml: camera 'x': its lens, .* folds over"):
-        build_rig(Cameras(layout="file", file=str(tmp_path / "a.yml")))
+        build_rig(CamerasSection(layout="file", file=str(tmp_path / "a.yml")))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from walkers import space
 
-from simharness.scenario.sections.room import Clutter
+from simharness.scenario.sections.room import ClutterSection
 from simharness.world.scene.placement.clutter import place_clutter
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, LIMB
 
@@ -16,7 +16,7 @@ def rolling(request):
     free = space(8, duration=12.0, seed=seed, area=3.2)
     pelvises = free.pelvises[:, :, None]
     free = replace(free, joints=pelvises + (free.joints - pelvises) * [reach, reach, 1.0])
-    (cart,) = place_clutter(seed, Clutter(carts=1), free)
+    (cart,) = place_clutter(seed, ClutterSection(carts=1), free)
     return free, cart
 
 
@@ -47,6 +47,6 @@ def test_a_cart_keeps_its_distance_from_people(rolling):
 
 def test_the_path_does_not_depend_on_the_duration():
     short, long = space(1, duration=4.0, area=0.7), space(1, duration=9.0, area=0.7)
-    one, two = (place_clutter(2, Clutter(carts=1), free)[0] for free in (short, long))
+    one, two = (place_clutter(2, ClutterSection(carts=1), free)[0] for free in (short, long))
     moments = np.linspace(0, 4, 33)
     np.testing.assert_allclose(one.trajectory.at(moments), two.trajectory.at(moments), atol=1e-9)

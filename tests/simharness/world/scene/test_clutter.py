@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from walkers import Rays, ring, space
 
-from simharness.scenario.sections.room import Clutter, Room
+from simharness.scenario.sections.room import ClutterSection, RoomSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.rigs.layouts import build_rig
@@ -13,9 +13,9 @@ from simharness.world.scene.placement.clutter import CLUTTER_KINDS, place_clutte
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, LENS, LIMB
 from simharness.world.scene.placement.sight_lines import PictureFill, cuts
 
-ROOM = Room()
+ROOM = RoomSection()
 DRAW = {kind.name: lambda rng, draw=kind.draw: draw(rng, ROOM) for kind in CLUTTER_KINDS} | {"cart": draw_cart}
-EVERYTHING = Clutter(boxes=2, shelves=1, racks=1, tables=1, chairs=2, pillars=1, partitions=1, plants=2, carts=1)
+EVERYTHING = ClutterSection(boxes=2, shelves=1, racks=1, tables=1, chairs=2, pillars=1, partitions=1, plants=2, carts=1)
 
 
 def extent(thing):
@@ -143,7 +143,7 @@ def test_cameras_and_pictures_stay_clear(furnished):
 def test_a_picture_is_never_filled_completely():
     """Twelve partitions around people seen by a low camera at close range: its picture stays open."""
     low = ring(3, radius=2.6, height=1.2)
-    placed = place_clutter(0, Clutter(partitions=9), space(1, area=0.8, rig=low))
+    placed = place_clutter(0, ClutterSection(partitions=9), space(1, area=0.8, rig=low))
     pictures = PictureFill(low)
     for solid in placed:
         pictures.add(solid)
@@ -152,8 +152,8 @@ def test_a_picture_is_never_filled_completely():
 
 def test_one_more_object_moves_no_earlier_one():
     free = space()
-    before = {solid.name: solid for solid in place_clutter(4, Clutter(boxes=2, shelves=1, carts=1), free)}
-    after = {solid.name: solid for solid in place_clutter(4, Clutter(boxes=3, shelves=1, carts=2), free)}
+    before = {solid.name: solid for solid in place_clutter(4, ClutterSection(boxes=2, shelves=1, carts=1), free)}
+    after = {solid.name: solid for solid in place_clutter(4, ClutterSection(boxes=3, shelves=1, carts=2), free)}
     assert set(after) - set(before) == {"box2", "cart1"}
     for name in ("box0", "box1", "shelf0"):
         np.testing.assert_array_equal(after[name].mesh.vertices, before[name].mesh.vertices)
@@ -161,9 +161,13 @@ def test_one_more_object_moves_no_earlier_one():
 
 def test_an_object_without_a_place_is_refused():
     with pytest.raises(ValueError, match=r"clutter.tables: found no place for table \d+.*lower clutter.tables"):
-        place_clutter(0, Clutter(tables=20), space(room=Room(size=(5.5, 5.5, 3.0)), area=2.0, rig=ring(radius=2.4)))
+        place_clutter(
+            0, ClutterSection(tables=20), space(room=RoomSection(size=(5.5, 5.5, 3.0)), area=2.0, rig=ring(radius=2.4))
+        )
     with pytest.raises(ValueError, match=r"clutter.carts: found no free path for cart \d+.*lower clutter.carts"):
-        place_clutter(0, Clutter(carts=20), space(room=Room(size=(5.5, 5.5, 3.0)), area=2.0, rig=ring(radius=2.4)))
+        place_clutter(
+            0, ClutterSection(carts=20), space(room=RoomSection(size=(5.5, 5.5, 3.0)), area=2.0, rig=ring(radius=2.4))
+        )
 
 
 def test_the_first_object_stands_in_the_middle_that_people_keep_free():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from walkers import Rays, ring, space
 
-from simharness.scenario.sections.room import Clutter
+from simharness.scenario.sections.room import ClutterSection
 from simharness.world.scene.placement.clutter import place_clutter
 from simharness.world.scene.placement.coverage import share_hidden
 
@@ -25,13 +25,13 @@ def measured(free, solids) -> float:
 @pytest.mark.parametrize("seed", range(2))
 def test_the_requested_share_is_occluded(requested, seed):
     free = space(seed=seed)
-    solids = place_clutter(seed, Clutter(coverage=requested), free)
+    solids = place_clutter(seed, ClutterSection(coverage=requested), free)
     assert measured(free, solids) == pytest.approx(requested, abs=0.05)
 
 
 def test_requested_objects_and_moving_carts_count():
     free = space(seed=3, duration=10.0)
-    requested = Clutter(boxes=3, shelves=1, carts=1, coverage=0.3)
+    requested = ClutterSection(boxes=3, shelves=1, carts=1, coverage=0.3)
     solids = place_clutter(3, requested, free)
     assert [solid.name for solid in solids][:5] == ["shelf0", "box0", "box1", "box2", "cart0"]
     assert len(solids) > 5
@@ -41,21 +41,21 @@ def test_requested_objects_and_moving_carts_count():
 
 def test_a_larger_share_adds_to_the_same_objects():
     free = space(seed=1)
-    less, more = (place_clutter(1, Clutter(coverage=share), free) for share in (0.2, 0.35))
+    less, more = (place_clutter(1, ClutterSection(coverage=share), free) for share in (0.2, 0.35))
     assert len(more) > len(less)
     for one, two in zip(less[:-1], more, strict=False):
         np.testing.assert_array_equal(one.mesh.vertices, two.mesh.vertices)
 
 
 def test_zero_adds_nothing():
-    assert place_clutter(0, Clutter(coverage=0.0), space()) == ()
+    assert place_clutter(0, ClutterSection(coverage=0.0), space()) == ()
 
 
 def test_unreachable_coverage_is_refused():
     high = ring(3, radius=1.2, height=5.0)  # they look down on all people
     with pytest.raises(ValueError, match=r"clutter.coverage = 0.8 cannot be reached: with \d+ added objects 0\.\d\d"):
-        place_clutter(0, Clutter(coverage=0.8), space(2, duration=2.0, rig=high))
+        place_clutter(0, ClutterSection(coverage=0.8), space(2, duration=2.0, rig=high))
     with pytest.raises(ValueError, match=r"clutter.coverage = 0.02 is less than the share of joints that the"):
-        place_clutter(0, Clutter(shelves=3, pillars=3, coverage=0.02), space())
+        place_clutter(0, ClutterSection(shelves=3, pillars=3, coverage=0.02), space())
     with pytest.raises(ValueError, match=r"no joint is in any picture: use people.count above 0"):
-        place_clutter(0, Clutter(coverage=0.2), space(0))
+        place_clutter(0, ClutterSection(coverage=0.2), space(0))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from walkers import Rays, ring, space
 
-from simharness.scenario.sections.room import Clutter, Decoys, Room
+from simharness.scenario.sections.room import ClutterSection, DecoysSection, RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.placement.clutter import place_clutter
 from simharness.world.scene.placement.decoys import (
@@ -16,7 +16,7 @@ from simharness.world.scene.placement.decoys import (
 )
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH
 
-ALL = Decoys(posters=2, mannequins=1, coat_stands=1, mirrors=2)
+ALL = DecoysSection(posters=2, mannequins=1, coat_stands=1, mirrors=2)
 NOSE, SHOULDERS, HIPS, ANKLES = 0, [5, 6], [11, 12], [15, 16]
 
 
@@ -108,8 +108,8 @@ def test_the_glass_of_a_mirror_lies_on_its_front(on_wall):
 
 def test_some_decoys_hang_on_walls_if_there_are_walls():
     for walls in (True, False):
-        free = space(1, area=1.0, room=Room(walls=walls))
-        decoys = place_decoys(5, Decoys(posters=4, mirrors=4), free)
+        free = space(1, area=1.0, room=RoomSection(walls=walls))
+        decoys = place_decoys(5, DecoysSection(posters=4, mirrors=4), free)
         to_wall = [4.0 - np.abs(solid.mesh.vertices[:, :2]).max() for solid in decoys]
         assert any(gap < 0.01 for gap in to_wall) == walls
         assert all(gap < 0.01 or gap > 0.05 for gap in to_wall)
@@ -117,7 +117,7 @@ def test_some_decoys_hang_on_walls_if_there_are_walls():
 
 def test_clutter_stands_clear_of_decoys(placed):
     free, decoys = placed
-    clutter = place_clutter(0, Clutter(boxes=4, shelves=1, carts=1), replace(free, taken=tuple(decoys.values())))
+    clutter = place_clutter(0, ClutterSection(boxes=4, shelves=1, carts=1), replace(free, taken=tuple(decoys.values())))
     assert len(clutter) == 6
     for solid in clutter:
         for moment in np.linspace(0, 6, 13):
@@ -126,12 +126,12 @@ def test_clutter_stands_clear_of_decoys(placed):
 
 def test_one_more_decoy_moves_no_earlier_one(placed):
     free, decoys = placed
-    fewer = {solid.name: solid for solid in place_decoys(1, Decoys(posters=1, mirrors=1), free)}
+    fewer = {solid.name: solid for solid in place_decoys(1, DecoysSection(posters=1, mirrors=1), free)}
     np.testing.assert_array_equal(fewer["poster0"].mesh.vertices, decoys["poster0"].mesh.vertices)
     np.testing.assert_array_equal(fewer["poster0"].mesh.texture, decoys["poster0"].mesh.texture)
 
 
 def test_a_decoy_without_a_place_is_refused():
-    tight = space(2, room=Room(size=(4.0, 4.0, 3.0)), area=1.5, rig=ring(radius=1.8))
+    tight = space(2, room=RoomSection(size=(4.0, 4.0, 3.0)), area=1.5, rig=ring(radius=1.8))
     with pytest.raises(ValueError, match=r"decoys.coat_stands: found no place for coat stand \d+.*lower decoys.coat"):
-        place_decoys(0, Decoys(coat_stands=30), tight)
+        place_decoys(0, DecoysSection(coat_stands=30), tight)

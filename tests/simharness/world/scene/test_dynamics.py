@@ -17,7 +17,7 @@ from simharness.world.motion.paths import make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.trajectory import RATE, Trajectory, motion_clock
 from simharness.world.scene.dynamics.inverse_dynamics import InverseDynamics
-from simharness.world.scene.dynamics.tracking import LEVER, Push, Tracker, track
+from simharness.world.scene.dynamics.tracking import LEVER, MotionServos, Push, track
 from simharness.world.scene.objects.assembly import Assembly
 
 GRAVITY = 9.81
@@ -65,7 +65,7 @@ def test_only_gravity_moves_the_centre_of_mass_in_the_air():
     """Independent of joint torques, it falls by g t^2 / 2."""
     plan = standing(MAN, height=3.0, duration=0.5, left_elbow_flexion=40.0)
     waving = replace(plan, angles=plan.angles + 0.8 * np.sin(9 * plan.time[:, None]) * (plan.angles > 0))
-    tracker = Tracker(room([MAN]), [MAN.body], [waving], assist=1e-9)
+    tracker = MotionServos(room([MAN]), [MAN.body], [waving], assist=1e-9)
     pelvis = tracker.people[0].pelvis
     heights, elbow = [], []
     for qpos in tracker.run():
@@ -109,7 +109,7 @@ def test_a_walk_without_assistance_falls():
 
 def test_assistance_stays_within_its_bound():
     push = Push(person=0, start=0.3, duration=0.2, force=(1200.0, 0.0, 0.0))
-    tracker = Tracker(room([MAN]), [MAN.body], [standing(MAN)], assist=150.0, pushes=[push])
+    tracker = MotionServos(room([MAN]), [MAN.body], [standing(MAN)], assist=150.0, pushes=[push])
     pelvis = tracker.people[0].pelvis
     forces, torques = [], []
     for _ in tracker.run():
@@ -143,7 +143,7 @@ def test_people_whose_plans_intersect_collide():
     plans = [walking(MAN, start=(0.0, -1.2)), walking(WOMAN, start=(0.1, 1.2), ahead=-1.0, seed=2)]
     apart = np.linalg.norm(plans[0].root[:, :2] - plans[1].root[:, :2], axis=1)
     assert apart.min() < 0.15  # as planned
-    tracker = Tracker(room(cast), [mover.body for mover in cast], plans, assist=300.0)
+    tracker = MotionServos(room(cast), [mover.body for mover in cast], plans, assist=300.0)
     owner = tracker.model.body_rootid[tracker.model.geom_bodyid]
     deepest, met = 0.0, False
     happened = []

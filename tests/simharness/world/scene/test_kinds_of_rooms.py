@@ -6,8 +6,10 @@ import pytest
 from walkers import Rays, ring, space
 
 from simharness.scenario.load import load
-from simharness.scenario.sections.room import Clutter, Room
-from simharness.scenario.sections.scenario import Cameras, People, Rendering, Scenario
+from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.room import ClutterSection, RoomSection
+from simharness.scenario.sections.scenario import RenderingSection, Scenario
 from simharness.trial.audit import audit
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import CaptureFrames
@@ -25,7 +27,7 @@ KINDS = [name for name, kind in ROOM_KINDS.items() if kind.furniture]
 
 
 def furnished(kind, *, size=(7.0, 7.0, 3.0), people=3, area=1.8, seed=1):
-    room = settled(Room(kind=kind, size=size), seed)
+    room = settled(RoomSection(kind=kind, size=size), seed)
     free = space(people, duration=1.0, area=area, room=room, rig=ring(4, radius=min(size[:2]) / 2 - 0.3))
     openings = draw_openings(room, seed)
     return room, free, openings, place_furniture(seed, free, openings)
@@ -86,13 +88,18 @@ def test_fittings_lie_nearer_to_the_walls_than_any_camera(kind):
 def test_the_default_room_keeps_its_solids_for_rays():
     """Fittings, windows and lamps of the laboratory have no geoms, and its walls are whole for rays."""
     scenario = Scenario(
-        name="x", duration=0.4, rate=5.0, people=People(count=1), clutter=Clutter(boxes=2), cameras=Cameras(count=3)
+        name="x",
+        duration=0.4,
+        rate=5.0,
+        people=PeopleSection(count=1),
+        clutter=ClutterSection(boxes=2),
+        cameras=CamerasSection(count=3),
     )
     scene = build_trial(scenario).scene
     assert {solid.kind for solid in scene.solids} == {"room", "clutter"}
     with_geoms = [solid for solid in scene.solids if solid.geoms]
-    assert [solid.name for solid in with_geoms[:5]] == [solid.name for solid in make_room(Room(), 0)]
-    for solid, plain in zip(with_geoms[:5], make_room(Room(), 0), strict=True):
+    assert [solid.name for solid in with_geoms[:5]] == [solid.name for solid in make_room(RoomSection(), 0)]
+    for solid, plain in zip(with_geoms[:5], make_room(RoomSection(), 0), strict=True):
         assert solid.geoms == plain.geoms
     spec = mujoco.MjSpec()
     for solid in scene.solids:
@@ -102,7 +109,7 @@ def test_the_default_room_keeps_its_solids_for_rays():
 
 
 def test_windows_are_holes_in_the_walls_of_pictures():
-    room = settled(Room(kind="office"), 2)
+    room = settled(RoomSection(kind="office"), 2)
     openings = draw_openings(room, 2)
     windows = [opening for opening in openings if opening.kind == "window"]
     assert windows
@@ -124,20 +131,20 @@ def test_a_piece_more_moves_none_of_those_before_it():
 
 
 def test_any_draws_several_kinds_and_keeps_the_open_air_open():
-    drawn = {settled(Room(kind="any"), seed).kind for seed in range(30)}
+    drawn = {settled(RoomSection(kind="any"), seed).kind for seed in range(30)}
     assert len(drawn) >= 5
     assert "outdoors" not in drawn
-    assert settled(Room(kind="any", walls=False), 0).kind == "outdoors"
-    assert not Room(kind="outdoors").walls
+    assert settled(RoomSection(kind="any", walls=False), 0).kind == "outdoors"
+    assert not RoomSection(kind="outdoors").walls
     with pytest.raises(ValueError, match=r"outdoors.*no walls"):
-        Room(kind="outdoors", walls=True)
-    kept = settled(Room(kind="office", floor="tiles", wall="brick"), 3)
+        RoomSection(kind="outdoors", walls=True)
+    kept = settled(RoomSection(kind="office", floor="tiles", wall="brick"), 3)
     assert (kept.floor, kept.wall) == ("tiles", "brick")
 
 
 def test_a_room_too_small_for_its_kind_is_refused():
     with pytest.raises(ValueError, match=r'room.kind = "gym" needs a room of at least 4 by 4 m.*room.size'):
-        check_size(Room(kind="gym", size=(3.5, 5.0, 3.0)))
+        check_size(RoomSection(kind="gym", size=(3.5, 5.0, 3.0)))
     with pytest.raises(ValueError, match=r"no piece of its furniture finds a place.*people.area"):
         furnished("office", size=(4.0, 4.0, 3.0), area=1.9)
 
@@ -154,10 +161,10 @@ def test_truth_fits_the_pictures_of_each_kind(kind):
         seed=5,
         duration=0.2,
         rate=5.0,
-        room=Room(kind=kind),
-        people=People(count=2),
-        cameras=Cameras(count=3, size=(320, 240)),
-        rendering=Rendering(color=False),
+        room=RoomSection(kind=kind),
+        people=PeopleSection(count=2),
+        cameras=CamerasSection(count=3, size=(320, 240)),
+        rendering=RenderingSection(color=False),
     )
     trial = build_trial(scenario)
     views = CaptureFrames(scenario, trial.scene, trial.exposures, frozenset())(range(scenario.frames))

@@ -15,7 +15,8 @@ from simharness.capture.film import PictureObserver, film
 from simharness.capture.picture import meshes_at
 from simharness.capture.ray_visibility import RayObserver
 from simharness.capture.rendering.renderer import make_renderer
-from simharness.scenario.sections.scenario import Faults, Scenario
+from simharness.scenario.sections.cameras import FaultsSection
+from simharness.scenario.sections.scenario import Scenario
 from simharness.types.mirror import Mirror
 from simharness.types.views import Views
 from simharness.world.rigs.exposure_schedule import ExposureSchedule
@@ -213,7 +214,7 @@ def looking(center, aim) -> Camera:
 class TestFilms:
     def test_films_carry_them_and_join(self):
         playback, rig = played(2)
-        exposures = schedule_exposures(rig, Faults(dead=(1,)), np.array([0.0, 0.5, 1.0]), seed=0)
+        exposures = schedule_exposures(rig, FaultsSection(dead=(1,)), np.array([0.0, 0.5, 1.0]), seed=0)
         observer = RayObserver(playback)
         whole = film(playback, exposures, observer)
         names = Lookalikes.of(playback.scene).names

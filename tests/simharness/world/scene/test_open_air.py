@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simharness.scenario.sections.room import Room
-from simharness.scenario.sections.scenario import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.room import RoomSection
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.rooms.landscape import WHITE, draw_panorama
 from simharness.world.scene.rooms.lighting import room_lighting
@@ -17,7 +17,7 @@ from simharness.world.scene.rooms.sky import clear_sky, overcast_sky
 from simharness.world.scene.rooms.surroundings import AROUND, MEADOW, make_surroundings
 from simharness.world.scene.rooms.weather import WEATHERS
 
-ROOM = Room(kind="outdoors", floor="paving", size=(8.0, 6.0, 3.0))
+ROOM = RoomSection(kind="outdoors", floor="paving", size=(8.0, 6.0, 3.0))
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -78,19 +78,19 @@ def test_light_outdoors_is_that_of_the_sun_in_the_bearing_of_the_closed_form():
     np.testing.assert_allclose(light.sources.sun.direction, light.direction)
     assert light.panorama is not None
     assert room_lighting(ROOM, 3) == light  # so that backgrounds of cameras are kept
-    assert room_lighting(Room(walls=False), 3).panorama is None
+    assert room_lighting(RoomSection(walls=False), 3).panorama is None
     assert room_lighting(ROOM.model_copy(update={"light": "dim"}), 3).sources.sun is None
 
 
 @pytest.fixture(scope="module")
 def far_rig():
     """Cameras outside the floor and outside the ground around it."""
-    return build_rig(Cameras(count=4, radius=15.0, height=3.0))
+    return build_rig(CamerasSection(count=4, radius=15.0, height=3.0))
 
 
 def test_surroundings_hide_nothing(far_rig):
     """No line between two points of the floor, the ground around it and the cameras meets anything above the ground."""
-    for rig, reach in ((far_rig, 15.0), (build_rig(Cameras(count=3, radius=2.5)), np.hypot(8.0, 7.0))):
+    for rig, reach in ((far_rig, 15.0), (build_rig(CamerasSection(count=3, radius=2.5)), np.hypot(8.0, 7.0))):
         meadow, plants = make_surroundings(ROOM, 1, rig)
         assert meadow.geoms == plants.geoms == ()
         assert np.abs(meadow.mesh.vertices[:, 2]).max() == 0.0

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from walkers import Rays
 
-from simharness.scenario.sections.room import Room
-from simharness.scenario.sections.scenario import Cameras
+from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.room import RoomSection
 from simharness.types.lighting import Lighting
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.rooms.lamps import MOODS, has_ceiling, make_ceiling, shown_lights
@@ -12,7 +12,7 @@ from simharness.world.scene.rooms.room import make_room
 from simharness.world.scene.rooms.textures import FLOORS, WALLS
 
 SIZE = (6.0, 8.0, 3.0)
-ROOM = Room(size=SIZE)
+ROOM = RoomSection(size=SIZE)
 
 
 @pytest.fixture(scope="module")
@@ -105,12 +105,16 @@ def test_a_finish_changes_only_its_surface():
 def test_any_draws_each_finish():
     floors, walls = set(), set()
     for seed in range(5):
-        floor, wall = (solid.mesh.texture for solid in make_room(Room(floor="any", wall="any"), seed)[:2])
+        floor, wall = (solid.mesh.texture for solid in make_room(RoomSection(floor="any", wall="any"), seed)[:2])
         for kinds, looks, key, texture, place in ((floors, FLOORS, "floor", floor, 0), (walls, WALLS, "wall", wall, 1)):
-            same = {n for n in looks if np.array_equal(make_room(Room(**{key: n}), seed)[place].mesh.texture, texture)}
+            same = {
+                n
+                for n in looks
+                if np.array_equal(make_room(RoomSection(**{key: n}), seed)[place].mesh.texture, texture)
+            }
             assert len(same) == 1  # a drawn finish equals the named one
             kinds.update(same)
-    lights = {room_lighting(Room(light="any"), seed).key for seed in range(24)}
+    lights = {room_lighting(RoomSection(light="any"), seed).key for seed in range(24)}
     assert len(floors) >= 3
     assert len(walls) >= 3
     assert lights == {light.key for light in LIGHTS.values()}
@@ -136,7 +140,7 @@ def test_a_ceiling_is_for_pictures_alone_and_looks_into_the_room():
 
 @pytest.mark.parametrize(("height", "walls", "has"), [(2.8, True, True), (2.8, False, False), (3.0, True, False)])
 def test_a_room_has_a_ceiling_if_all_cameras_hang_below_it(height, walls, has):
-    rig = build_rig(Cameras(count=2, radius=2.0, height=height))
+    rig = build_rig(CamerasSection(count=2, radius=2.0, height=height))
     assert has_ceiling(ROOM.model_copy(update={"walls": walls}), rig) == has
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.world.scene.rooms.lights_of_kinds import lights_of
 from simharness.world.scene.rooms.openings import draw_openings
 
@@ -12,7 +12,7 @@ from simharness.world.scene.rooms.openings import draw_openings
 @pytest.mark.parametrize("kind", ["laboratory", "office", "living_room", "gym", "ward", "shop"])
 def test_windows_shine_into_the_room(kind):
     for seed in range(4):
-        room = Room(kind=kind, size=(7.0, 6.0, 3.0))
+        room = RoomSection(kind=kind, size=(7.0, 6.0, 3.0))
         openings = [each for each in draw_openings(room, seed) if each.kind == "window"]
         windows = [light for light in lights_of(room, seed, openings) if light.kind == "window"]
         assert len(windows) == len(openings)

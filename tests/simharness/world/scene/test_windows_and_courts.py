@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simharness.capture.rendering.raster import RasterRenderer
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.world.rigs.layouts import intrinsics, look_at
 from simharness.world.scene.rooms.court import make_court
 from simharness.world.scene.rooms.kinds import ROOM_KINDS, settled
@@ -22,7 +22,7 @@ def camera_at(center, aim, fov):
 
 @pytest.mark.parametrize("kind", [name for name, kind in ROOM_KINDS.items() if kind.windows[0]])
 def test_windows_shine_into_the_room(kind):
-    room = settled(Room(kind=kind), 1)
+    room = settled(RoomSection(kind=kind), 1)
     areas = [area for area in lights_of(room, 1, draw_openings(room, 1)) if area.kind == "window"]
     assert areas
     for area in areas:
@@ -33,7 +33,7 @@ def test_windows_shine_into_the_room(kind):
 
 def test_daylight_is_brightest_below_the_windows():
     """With its lamps off, the floor of a room is brighter near the windows than at the opposite wall."""
-    room = settled(Room(kind="office", size=(8.0, 8.0, 3.0), light="side"), 1)
+    room = settled(RoomSection(kind="office", size=(8.0, 8.0, 3.0), light="side"), 1)
     openings = [opening for opening in draw_openings(room, 1) if opening.kind == "window"][:1]
     lighting = room_lighting(room, 1, lights_of(room, 1, openings))
     meshes = [solid.mesh for solid in make_room(room, 1, openings)]
@@ -48,7 +48,7 @@ def test_daylight_is_brightest_below_the_windows():
 
 
 def test_a_window_without_a_pane_shows_the_panorama():
-    room = settled(Room(kind="office"), 2)
+    room = settled(RoomSection(kind="office"), 2)
     openings = draw_openings(room, 2)
     lighting = room_lighting(room, 2, lights_of(room, 2, openings))
     assert lighting.panorama is not None
@@ -63,7 +63,7 @@ def test_a_window_without_a_pane_shows_the_panorama():
 
 @pytest.mark.parametrize("size", [(8.0, 7.0, 3.0), (7.0, 12.0, 4.0), (30.0, 18.0, 6.0)])
 def test_lines_of_courts_stay_on_the_floor(size):
-    (court,) = make_court(settled(Room(kind="gym", size=size), 3), 3)
+    (court,) = make_court(settled(RoomSection(kind="gym", size=size), 3), 3)
     vertices = court.mesh.vertices.astype(float)
     assert court.geoms == ()
     assert (np.abs(vertices[:, :2]) <= np.array(size[:2]) / 2 - 0.3).all()
@@ -74,7 +74,7 @@ def test_lines_of_courts_stay_on_the_floor(size):
 
 
 def test_a_large_gym_has_a_whole_court_of_badminton():
-    (court,) = make_court(settled(Room(kind="gym", size=(30.0, 18.0, 6.0)), 3), 3)
+    (court,) = make_court(settled(RoomSection(kind="gym", size=(30.0, 18.0, 6.0)), 3), 3)
     lower = court.mesh.vertices[court.mesh.vertices[:, 2] < 0.002]
     np.testing.assert_allclose(np.abs(lower[:, :2]).max(axis=0), [13.40 / 2, 6.10 / 2], atol=0.03)
     upper = court.mesh.vertices[court.mesh.vertices[:, 2] > 0.002]
@@ -82,5 +82,5 @@ def test_a_large_gym_has_a_whole_court_of_badminton():
 
 
 def test_other_rooms_have_no_court():
-    assert make_court(settled(Room(kind="office"), 3), 3) == ()
-    assert make_court(settled(Room(kind="gym", floor="concrete"), 3), 3) == ()
+    assert make_court(settled(RoomSection(kind="office"), 3), 3) == ()
+    assert make_court(settled(RoomSection(kind="gym", floor="concrete"), 3), 3) == ()

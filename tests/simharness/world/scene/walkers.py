@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from mvpose import Camera, Rig
-from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.room import RoomSection
 from simharness.world.motion.trajectory import motion_clock
 from simharness.world.scene.placement.free_space import FreeSpace
 
@@ -51,7 +51,7 @@ def ring(count: int = 5, *, radius: float = 3.5, height: float = 2.2) -> Rig:
 def space(
     people: int = 4, *, duration: float = 6.0, area: float = 2.0, seed: int = 0, room=None, rig=None
 ) -> FreeSpace:
-    return FreeSpace(room or Room(), area, *crowd(people, duration, area, seed), rig or ring())
+    return FreeSpace(room or RoomSection(), area, *crowd(people, duration, area, seed), rig or ring())
 
 
 class Rays:
