@@ -97,6 +97,7 @@ def test_a_file_has_a_name_or_a_base_that_has_one(validator):
 
 def test_keys_say_what_they_mean():
     schema = scenario_schema()
-    assert schema["$defs"]["CamerasFileSection"]["properties"]["fov"]["description"] == "horizontal field of view, degrees"
+    cameras = schema["$defs"]["CamerasFileSection"]
+    assert cameras["properties"]["fov"]["description"] == "horizontal field of view, degrees"
     swept = schema["properties"]["sweep"]["properties"]["cameras"]["$ref"].rpartition("/")[2]
     assert schema["$defs"][swept]["properties"]["fov"]["description"] == "horizontal field of view, degrees"
