@@ -8,7 +8,7 @@ from mvpose import Camera, Rig
 from simharness.planning import FastLayer, Prediction, Volume
 from simharness.planning.rig_file import read_rig
 from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.world.rigs.layouts import build_rig
 
 ROOM = 8.0, 7.0, 3.0  # metres

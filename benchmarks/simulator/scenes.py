@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.cameras import CamerasSection
-from simharness.scenario.sections.people import PeopleSection
-from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.cameras_section import CamerasSection
+from simharness.scenario.sections.people_section import PeopleSection
+from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import Scenario
 
 

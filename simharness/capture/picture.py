@@ -23,7 +23,7 @@ from simharness.types.mirror import Mirror
 from simharness.world.motion.trajectory import transform_points
 
 if TYPE_CHECKING:
-    from simharness.scenario.sections.cameras import SensorSection
+    from simharness.scenario.sections.cameras_section import SensorSection
     from simharness.world.rigs.exposure_schedule import ExposureSchedule
     from simharness.world.scene.build import Scene
     from simharness.world.scene.playback import Playback, PlaybackState

@@ -21,7 +21,7 @@ from simharness.capture.raw_kernels import expose
 from simharness.types.srgb import linear_table, rounded
 
 if TYPE_CHECKING:
-    from simharness.scenario.sections.cameras import SensorSection
+    from simharness.scenario.sections.cameras_section import SensorSection
 
 Rgb = NDArray[np.uint8]
 

@@ -84,8 +84,8 @@ def check(
         if update:
             _update(study, baseline, workers)
             return
-        from simharness.gate.runner import baseline_of
-        from simharness.gate.runner import check as check_suite
+        from simharness.gate.gate_check import baseline_of
+        from simharness.gate.gate_check import check as check_suite
         from simharness.runtime.progress import reporter
 
         before = baseline_of(study, baseline)

@@ -11,8 +11,8 @@ import numpy as np
 from simharness.planning.rehearsal import Target
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
-from simharness.scenario.sections.detector import DetectorSection
-from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.detector_section import DetectorSection
+from simharness.scenario.sections.room_section import ClutterSection
 
 _ROOM_HEIGHT = 3.0  # metres, unless another is given
 

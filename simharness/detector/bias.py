@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
-from simharness.scenario.sections.detector import BiasSection
+from simharness.scenario.sections.detector_section import BiasSection
 from simharness.world.rigs.projection import project_to_image
 
 _LEFT_SHOULDER, _RIGHT_SHOULDER, _LEFT_HIP, _RIGHT_HIP = 5, 6, 11, 12

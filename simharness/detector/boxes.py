@@ -22,7 +22,7 @@ from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import LIMB_OF_JOINT, Key, KeyedDraws, logistic
 from simharness.detector.steps import Context, StepStage, step
 from simharness.detector.view_geometry import hidden_shares
-from simharness.scenario.sections.detector import BoxesSection
+from simharness.scenario.sections.detector_section import BoxesSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility
 

@@ -22,13 +22,13 @@ from simharness.detector.descriptors import DescriptorSampler, DescriptorSetting
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.heatmaps import Peaks
-from simharness.detector.outer_joints import detect_outer_joints
+from simharness.detector.outer_detections import detect_outer_joints
 from simharness.detector.steps import Context, registered_steps
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
+from simharness.types.outer_joints import OuterTruth, WholeFrame, whole_joints
 from simharness.types.sequence import Sequence
 from simharness.types.truth import Truth
 from simharness.types.views import Views
-from simharness.types.whole_body import OuterTruth, WholeFrame, whole_joints
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 from simharness.detector.bias import SIDE
 from simharness.detector.conditions import OCCLUDED, OUTSIDE, VISIBLE
-from simharness.scenario.sections.detector import BEARINGS, KIND_OF_JOINT, KINDS, DropSection, FaceSection
+from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOINT, KINDS, DropSection, FaceSection
 
 
 def drop_shares(drop: DropSection, face: FaceSection, occlusion: NDArray[np.int8], bearings: Floats | None) -> Floats:

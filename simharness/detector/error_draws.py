@@ -10,7 +10,7 @@ from scipy.special import ndtri
 from mvpose.arrays import Bools, Floats
 from simharness.detector.draws import LIMB_OF_JOINT, KeyedDraws
 from simharness.detector.part_tree import IN_TREE
-from simharness.scenario.sections.detector import CorrelationSection
+from simharness.scenario.sections.detector_section import CorrelationSection
 
 GROSS = frozenset({"miss", "stray", "inversion", "swap", "guess"})
 """Errors that ``correlation.gross_views`` correlates over the views; of the others it is ``correlation.views``."""

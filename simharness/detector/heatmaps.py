@@ -19,7 +19,7 @@ from mvpose.heatmaps import Heatmaps
 from mvpose.kernels import njit
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.steps import Context, StepStage, step
-from simharness.scenario.sections.detector import HeatmapHeadSection
+from simharness.scenario.sections.detector_section import HeatmapHeadSection
 from simharness.types.truth import KeypointError
 
 ASPECT = 3 / 4

@@ -31,7 +31,7 @@ from simharness.detector.reported import ReportedJoints, last_pixels
 from simharness.detector.scatter import Scatter
 from simharness.detector.steps import Context, StepStage, step
 from simharness.detector.view_geometry import bearings, image_axes
-from simharness.scenario.sections.detector import BiasSection, CorrelationSection, KeypointsSection
+from simharness.scenario.sections.detector_section import BiasSection, CorrelationSection, KeypointsSection
 from simharness.types.sequence import Sequence
 from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError
 from simharness.types.views import Views

@@ -18,7 +18,7 @@ from simharness.detector.draws import KeyedDraws
 from simharness.detector.false_positives import MIN_JOINTS, bounding_box, false_positive_block, keypoint_scores
 from simharness.detector.phantom_poses import NORMALS, postures, project_upright, rotate_about_z
 from simharness.detector.steps import Context, StepStage, step
-from simharness.scenario.sections.detector import PhantomsSection
+from simharness.scenario.sections.detector_section import PhantomsSection
 from simharness.types.views import Views, Visibility
 from simharness.world.rigs.projection import project_to_image
 

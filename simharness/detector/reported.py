@@ -13,7 +13,7 @@ from simharness.detector.drops import drop_shares
 from simharness.detector.error_draws import ErrorDraws
 from simharness.detector.part_tree import with_parents
 from simharness.detector.view_geometry import head_bearings
-from simharness.scenario.sections.detector import FaceSection, KeypointsSection
+from simharness.scenario.sections.detector_section import FaceSection, KeypointsSection
 
 
 @dataclass(frozen=True)

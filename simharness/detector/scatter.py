@@ -15,7 +15,7 @@ from mvpose import COCO17
 from mvpose.arrays import Floats
 from simharness.detector.conditions import VISIBLE
 from simharness.detector.draws import Key, KeyedDraws
-from simharness.scenario.sections.detector import CorrelationSection, KeypointsSection
+from simharness.scenario.sections.detector_section import CorrelationSection, KeypointsSection
 from simharness.types.truth import GOOD_BELOW
 
 

@@ -4,8 +4,8 @@
 (:meth:`~simharness.detector.detection_block.DetectionBlock.of_people`) and runs every registered step on them, ordered
 by :class:`StepStage` and within a stage by :data:`MODULES`.
 
-An added error is a section of :mod:`simharness.scenario.sections.detector`, a field of ``DetectorSection`` with it, one
-file with the step, and its name in :data:`MODULES`: see "a detector error" in the documentation (extending).
+An added error is a section of :mod:`simharness.scenario.sections.detector_section`, a field of ``DetectorSection`` with
+it, one file with the step, and its name in :data:`MODULES`: see "a detector error" in the documentation (extending).
 
 Rules for a step:
 
@@ -35,16 +35,16 @@ from mvpose.camera import Rig
 from simharness.detector.conditions import Conditions
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import KeyedDraws
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views
 
 MODULES = (
     "keypoints",
-    "scores",
+    "keypoint_scores",
     "boxes",
     "phantoms",
-    "decoys",
+    "decoy_hits",
     "heatmaps",
     "delivery",
 )

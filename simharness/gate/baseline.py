@@ -14,7 +14,7 @@ from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import MIB, parse_json, read_bytes
 from mvpose.files.message_text import one_line, shown
 from simharness.gate.trial_command import TrialKey
-from simharness.scenario.sections.gate import Tolerance
+from simharness.scenario.sections.gate_section import Tolerance
 
 GATED = tuple(Tolerance.model_fields)
 """Keys of the scores that are compared."""

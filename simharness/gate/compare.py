@@ -35,7 +35,7 @@ from simharness.gate.baseline import GATED, TIME, Measurement
 from simharness.gate.pairs import Pairs, pairs_of
 from simharness.gate.score_tests import Tested, test_of
 from simharness.gate.trial_command import TrialKey
-from simharness.scenario.sections.gate import GateSection
+from simharness.scenario.sections.gate_section import GateSection
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.paired_tests import holm
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from simharness.gate.compare import Change, Comparison
 from simharness.gate.trial_command import TrialKey
-from simharness.scenario.sections.gate import GateSection
+from simharness.scenario.sections.gate_section import GateSection
 
 
 @dataclass(frozen=True)

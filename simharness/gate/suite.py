@@ -17,7 +17,7 @@ from simharness.gate.gate_result import FailedCase
 from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.version import code_version
-from simharness.scenario.sections.method import MethodSection
+from simharness.scenario.sections.method_section import MethodSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study
 from simharness.study.measure import StoredTrial, TrialOutput

@@ -25,7 +25,7 @@ from simharness.planning.sightings import detect_in
 from simharness.planning.standing_people import ACTIVITIES, StandingScenes, pose_pool, standing_scenes
 from simharness.planning.visibility import Obstacle, see, seen_joints
 from simharness.planning.volume import Volume
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scoring.pcp import Part, part_states
 
 _LEAST_DEVIATION = 0.5  # pixels: no keypoint is more exact than the grid from which it is read

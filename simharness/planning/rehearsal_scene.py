@@ -14,8 +14,8 @@ from simharness.planning.scene_frame import SceneFrame
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.reality.validation.frame_scores import RULES, HeadRule
-from simharness.scenario.sections.detector import DetectorSection
-from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.detector_section import DetectorSection
+from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.world.humans.wearing import take_off
 from simharness.world.motion.poses.kinematics import Kinematics

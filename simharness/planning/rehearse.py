@@ -33,8 +33,8 @@ from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.reality.validation.subsets import camera_subsets
 from simharness.runtime.progress import Reporter, Silence
-from simharness.scenario.sections.detector import DetectorSection
-from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.detector_section import DetectorSection
+from simharness.scenario.sections.room_section import ClutterSection
 from simharness.statistics.intervals import Interval
 
 T = TypeVar("T")

@@ -9,7 +9,7 @@ from pathlib import Path
 from mvpose import Rig
 from mvpose.files.message_text import one_line
 from simharness.scenario.presets import RIGS, file_of, read_preset
-from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.toml_files import read_toml
 from simharness.world.rigs.layouts import build_rig
 

@@ -26,7 +26,7 @@ from simharness.planning.polygons import (
 )
 from simharness.planning.room_keys import LensKeys, ObstacleKeys, RoomKeys, WallPlaces
 from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.world.rigs.layouts import look_at
 from simharness.world.rigs.lenses import check_lens, intrinsics
 from simharness.world.scene.objects.geoms import Box

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
-from simharness.scenario.sections.cameras import Pixels, Term
+from simharness.scenario.sections.cameras_section import Pixels, Term
 from simharness.scenario.sections.section import (
     MOST_CAMERAS,
     Coordinate,

@@ -12,7 +12,7 @@ from mvpose.arrays import Floats
 from simharness.detector.conditions import oks_units
 from simharness.planning.layer import FastLayer
 from simharness.planning.visibility import see
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.views import Views, Visibility
 
 _FALSE = 0.1  # metres across the ray: farther keypoints are false, as are guesses at hidden joints

@@ -20,7 +20,7 @@ from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import Key, KeyedDraws
 from simharness.detector.steps import Context, registered_steps
 from simharness.planning.standing_people import StandingScenes
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.random_streams import stream
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views

@@ -25,7 +25,7 @@ from simharness.planning.scene_results import Condition, SceneResult, Scores
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.validation.frame_scores import RULES, score_frames
 from simharness.runtime.frame_pool import map_jobs
-from simharness.scenario.sections.cameras import FaultsSection
+from simharness.scenario.sections.cameras_section import FaultsSection
 from simharness.scoring.matching import count_groups
 from simharness.scoring.pcp import Part
 from simharness.trial.stages.capture import CaptureFrames

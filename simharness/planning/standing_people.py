@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Bools, Floats, Integers
 from simharness.detector.bias import body_axes
 from simharness.planning.volume import Volume
-from simharness.scenario.sections.people import ActivityName
+from simharness.scenario.sections.people_section import ActivityName
 from simharness.types.random_streams import stream
 
 ACTIVITIES = ("walk", "wave", "turn", "talk", "reach", "point")
@@ -98,9 +98,9 @@ def pose_pool(activities: Sequence[str] = ACTIVITIES, *, children: float = 0.0, 
 def _pose_pool(activities: tuple[str, ...], children: float, seed: int) -> PosePool:
     from simharness.capture.body_outlines import Outline, even_directions
     from simharness.capture.ray_casting import RayCaster
-    from simharness.scenario.sections.cameras import CamerasSection
-    from simharness.scenario.sections.people import PeopleSection
-    from simharness.scenario.sections.room import ClutterSection, RoomSection
+    from simharness.scenario.sections.cameras_section import CamerasSection
+    from simharness.scenario.sections.people_section import PeopleSection
+    from simharness.scenario.sections.room_section import ClutterSection, RoomSection
     from simharness.scenario.sections.scenario import Scenario
     from simharness.world.rigs.layouts import build_rig
     from simharness.world.scene.build import build

@@ -23,7 +23,7 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.people_tracks import TrackedPeople
 from simharness.runtime.progress import Silence
 from simharness.runtime.stages import Stages
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import Simulation, capture_trial

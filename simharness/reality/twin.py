@@ -19,7 +19,7 @@ from simharness.reality.detector_fit.fit import Fit
 from simharness.reality.people_tracks import TrackedPeople
 from simharness.reality.reenactment import Film, cut_takes, film
 from simharness.runtime.progress import Reporter, Silence
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 
 MOST_FILMS = 3
 """Largest number of films of a recording. More twins have the bodies of earlier ones, and detections of their own:

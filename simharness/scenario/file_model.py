@@ -9,9 +9,9 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from simharness.scenario.sections.cameras import CamerasSection, SensorSection
-from simharness.scenario.sections.detector import DetectorSection
-from simharness.scenario.sections.gate import GateSection
+from simharness.scenario.sections.cameras_section import CamerasSection, SensorSection
+from simharness.scenario.sections.detector_section import DetectorSection
+from simharness.scenario.sections.gate_section import GateSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.size import MOST_TRIALS
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from simharness.scenario.sections.detector import KINDS
+from simharness.scenario.sections.detector_section import KINDS
 
 Key = tuple[str, ...]
 Origins = dict[Key, str]

@@ -23,8 +23,8 @@ from mvpose.files.input_files import SETTINGS, read_bytes
 from mvpose.files.message_text import all_in_one_line, listed, shown
 from simharness.scenario.layers import Origins, merge
 from simharness.scenario.named_files import locate_files
-from simharness.scenario.sections.cameras import CamerasSection, SensorSection
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.cameras_section import CamerasSection, SensorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.section import Section
 from simharness.scenario.shipped import shipped_folder
 from simharness.scenario.toml_files import ScenarioError, read_toml

@@ -19,7 +19,7 @@ from mvpose.files.message_text import all_in_one_line, shown
 from simharness.scenario.document import Document, read_document
 from simharness.scenario.layers import Origins, leaves, merge, nested, set_origin
 from simharness.scenario.presets import KINDS, Presets, merge_with_presets
-from simharness.scenario.sections.gate import GateSection
+from simharness.scenario.sections.gate_section import GateSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.sections.section import Section
 from simharness.scenario.size import MOST_TRIALS, oversized

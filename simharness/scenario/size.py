@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from mvpose.detections import MOST_DETECTIONS
-from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.scenario import Scenario
 
 MOST_FRAMES = 100_000

@@ -22,7 +22,7 @@ Beside the keys of a scenario, a scenario file may have::
     [method.estimators]               # user-defined estimators: simharness.trial.stages.estimators
     custom = "custom.py:Custom"
 
-    [gate]                            # simharness.scenario.sections.gate
+    [gate]                            # simharness.scenario.sections.gate_section
 
 A setting at a seed is a trial; all variants of a trial get the same detections. A file without these keys is a study of
 one trial.
@@ -36,8 +36,8 @@ from pathlib import Path
 from typing import Any
 
 from simharness.scenario.resolution import Resolver, ScenarioPlan, read_plan, refuse, value_at, vary
-from simharness.scenario.sections.gate import GateSection
-from simharness.scenario.sections.method import wrong_variants
+from simharness.scenario.sections.gate_section import GateSection
+from simharness.scenario.sections.method_section import wrong_variants
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.size import MOST_TRIALS
 from simharness.scenario.sweep import Value

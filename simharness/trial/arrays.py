@@ -18,8 +18,8 @@ from mvpose.detections import Detections
 from mvpose.estimate import Estimate, Matching
 from mvpose.skeleton import COCO17, SHELF14
 from mvpose.wholebody import skeleton_by_name
+from simharness.types.outer_joints import WholeFrame
 from simharness.types.truth import Truth
-from simharness.types.whole_body import WholeFrame
 
 Arrays = dict[str, NDArray[Any]]
 

@@ -14,7 +14,7 @@ import simharness
 from mvpose.wholebody import read_skeleton
 from simharness.planning.candidates import candidates_in
 from simharness.planning.room_file import read_room
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 
 
 def test_every_block_is_tested_here():

@@ -8,7 +8,7 @@ import pytest
 from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.sensor import develop
-from simharness.scenario.sections.cameras import SensorSection
+from simharness.scenario.sections.cameras_section import SensorSection
 from tools.reid import code_digest
 from tools.reid.crops import FILL, SIZE, Crops, Recipe, azimuths, crops_of_boxes, crops_of_group, jitter_boxes
 from tools.reid.filming_sites import SIZE as PICTURE

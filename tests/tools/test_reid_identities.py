@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scenario.sections.cameras import CamerasSection
-from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.cameras_section import CamerasSection
+from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape

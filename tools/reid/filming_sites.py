@@ -11,8 +11,8 @@ from functools import lru_cache
 import numpy as np
 
 from mvpose.camera import Camera
-from simharness.scenario.sections.cameras import SensorSection
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.cameras_section import SensorSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream

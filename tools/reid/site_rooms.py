@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.camera import Camera, Rig
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.world.scene.objects.geoms import Box

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from simharness.scenario.presets import SENSORS, read_preset
-from simharness.scenario.sections.cameras import SensorSection
+from simharness.scenario.sections.cameras_section import SensorSection
 
 PROFILES = {"machine-vision": 0.3, "webcam": 0.25, "phone": 0.2, "action": 0.15, "perfect": 0.1}
 """Fraction of sites whose cameras are like those of a profile."""

@@ -27,7 +27,7 @@ from simharness.outputs.study.failure_section import failure_section
 from simharness.outputs.study.losses import LOST, Loss, finding, losses
 from simharness.outputs.study.worst_frames import WorstFramePictures, show, worst_frames
 from simharness.runtime.progress import duration
-from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scoring.catalogue import SCORES
 from simharness.study.causes.blame_file import read_blame
 from simharness.study.causes.cause_shares import Blame

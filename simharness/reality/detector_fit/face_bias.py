@@ -13,7 +13,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.detector.bias import SIDE, body_axes
 from simharness.reality.people_tracks import LIMB_JOINTS
-from simharness.scenario.sections.detector import KIND_OF_JOINT
+from simharness.scenario.sections.detector_section import KIND_OF_JOINT
 
 
 def face_bias(tracked: Floats, staged: Floats) -> Floats:

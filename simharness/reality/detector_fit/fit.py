@@ -19,7 +19,7 @@ from simharness.reality.detector_fit.profile import as_toml, settings
 from simharness.reality.detector_fit.sample import Sample, sample_of
 from simharness.reality.people_tracks import TrackedPeople, track_people
 from simharness.reality.reenactment import Film, film
-from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, DetectorSection
+from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
 
 _TWINS = 2  # simulated in each round of the calibration
 _FEWEST = 100  # joints behind a value that is calibrated: Shelf has 130 reported shoulders that others hide

@@ -15,7 +15,7 @@ from simharness.detector.error_draws import GROSS
 from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints
 from simharness.reality.detector_fit.tetrachoric import correlation_grid, joint_probability
 from simharness.reality.people_tracks import LIMB_JOINTS
-from simharness.scenario.sections.detector import BEARINGS, KIND_OF_JOINT, KINDS, KeypointsSection
+from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOINT, KINDS, KeypointsSection
 from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError
 
 FrameSums = dict[str, Floats]

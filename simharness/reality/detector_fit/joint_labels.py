@@ -25,7 +25,7 @@ from simharness.reality.detector_fit.consensus import Consensus, find_consensus
 from simharness.reality.detector_fit.occlusion import complete_face, occlusion_classes
 from simharness.reality.detector_fit.sample import Sample
 from simharness.reality.people_tracks import LIMB_JOINTS
-from simharness.scenario.sections.detector import BEARINGS, KIND_OF_JOINT, KINDS
+from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOINT, KINDS
 from simharness.types.truth import KeypointError
 
 CLASSES = ("drop", "swap", "inversion", "miss", "jitter")

@@ -13,7 +13,7 @@ from simharness.reality.detector_fit.frame_sums import SCORED, FrameSums, frame_
 from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints, label_joints
 from simharness.reality.detector_fit.parameters import estimate_parameters
 from simharness.reality.detector_fit.sample import Sample
-from simharness.scenario.sections.detector import KINDS
+from simharness.scenario.sections.detector_section import KINDS
 from simharness.statistics.bootstrap import block_weights, blocks, interval, resampled
 
 RESAMPLES = 500

@@ -20,7 +20,7 @@ from simharness.reality.detector_fit.tetrachoric import (
     joint_probability,
     tetrachoric_correlation,
 )
-from simharness.scenario.sections.detector import BEARINGS, KIND_OF_JOINT, KINDS
+from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOINT, KINDS
 from simharness.types.truth import GOOD_BELOW
 
 LIMB_KINDS = tuple(sorted({KIND_OF_JOINT[joint] for joint in range(5, 17)}))

@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from simharness.reality.detector_fit.measure import MeasuredDetector
-from simharness.scenario.sections.detector import BEARINGS, KINDS
+from simharness.scenario.sections.detector_section import BEARINGS, KINDS
 
 _COLORS = ("#3b82c4", "#d9643a")
 _STYLE: dict[Any, Any] = {

@@ -10,7 +10,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.reality.detector_fit.measure import MeasuredDetector, MeasuredValue
-from simharness.scenario.sections.detector import KINDS, LARGEST_MULTIPLE, DetectorSection
+from simharness.scenario.sections.detector_section import KINDS, LARGEST_MULTIPLE, DetectorSection
 
 _FACE_DROPS = ("keypoints.drop.visible", "keypoints.drop.self_occluded")
 

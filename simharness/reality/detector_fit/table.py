@@ -12,7 +12,7 @@ from rich.text import Text
 from simharness.reality.annotation import AnnotationFit
 from simharness.reality.detector_fit.frame_sums import TERCILES
 from simharness.reality.detector_fit.measure import MeasuredDetector, MeasuredValue, agreement
-from simharness.scenario.sections.detector import BEARINGS, KINDS
+from simharness.scenario.sections.detector_section import BEARINGS, KINDS
 
 _WIDE = 130  # columns of a terminal that has room for all intervals
 _OCCLUSIONS = ("visible", "self_occluded", "occluded")

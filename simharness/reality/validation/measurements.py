@@ -18,7 +18,7 @@ from mvpose.rays import viewing_rays
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.sample import LIMB_JOINTS
 from simharness.reality.validation.shown_people import ShownPeople, people_detections, shown_people
-from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS
+from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS
 
 TREE = {
     "wrist|elbow": ((9, 7), (10, 8)),

@@ -13,11 +13,11 @@ from pydantic import Field
 
 from simharness.scenario.sections.annotation import AnnotationSection
 from simharness.scenario.sections.appearance import AppearanceSection
-from simharness.scenario.sections.cameras import CamerasSection, FaultsSection, SensorSection
-from simharness.scenario.sections.detector import DetectorSection
-from simharness.scenario.sections.method import NAME, MethodSection
-from simharness.scenario.sections.people import PeopleSection
-from simharness.scenario.sections.room import ClutterSection, DecoysSection, RoomSection
+from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection, SensorSection
+from simharness.scenario.sections.detector_section import DetectorSection
+from simharness.scenario.sections.method_section import NAME, MethodSection
+from simharness.scenario.sections.people_section import PeopleSection
+from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
 from simharness.scenario.sections.section import Section
 
 FILE_KEYS: tuple[tuple[str, ...], ...] = (

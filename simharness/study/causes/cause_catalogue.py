@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from mvpose.files.message_text import listed
-from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
-from simharness.scenario.sections.detector import (
+from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
+from simharness.scenario.sections.detector_section import (
     BiasSection,
     BoxesSection,
     DropSection,

@@ -10,12 +10,12 @@ if TYPE_CHECKING:
     from mvpose.arrays import Floats
     from mvpose.skeleton import Skeleton
     from simharness.capture.film import Observer
-    from simharness.capture.outer_joints import OuterJointFilm
+    from simharness.capture.outer_views import OuterJointFilm
     from simharness.capture.picture import PictureSource
     from simharness.capture.rendering.renderer import Renderer, RendererName
     from simharness.scenario.sections.scenario import Scenario
+    from simharness.types.outer_joints import OuterViews
     from simharness.types.views import Views
-    from simharness.types.whole_body import OuterViews
     from simharness.world.rigs.exposure_schedule import ExposureSchedule
     from simharness.world.scene.build import Scene
     from simharness.world.scene.playback import Playback
@@ -90,7 +90,7 @@ class FilmOuterJoints:
     @functools.cached_property
     def _film(self) -> OuterJointFilm:
         """The film of this process."""
-        from simharness.capture.outer_joints import OuterJointFilm
+        from simharness.capture.outer_views import OuterJointFilm
         from simharness.world.scene.playback import Playback
 
         return OuterJointFilm(Playback(self.scene), self.skeleton)

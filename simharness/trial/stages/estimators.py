@@ -42,7 +42,7 @@ from mvpose.checks import as_array
 from mvpose.pipeline import Estimator
 from mvpose.skeleton import Skeleton
 from simharness.runtime.errors import RunError
-from simharness.scenario.sections.method import MethodSection, wrong_variants
+from simharness.scenario.sections.method_section import MethodSection, wrong_variants
 from simharness.trial.stages.tracking import track_frames
 
 _PROTOCOL = "estimate(rig, detections) -> mvpose.Estimate"

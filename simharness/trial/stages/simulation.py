@@ -14,9 +14,9 @@ from simharness.trial.stages.build_trial import Trial
 from simharness.trial.stages.capture import CaptureFrames, FilmOuterJoints
 from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.trial.stages.networks import ReadFrames
+from simharness.types.outer_joints import OuterTruth, OuterViews
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views
-from simharness.types.whole_body import OuterTruth, OuterViews
 from simharness.world.scene.playback import simulate
 
 

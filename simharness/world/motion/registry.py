@@ -11,7 +11,7 @@ How to add an activity:
        @activity("hand_over", performers=2, clearance=0.5)
        def hand_over(performers, spot, time, *, rng, pace) -> Performance: ...
 
-2. Add the name to ``ActivityName`` in ``simharness/scenario/sections/people.py``, the names that scenario files accept.
+2. Add the name to ``ActivityName`` in ``simharness/scenario/sections/people_section.py``, the names that scenario files accept.
 
 Nothing else lists activities: :func:`activities` imports every module of the two folders. The tests in
 ``tests/simharness/world/motion`` (``test_activities.py``, ``test_interactions.py``) run on every registered activity:
@@ -34,7 +34,7 @@ from typing import TypeVar, get_args
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.people import ActivityName, PeopleSection
+from simharness.scenario.sections.people_section import ActivityName, PeopleSection
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop, Spot, Track
 from simharness.world.motion.performance import Performance
@@ -153,7 +153,7 @@ def activities() -> Mapping[str, Activity]:
     if unlisted:
         raise ValueError(
             f"the activity {unlisted[0]!r} is registered, but scenario files do not accept it: add its name to "
-            "ActivityName in simharness/scenario/sections/people.py"
+            "ActivityName in simharness/scenario/sections/people_section.py"
         )
     return MappingProxyType({name: _registered[name] for name in names if name in _registered})
 

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from mvpose.arrays import Bools, Floats
-from simharness.scenario.sections.people import TrafficSection
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.people_section import TrafficSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.performance import Prop
 from simharness.world.motion.presence import Presence

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.cameras_section import CamerasSection
 
 _WALL_DISTANCE = 0.25  # metres: cameras in the corners of a room
 _GOLDEN = 180.0 * (3.0 - np.sqrt(5.0))  # degrees: the golden angle spreads bearings evenly

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Camera, Rig
 from mvpose.checks import as_array
-from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
+from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
 from simharness.types.random_streams import stream
 from simharness.world.rigs.exposure_schedule import ExposureSchedule, moved
 

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.camera import Camera, Rig
 from mvpose.formats.calibration.registry import read_calibration
 from mvpose.formats.views.plausibility import UNKNOWN_SIZE
-from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.types.random_streams import stream
 from simharness.world.rigs.camera_positions import camera_positions
 from simharness.world.rigs.lenses import check_lens, intrinsics
-from simharness.world.rigs.presets import preset_rig
+from simharness.world.rigs.published_rigs import preset_rig
 
 _STEEPEST = 1e-6  # sine of the angle to the vertical below which the upright roll is undefined
 _SAME = 1e-9  # metres: closer points are the same

@@ -25,7 +25,7 @@ from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.presence import Presence, held
 from simharness.world.motion.trajectory import motion_clock
 from simharness.world.scene.camera_clearance import check_rig
-from simharness.world.scene.dynamics.tracking import track
+from simharness.world.scene.dynamics.motion_servos import track
 from simharness.world.scene.objects.props import make_prop
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.people import make_person, shape_of_person

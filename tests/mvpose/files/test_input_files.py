@@ -121,8 +121,8 @@ AROUND = {
     "simharness/outputs/study/page.py": "a file of a result folder, if regular",
 }
 SHIPPED = {
-    "simharness/world/rigs/presets.py", "simharness/world/humans/body.py", "simharness/detector/guesses.py",
-    "simharness/world/humans/outer_joints.py", "simharness/trial/kernel_compilation.py",
+    "simharness/world/rigs/published_rigs.py", "simharness/world/humans/body.py", "simharness/detector/guesses.py",
+    "simharness/world/humans/outer_landmarks.py", "simharness/trial/kernel_compilation.py",
 }  # fmt: skip
 CALLS = re.compile(
     r"(?:^|\.)(?:read_text|read_bytes|loadmat|read_parquet|scan_parquet|FileStorage|imread)$|^(?:np\.load|json\.loads?|"

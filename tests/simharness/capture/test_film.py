@@ -15,7 +15,7 @@ from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.film import PictureObserver, film
 from simharness.capture.picture import PictureSource, antialiased, meshes_at
 from simharness.capture.rendering.raster import RasterRenderer
-from simharness.scenario.sections.cameras import FaultsSection, SensorSection
+from simharness.scenario.sections.cameras_section import FaultsSection, SensorSection
 from simharness.types.lighting import Lighting
 from simharness.types.views import LookalikeViews, Views, Visibility
 from simharness.world.rigs.exposure_schedule import ExposureSchedule

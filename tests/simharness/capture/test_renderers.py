@@ -10,7 +10,7 @@ import pytest
 from mesh_shapes import _mesh, ball, box, chequered, crowd, disc, room, sheet, with_parts
 
 from simharness.capture.rendering.renderer import NEAR, make_renderer
-from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.types.lighting import Lighting
 from simharness.world.rigs.layouts import build_rig, intrinsics, look_at
 
@@ -244,8 +244,8 @@ def test_the_renderers_agree_on_a_crowd(raster, gl):
 def test_the_renderers_agree_on_people_of_a_scenario(raster, gl):
     from simharness.capture.joint_visibility import label_joints
     from simharness.capture.picture import meshes_at
-    from simharness.scenario.sections.people import PeopleSection
-    from simharness.scenario.sections.room import ClutterSection
+    from simharness.scenario.sections.people_section import PeopleSection
+    from simharness.scenario.sections.room_section import ClutterSection
     from simharness.scenario.sections.scenario import Scenario
     from simharness.world.scene.build import build
     from simharness.world.scene.playback import Playback

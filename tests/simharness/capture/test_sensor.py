@@ -9,7 +9,7 @@ from test_renderers import VIEWS
 
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.sensor import blur, compressed, develop, draw_response, from_linear, to_linear
-from simharness.scenario.sections.cameras import SensorSection
+from simharness.scenario.sections.cameras_section import SensorSection
 
 GRAY = np.full((120, 160, 3), 128, np.uint8)
 RAMP = np.tile(np.arange(256, dtype=np.uint8)[None, :, None], (4, 1, 3))

@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose import COCO17, Camera, Rig
 from simharness.detector.bias import body_axes, pixel_offsets, world_offsets
-from simharness.scenario.sections.detector import BiasSection
+from simharness.scenario.sections.detector_section import BiasSection
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape
 

@@ -10,7 +10,7 @@ from simharness.detector.boxes import DUPLICATE_SCATTER, DUPLICATE_SCORE, UPPER_
 from simharness.detector.conditions import BOX_SHARE, overlaps
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import LIMB_OF_JOINT, KeyedDraws
-from simharness.scenario.sections.detector import BoxesSection
+from simharness.scenario.sections.detector_section import BoxesSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility
 

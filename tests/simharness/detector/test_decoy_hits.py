@@ -7,10 +7,10 @@ import pytest
 from scipy.stats import binom
 
 from mvpose import Camera, Rig
-from simharness.detector.decoys import draw_decoy_hits
+from simharness.detector.decoy_hits import draw_decoy_hits
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.false_positives import MIN_JOINTS
-from simharness.scenario.sections.detector import DecoyHitsSection
+from simharness.scenario.sections.detector_section import DecoyHitsSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import LookalikeViews, Views
 

@@ -13,7 +13,7 @@ from simharness.detector.descriptor_model import DescriptorModel
 from simharness.detector.descriptors import DescriptorSettings
 from simharness.detector.detect import detect
 from simharness.detector.view_geometry import bearings, hidden_shares
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.views import LookalikeViews, Visibility
 
 PEOPLE, VIEWS = 12, 5

@@ -11,7 +11,7 @@ from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
 from simharness.scenario.load import load
 from simharness.scenario.presets import PROFILES, read_profile
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import CaptureFrames
 from simharness.types.truth import MISS_FROM, KeypointError

@@ -7,10 +7,10 @@ from worlds import world
 from mvpose.wholebody import skeleton_by_name
 from simharness.detector.conditions import BOX_SHARE
 from simharness.detector.detect import detect
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
+from simharness.types.outer_joints import OuterTruth, OuterViews
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility
-from simharness.types.whole_body import OuterTruth, OuterViews
 
 SKELETON = skeleton_by_name("halpe26")
 OUTER = SKELETON.joints[17:]

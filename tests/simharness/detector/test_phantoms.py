@@ -13,8 +13,8 @@ from simharness.detector.birth_death import BirthDeathProcess, assign_slots, fra
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.phantom_poses import NORMALS, postures, project_upright
 from simharness.detector.phantoms import draw_phantoms, viewed_area
-from simharness.scenario.sections.cameras import CamerasSection
-from simharness.scenario.sections.detector import PhantomsSection
+from simharness.scenario.sections.cameras_section import CamerasSection
+from simharness.scenario.sections.detector_section import PhantomsSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility
 from simharness.world.rigs.layouts import build_rig

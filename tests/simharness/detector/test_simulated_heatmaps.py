@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from mvpose import Camera, Detections, Pipeline, Rig
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.heatmaps import ASPECT, PADDING, Peaks, drop_outside_crops
-from simharness.scenario.sections.detector import HeatmapHeadSection
+from simharness.scenario.sections.detector_section import HeatmapHeadSection
 from simharness.types.truth import KeypointError
 
 SIZES = ("64x48", "96x72")

@@ -11,7 +11,7 @@ from simharness.detector.detect import detect
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.error_classes import MIRROR
 from simharness.detector.steps import Context, StepStage, registered_steps, step
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.section import Section
 from simharness.types.truth import KeypointError
 from simharness.types.views import Visibility

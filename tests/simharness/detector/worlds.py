@@ -9,7 +9,7 @@ from mvpose import Camera, Rig
 from simharness.detector.conditions import Conditions
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.keypoints import find_keypoints
-from simharness.scenario.sections.detector import CorrelationSection, KeypointsSection
+from simharness.scenario.sections.detector_section import CorrelationSection, KeypointsSection
 from simharness.types.landmarks import LANDMARKS
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views, Visibility

@@ -16,7 +16,7 @@ from simharness.gate.gate_result import FailedCase, GateResult
 from simharness.gate.junit import SPEED, WHOLE, junit
 from simharness.gate.markdown import markdown
 from simharness.gate.trial_command import TrialKey
-from simharness.scenario.sections.gate import GateSection
+from simharness.scenario.sections.gate_section import GateSection
 from simharness.scoring.catalogue import SCORES
 
 COMMAND = "simharness run a.toml --set 'cases={}' --seed 3"

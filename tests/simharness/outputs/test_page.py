@@ -8,8 +8,8 @@ import pytest
 from mvpose import Detections, Estimate, Matching
 from simharness.outputs.run.page import joint_errors, person_errors, render
 from simharness.outputs.run.result_folder import score_table
-from simharness.scenario.sections.cameras import CamerasSection
-from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.cameras_section import CamerasSection
+from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import score_variant
 from simharness.scoring.summary import summarize

@@ -10,7 +10,7 @@ import pytest
 from mvpose.report.svg_plots import STAGE_COLORS
 from simharness.outputs.run import plots
 from simharness.outputs.study import plots as study_plots
-from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval
 from simharness.world.rigs.layouts import build_rig

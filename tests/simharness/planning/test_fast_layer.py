@@ -11,7 +11,7 @@ from simharness.planning.joint_error import covariance, expected_distance, infor
 from simharness.planning.standing_people import APART, bearings_of, pose_pool, standing_scenes
 from simharness.planning.visibility import see, seen_joints
 from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.detector import CorrelationSection, DetectorSection, Factors
+from simharness.scenario.sections.detector_section import CorrelationSection, DetectorSection, Factors
 from simharness.types.views import Visibility
 from simharness.world.rigs.layouts import look_at
 

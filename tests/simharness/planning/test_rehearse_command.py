@@ -18,7 +18,7 @@ from simharness.planning.volume import Volume
 from simharness.scenario.presets import read_profile
 from simharness.scenario.shipped import shipped_folder
 from simharness.world.rigs.layouts import look_at
-from simharness.world.rigs.presets import preset_rig
+from simharness.world.rigs.published_rigs import preset_rig
 
 
 def test_nothing_visible_is_one_message():

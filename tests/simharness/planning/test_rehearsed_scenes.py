@@ -15,7 +15,7 @@ from simharness.planning.simulation import SceneBatch, simulate_scenes
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.room_section import ClutterSection
 
 WHOLE = (0, 1, 2, 3, 4)
 WORSE = Condition(WHOLE, "rotation", 2.0)

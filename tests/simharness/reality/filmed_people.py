@@ -15,7 +15,7 @@ from simharness.reality.reenactment import Film
 from simharness.runtime.progress import Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.load import load
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import capture_trial
 from simharness.types.sequence import Sequence

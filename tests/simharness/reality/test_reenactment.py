@@ -10,7 +10,7 @@ from turning_people import walkers
 from mvpose import Rig
 from simharness.reality.people_tracks import LIMB_JOINTS, TrackedPeople
 from simharness.reality.reenactment import cut_takes, film, floor_height
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.views import Visibility
 
 SHIFT = np.array([0.0, 0.0, -0.14])

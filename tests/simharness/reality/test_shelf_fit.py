@@ -10,7 +10,7 @@ from simharness.reality.detector_fit.measure import point_estimates
 from simharness.reality.detector_fit.sample import sample_of
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, track_people
 from simharness.reality.recording_file import read_recording
-from simharness.scenario.sections.detector import KINDS
+from simharness.scenario.sections.detector_section import KINDS
 
 pytestmark = pytest.mark.slow
 

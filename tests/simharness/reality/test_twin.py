@@ -14,7 +14,7 @@ from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS
 from simharness.reality.seed_evaluation import PcpInterval
 from simharness.reality.twin import TwinModel, detected_twin, simulate_twins
 from simharness.reality.twin_comparison import TwinComparison, compare
-from simharness.scenario.sections.detector import BiasSection, DetectorSection
+from simharness.scenario.sections.detector_section import BiasSection, DetectorSection
 
 DETECTOR = DetectorSection.model_validate(
     {"name": "known", "kind": "bottom-up", "keypoints": {"scatter": 0.3}, "boxes": {"missed": 0.1}}

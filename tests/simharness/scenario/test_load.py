@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from simharness.scenario.load import ScenarioError, fingerprint, load
 from simharness.scenario.resolution import read_plan
-from simharness.scenario.sections.cameras import CamerasSection
-from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.cameras_section import CamerasSection
+from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_files import dumps
 

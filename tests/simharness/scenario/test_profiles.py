@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from simharness.scenario.load import ScenarioError, load
 from simharness.scenario.presets import PROFILES, read_profile
-from simharness.scenario.sections.detector import KINDS, DetectorSection, KeypointsSection
+from simharness.scenario.sections.detector_section import KINDS, DetectorSection, KeypointsSection
 from simharness.scenario.toml_files import dumps
 
 

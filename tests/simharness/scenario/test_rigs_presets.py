@@ -6,7 +6,7 @@ import pytest
 
 from simharness.scenario.load import ScenarioError, load
 from simharness.scenario.presets import RIGS, summary_of
-from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.study_definition import load_study
 from simharness.world.rigs.layouts import build_rig
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mvpose import Rig
-from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
-from simharness.scenario.sections.people import PeopleSection
-from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
+from simharness.scenario.sections.people_section import PeopleSection
+from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import RenderingSection, Scenario
 from simharness.scenario.study_definition import load_study
 from simharness.study.runner import run_study

@@ -6,7 +6,7 @@ from mvpose.calibration import diagnose
 from simharness.runtime.progress import Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.load import load
-from simharness.scenario.sections.cameras import FaultsSection
+from simharness.scenario.sections.cameras_section import FaultsSection
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import capture_trial, detect_trial
 

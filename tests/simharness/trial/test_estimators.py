@@ -25,7 +25,7 @@ from simharness.outputs.study.worst_frames import _command
 from simharness.runtime.errors import RunError
 from simharness.runtime.frame_pool import map_frames
 from simharness.scenario.load import load
-from simharness.scenario.sections.method import EstimatorsSection, MethodSection
+from simharness.scenario.sections.method_section import EstimatorsSection, MethodSection
 from simharness.scenario.study_definition import load_study
 from simharness.study.runner import run_study
 from simharness.trial.run_folder import read_run

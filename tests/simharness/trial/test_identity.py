@@ -236,7 +236,7 @@ class TestCode:
             text = path.read_text()
             assert text.count('"""') >= 4
             path.write_text("# A comment.\n" + text.replace('"""', '"""Changed. ', 1))
-        sections = folder / "simharness/scenario/sections/people.py"
+        sections = folder / "simharness/scenario/sections/people_section.py"
         text = sections.read_text()
         assert 'description="' in text
         sections.write_text(text.replace('description="', 'description="changed ', 1))

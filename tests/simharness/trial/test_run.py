@@ -14,11 +14,11 @@ from simharness.outputs.run.result_folder import run
 from simharness.runtime.errors import RunError
 from simharness.scenario.load import fingerprint
 from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.cameras import CamerasSection
-from simharness.scenario.sections.detector import DetectorSection
-from simharness.scenario.sections.method import MethodSection
-from simharness.scenario.sections.people import PeopleSection
-from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.cameras_section import CamerasSection
+from simharness.scenario.sections.detector_section import DetectorSection
+from simharness.scenario.sections.method_section import MethodSection
+from simharness.scenario.sections.people_section import PeopleSection
+from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import RenderingSection, Scenario
 from simharness.scoring.summary import VariantScores
 from simharness.trial import run_trial

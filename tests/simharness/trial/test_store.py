@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from mvpose import Camera, Detections, Estimate, Matching, Rig
-from simharness.scenario.sections.method import MethodSection
+from simharness.scenario.sections.method_section import MethodSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.run_folder import Record, read_run, write_run
 from simharness.types.truth import Truth

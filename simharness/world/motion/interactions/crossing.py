@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.people_section import PeopleSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.activities.route_walking import LOOKAHEAD, walk_route
 from simharness.world.motion.paths import Spot

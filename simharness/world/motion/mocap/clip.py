@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.people import MocapSection
+from simharness.scenario.sections.people_section import MocapSection
 from simharness.world.motion.mocap.asf import read_amc, read_asf
 from simharness.world.motion.mocap.bvh import read_bvh
 from simharness.world.motion.mocap.retarget import SourceMotion, pelvis_path, retarget, source_motion

@@ -16,7 +16,7 @@ from mvpose.arrays import Floats
 from mvpose.files.archives import arrays_of
 from mvpose.files.input_files import read_bytes
 from mvpose.skeleton import COCO17
-from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.people_section import PeopleSection
 from simharness.world.humans.body_size import body_lengths
 
 _TRUNK = (0.15, 0.9)  # metres: least and greatest trunk of children and adults, with much tolerance

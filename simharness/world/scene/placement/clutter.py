@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simharness.scenario.sections.room import ClutterSection, RoomSection
+from simharness.scenario.sections.room_section import ClutterSection, RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.fixtures import draw_partition, draw_pillar
 from simharness.world.scene.objects.furniture import draw_chair, draw_table

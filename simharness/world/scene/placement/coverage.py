@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from mvpose.arrays import Bools, Floats
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.solids import ObjectModel, Solid
 from simharness.world.scene.placement.free_space import FreeSpace, Site

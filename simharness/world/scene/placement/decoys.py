@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.room import DecoysSection
+from simharness.scenario.sections.room_section import DecoysSection
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
 from simharness.types.random_streams import stream

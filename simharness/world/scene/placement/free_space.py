@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.solids import Kind, ObjectModel, Solid
 from simharness.world.scene.placement.sight_lines import PictureFill

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.furnishing import Furnishing
 from simharness.world.scene.objects.geoms import Box

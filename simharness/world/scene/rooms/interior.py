@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mvpose.camera import Rig
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.light_sources import AreaLight
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.court import make_court

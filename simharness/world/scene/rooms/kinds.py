@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects import gym, home, office, park, shop, stage, ward
 from simharness.world.scene.objects.furnishing import Furnishing

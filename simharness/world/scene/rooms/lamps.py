@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.light_sources import AreaLight, Sun, Vector
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import box_mesh, quad_mesh

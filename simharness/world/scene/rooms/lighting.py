@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.light_sources import AreaLight, LightSources, Sun, Vector
 from simharness.types.lighting import Lighting
 from simharness.types.random_streams import stream

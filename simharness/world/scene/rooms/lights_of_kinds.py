@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.light_sources import AreaLight, Vector
 from simharness.world.scene.objects.furnishing import Furnishing
 from simharness.world.scene.objects.geoms import Box

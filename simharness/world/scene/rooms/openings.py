@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.solids import Solid

@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from mvpose.arrays import Bools, Floats
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box

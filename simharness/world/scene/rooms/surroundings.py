@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.light_sources import Vector
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
-from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
-from simharness.scenario.sections.people import PeopleSection
-from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
+from simharness.scenario.sections.people_section import PeopleSection
+from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import RenderingSection, Scenario
 from simharness.trial.stages.build_trial import build_trial
 

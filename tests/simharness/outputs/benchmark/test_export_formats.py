@@ -17,7 +17,7 @@ from mvpose.wholebody import skeleton_by_name
 from simharness.formats.panoptic_poses import body_scene, confidences
 from simharness.outputs.benchmark.cameras import hd_names
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.views import Visibility
 
 HIDDEN = (Visibility.SELF_OCCLUDED, Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)

@@ -7,7 +7,7 @@ from trials import simulated
 from mvpose import COCO17, SHELF14
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
 from simharness.reality.recording_file import read_recording
-from simharness.scenario.sections.cameras import FaultsSection
+from simharness.scenario.sections.cameras_section import FaultsSection
 
 
 @pytest.fixture(scope="module")

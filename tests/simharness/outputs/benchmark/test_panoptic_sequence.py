@@ -20,9 +20,9 @@ from mvpose.skeleton import PANOPTIC19
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
 from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
-from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
-from simharness.scenario.sections.people import PeopleSection
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
+from simharness.scenario.sections.people_section import PeopleSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.trial.provenance import PROVENANCE
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import picture_source_of

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from simharness.outputs.benchmark.render import RenderPlan, render
-from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
-from simharness.scenario.sections.people import PeopleSection
-from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
+from simharness.scenario.sections.people_section import PeopleSection
+from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import Scenario
 
 

@@ -6,7 +6,7 @@ import pytest
 from simharness.reality.detector_fit.calibration import FACTORS, SHARES, calibrate
 from simharness.reality.detector_fit.measure import measure
 from simharness.reality.detector_fit.profile import settings
-from simharness.scenario.sections.detector import KINDS
+from simharness.scenario.sections.detector_section import KINDS
 
 TRUE = {"keypoints.scatter": 0.4, "keypoints.miss": 0.06, "keypoints.jitter": 0.12}
 

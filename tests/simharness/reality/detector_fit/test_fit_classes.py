@@ -8,7 +8,7 @@ from simharness.detector.bias import pixel_offsets
 from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
 from simharness.detector.error_classes import MIRROR, classify, opposite_hits
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.truth import KeypointError
 
 GOOD, JITTER, MISS, INVERSION, SWAP, ABSENT = KeypointError

@@ -14,7 +14,7 @@ from simharness.reality.detector_fit.frame_sums import frame_sums
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.measure import MeasuredValue, agreement, measure, point_estimates
 from simharness.reality.detector_fit.profile import as_toml, settings
-from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, DetectorSection
+from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
 
 LIMB_KINDS = KINDS[3:]
 EARS = [0.3, 0.1, 0.05, 0.05, 0.05, 0.08, 0.1, 0.6, 0.95, 0.97, 0.97, 0.8]

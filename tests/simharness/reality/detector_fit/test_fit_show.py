@@ -11,7 +11,7 @@ from simharness.reality.annotation import AnnotationFit, AnnotationModel
 from simharness.reality.detector_fit.measure import MeasuredValue, measure
 from simharness.reality.detector_fit.plot import plot_comparison
 from simharness.reality.detector_fit.table import print_agreement, print_annotation, print_measurement
-from simharness.scenario.sections.detector import KINDS
+from simharness.scenario.sections.detector_section import KINDS
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from mvpose.estimate import Matching
 from mvpose.matching import Matcher
 from mvpose.reconstruction import PictorialStructure, Triangulation
 from simharness.scenario.load import load
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scoring.catalogue import SCORES
 from simharness.scoring.failures.failure_classes import FailureKind, find_failures
 from simharness.scoring.failures.stage_blame import FAILURE_SCHEMA, Stage, blame, failure_scores, failure_table

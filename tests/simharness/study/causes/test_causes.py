@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simharness.scenario.load import load
-from simharness.scenario.sections.detector import DetectorSection
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.statistics.intervals import Interval
 from simharness.study.causes.blame_text import conclusion, heading, points
 from simharness.study.causes.cause_catalogue import CAUSES, causes_by_name, present_causes

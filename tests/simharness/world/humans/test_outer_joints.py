@@ -5,7 +5,7 @@ import pytest
 
 from mvpose.wholebody import SKELETONS, skeleton_by_name
 from simharness.world.humans.body import make_body
-from simharness.world.humans.outer_joints import OuterJoints
+from simharness.world.humans.outer_landmarks import OuterJoints
 from simharness.world.humans.shape import Shape
 
 SHAPES = {"man": Shape(gender=0.0, weight=0.7), "woman": Shape(gender=1.0, weight=1.1), "child": Shape(age=0.3)}

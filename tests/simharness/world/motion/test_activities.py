@@ -6,7 +6,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from simharness.scenario.sections.people import ActivityName
+from simharness.scenario.sections.people_section import ActivityName
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape

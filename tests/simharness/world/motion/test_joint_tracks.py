@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mvpose.skeleton import COCO17
-from simharness.scenario.sections.people import MocapSection, PeopleSection
+from simharness.scenario.sections.people_section import MocapSection, PeopleSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.mocap.joint_tracks import load_tracks, read_joint_tracks, tracks_file
 

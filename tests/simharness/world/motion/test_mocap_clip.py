@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from simharness.scenario.sections.people import MocapSection
+from simharness.scenario.sections.people_section import MocapSection
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape

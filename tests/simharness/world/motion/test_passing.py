@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from casting import performer
 
-from simharness.scenario.sections.people import PeopleSection
+from simharness.scenario.sections.people_section import PeopleSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.choreography import assign_activities
 from simharness.world.motion.contact import penetration

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simharness.scenario.sections.people import TrafficSection
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.people_section import TrafficSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body

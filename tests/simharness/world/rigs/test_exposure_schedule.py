@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.world.rigs.exposure_schedule import ExposureSchedule, moved
 from simharness.world.rigs.layouts import build_rig
 

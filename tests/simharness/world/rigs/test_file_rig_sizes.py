@@ -10,7 +10,7 @@ from simharness.cli import app
 from simharness.scenario.load import load
 from simharness.trial.identity import trial_identity
 from simharness.world.rigs.layouts import build_rig
-from simharness.world.rigs.presets import preset_rig
+from simharness.world.rigs.published_rigs import preset_rig
 
 RIG = preset_rig("shelf")  # 1032 x 776
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simharness.scenario.sections.cameras import CamerasSection, FaultsSection
+from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
 from simharness.world.rigs.faults import camera_phases, schedule_exposures
 from simharness.world.rigs.layouts import build_rig
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.world.rigs.layouts import build_rig, intrinsics, look_at
 
 POINT = st.tuples(st.floats(-4, 4), st.floats(-4, 4), st.floats(0, 3))

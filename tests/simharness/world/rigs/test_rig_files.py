@@ -6,7 +6,7 @@ from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, vo
 from mvpose.formats.calibration.file_storage import write_storage
 from mvpose.formats.calibration.registry import read_calibration
 from simharness.scenario.load import load
-from simharness.scenario.sections.cameras import CamerasSection
+from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.world.rigs.layouts import aligned, build_rig, look_at
 
 RIG = build_rig(CamerasSection(count=3, size=(640, 480), distortion=(-0.1, 0.01, 0.001, 0.002, 0.0)))

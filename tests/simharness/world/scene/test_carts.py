@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from walkers import space
 
-from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.room_section import ClutterSection
 from simharness.world.scene.placement.clutter import place_clutter
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, LIMB
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from walkers import Rays, ring, space
 
-from simharness.scenario.sections.room import ClutterSection, RoomSection
+from simharness.scenario.sections.room_section import ClutterSection, RoomSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.rigs.layouts import build_rig

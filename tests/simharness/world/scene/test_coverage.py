@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from walkers import Rays, ring, space
 
-from simharness.scenario.sections.room import ClutterSection
+from simharness.scenario.sections.room_section import ClutterSection
 from simharness.world.scene.placement.clutter import place_clutter
 from simharness.world.scene.placement.coverage import share_hidden
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from walkers import Rays, ring, space
 
-from simharness.scenario.sections.room import ClutterSection, DecoysSection, RoomSection
+from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.placement.clutter import place_clutter
 from simharness.world.scene.placement.decoys import (

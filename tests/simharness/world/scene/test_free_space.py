@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from simharness.scenario.sections.cameras import CamerasSection
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.cameras_section import CamerasSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.placement.free_space import FreeSpace
 

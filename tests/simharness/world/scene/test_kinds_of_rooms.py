@@ -6,9 +6,9 @@ import pytest
 from walkers import Rays, ring, space
 
 from simharness.scenario.load import load
-from simharness.scenario.sections.cameras import CamerasSection
-from simharness.scenario.sections.people import PeopleSection
-from simharness.scenario.sections.room import ClutterSection, RoomSection
+from simharness.scenario.sections.cameras_section import CamerasSection
+from simharness.scenario.sections.people_section import PeopleSection
+from simharness.scenario.sections.room_section import ClutterSection, RoomSection
 from simharness.scenario.sections.scenario import RenderingSection, Scenario
 from simharness.trial.audit import audit
 from simharness.trial.stages.build_trial import build_trial

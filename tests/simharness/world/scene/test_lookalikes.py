@@ -15,7 +15,7 @@ from simharness.capture.film import PictureObserver, film
 from simharness.capture.picture import meshes_at
 from simharness.capture.ray_visibility import RayObserver
 from simharness.capture.rendering.renderer import make_renderer
-from simharness.scenario.sections.cameras import FaultsSection
+from simharness.scenario.sections.cameras_section import FaultsSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.mirror import Mirror
 from simharness.types.views import Views

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simharness.scenario.sections.cameras import CamerasSection
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.cameras_section import CamerasSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.rooms.landscape import WHITE, draw_panorama
 from simharness.world.scene.rooms.lighting import room_lighting

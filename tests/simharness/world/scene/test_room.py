@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from walkers import Rays
 
-from simharness.scenario.sections.cameras import CamerasSection
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.cameras_section import CamerasSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.lighting import Lighting
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.rooms.lamps import MOODS, has_ceiling, make_ceiling, shown_lights

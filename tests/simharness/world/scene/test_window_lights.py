@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.world.scene.rooms.lights_of_kinds import lights_of
 from simharness.world.scene.rooms.openings import draw_openings
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simharness.capture.rendering.raster import RasterRenderer
-from simharness.scenario.sections.room import RoomSection
+from simharness.scenario.sections.room_section import RoomSection
 from simharness.world.rigs.layouts import intrinsics, look_at
 from simharness.world.scene.rooms.court import make_court
 from simharness.world.scene.rooms.kinds import ROOM_KINDS, settled

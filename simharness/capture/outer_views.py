@@ -21,9 +21,9 @@ from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import RayCaster
 from simharness.capture.ray_visibility import cast_bands
 from simharness.capture.shutter import joints_at_exposure
+from simharness.types.outer_joints import OuterViews
 from simharness.types.views import Visibility
-from simharness.types.whole_body import OuterViews
-from simharness.world.humans.outer_joints import OuterJoints
+from simharness.world.humans.outer_landmarks import OuterJoints
 
 if TYPE_CHECKING:
     from simharness.world.rigs.exposure_schedule import ExposureSchedule

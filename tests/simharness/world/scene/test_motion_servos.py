@@ -17,7 +17,7 @@ from simharness.world.motion.paths import make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.trajectory import RATE, Trajectory, motion_clock
 from simharness.world.scene.dynamics.inverse_dynamics import InverseDynamics
-from simharness.world.scene.dynamics.tracking import LEVER, MotionServos, Push, track
+from simharness.world.scene.dynamics.motion_servos import LEVER, MotionServos, Push, track
 from simharness.world.scene.objects.assembly import Assembly
 
 GRAVITY = 9.81

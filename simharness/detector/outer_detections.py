@@ -32,9 +32,9 @@ from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.scatter import Scatter
 from simharness.detector.steps import Context
 from simharness.detector.view_geometry import image_axes
-from simharness.scenario.sections.detector import BiasSection
+from simharness.scenario.sections.detector_section import BiasSection
+from simharness.types.outer_joints import OuterTruth
 from simharness.types.truth import KeypointError
-from simharness.types.whole_body import OuterTruth
 
 _OF_PEOPLE = (Origin.PERSON, Origin.DUPLICATE, Origin.LOWER_HALF)
 _DISPLACED = (KeypointError.JITTER, KeypointError.MISS)

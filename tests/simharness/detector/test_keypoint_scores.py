@@ -5,9 +5,9 @@ from worlds import within, world
 from mvpose import COCO17
 from simharness.detector.conditions import Conditions
 from simharness.detector.draws import KeyedDraws
+from simharness.detector.keypoint_scores import MIN_SCORE, score_keypoints
 from simharness.detector.keypoints import find_keypoints
-from simharness.detector.scores import MIN_SCORE, score_keypoints
-from simharness.scenario.sections.detector import KINDS, CorrelationSection, KeypointsSection, ScoresSection
+from simharness.scenario.sections.detector_section import KINDS, CorrelationSection, KeypointsSection, ScoresSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import Visibility
 

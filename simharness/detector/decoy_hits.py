@@ -17,7 +17,7 @@ from simharness.detector.draws import KeyedDraws
 from simharness.detector.false_positives import MIN_JOINTS, bounding_box, false_positive_block, keypoint_scores
 from simharness.detector.phantom_poses import NORMALS, postures, project_upright
 from simharness.detector.steps import Context, StepStage, step
-from simharness.scenario.sections.detector import DecoyHitsSection
+from simharness.scenario.sections.detector_section import DecoyHitsSection
 from simharness.types.views import Views
 
 _SCATTER = 0.2  # deviation of keypoints at the decoy's true joints, in units of OKS sigma x sqrt(area)

@@ -16,7 +16,7 @@ from simharness.detector.conditions import OUTSIDE, VISIBLE, Conditions
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import KeyedDraws, logistic
 from simharness.detector.steps import Context, StepStage, step
-from simharness.scenario.sections.detector import CorrelationSection, ScoresSection
+from simharness.scenario.sections.detector_section import CorrelationSection, ScoresSection
 from simharness.types.truth import KeypointError
 
 MIN_SCORE = 0.02
