@@ -1,6 +1,7 @@
 """Make the joints of hands and feet from the vertices of the body: ``python -m tools.body.hands_and_feet``.
 
-Writes ``data/hands_and_feet.npz``, which :mod:`simharness.world.humans.outer_landmarks` reads; needs the extra ``bake``.
+Writes ``data/hands_and_feet.npz``, which :mod:`simharness.world.humans.outer_landmarks` reads; needs the extra
+``bake``.
 Like the joints of COCO17, each joint is a weighted mean of vertices of the skin:
 
 - toes and heels: anny's regressor of keypoints, as for COCO17;

@@ -11,7 +11,8 @@ How to add an activity:
        @activity("hand_over", performers=2, clearance=0.5)
        def hand_over(performers, spot, time, *, rng, pace) -> Performance: ...
 
-2. Add the name to ``ActivityName`` in ``simharness/scenario/sections/people_section.py``, the names that scenario files accept.
+2. Add the name to ``ActivityName`` in ``simharness/scenario/sections/people_section.py``, the names that scenario files
+   accept.
 
 Nothing else lists activities: :func:`activities` imports every module of the two folders. The tests in
 ``tests/simharness/world/motion`` (``test_activities.py``, ``test_interactions.py``) run on every registered activity:
