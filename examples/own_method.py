@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 import simharness
-from mvpose import Detections, Estimate, Pipeline, Rig
+from mvpose import Detections, Estimate, Rig, preset
 
 
 class TwoViews:
@@ -45,7 +45,7 @@ def main() -> None:
     """Print the scores of both methods."""
     scenario = simharness.load_scenario("quickstart", overrides=["duration=1.0", 'rendering.renderer="rays"'])
     recording = simharness.simulate(scenario)
-    for name, method in {"two views": TwoViews(), "full": Pipeline.preset("full")}.items():
+    for name, method in {"two views": TwoViews(), "full": preset("full")}.items():
         estimates = [method.estimate(recording.rig, detections) for detections in recording.detections]
         scores = simharness.score(recording, estimates).scores
         print(f"{name:>9}: PCP {scores['pcp']:5.1f} %, recall {scores['recall']:5.1f} %, {scores['ghosts']:.2f} ghosts")

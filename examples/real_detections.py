@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import simharness
-from mvpose import Pipeline
+from mvpose import preset
 from mvpose.formats.calibration.voxelpose import read_calibration, write_calibration
 from mvpose.formats.openpose import people_file, read_frame
 
@@ -21,7 +21,7 @@ def people_of(folder: Path, *, size: tuple[int, int], frames: int) -> None:
     """Print how many people are in the first frames of a folder."""
     rig = read_calibration(folder / "calibration_shelf.json", size=size)
     views = [sorted((folder / "openpose" / camera.name).glob("*.json")) for camera in rig]
-    pipeline = Pipeline.preset("full")
+    pipeline = preset("full")
     for frame, files in enumerate(zip(*views, strict=True)):
         if frame == frames:
             break

@@ -1,14 +1,14 @@
 """Simulate a scenario, estimate its people with a preset, and score the estimates."""
 
 import simharness
-from mvpose import Pipeline
+from mvpose import preset
 
 
 def main() -> None:
     """Print the scores of one preset."""
     scenario = simharness.load_scenario("quickstart", overrides=["duration=1.0", 'rendering.renderer="rays"'])
     recording = simharness.simulate(scenario)  # detections and truth of each frame, and the cameras
-    pipeline = Pipeline.preset("full")
+    pipeline = preset("full")
     estimates = [pipeline.estimate(recording.rig, detections) for detections in recording.detections]
     scores = simharness.score(recording, estimates).scores
     print(f"{len(recording)} frames of {recording.people} people before {len(recording.rig)} cameras")

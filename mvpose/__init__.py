@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from mvpose.detections import Detections
     from mvpose.estimate import Estimate, Matching
     from mvpose.pipeline import Pipeline
+    from mvpose.presets import preset
     from mvpose.skeleton import COCO17, PANOPTIC19, SHELF14, Skeleton
 
 _MODULES = {
@@ -23,6 +24,7 @@ _MODULES = {
     "Pipeline": "mvpose.pipeline",
     "Rig": "mvpose.camera",
     "Skeleton": "mvpose.skeleton",
+    "preset": "mvpose.presets",
 }
 
 __all__ = [
@@ -36,6 +38,7 @@ __all__ = [
     "Pipeline",
     "Rig",
     "Skeleton",
+    "preset",
 ]
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.affinity import Affinity, AppearanceAffinity, FusedAffinity
+from mvpose.affinity import Affinity, FusedAffinity
 from mvpose.camera import Rig
 from mvpose.checks import seal
 from mvpose.detections import Detections
@@ -21,31 +20,6 @@ from mvpose.ordering import number_views, restored_pairs
 from mvpose.rays import Rays, ordered_rays
 from mvpose.reconstruction import PictorialStructure, Poses, UnmatchedPictorialStructure
 from mvpose.skeleton import Skeleton
-
-
-class Estimator(Protocol):
-    """Object that estimates the people of a frame."""
-
-    def estimate(self, rig: Rig, detections: Detections) -> Estimate:
-        """Estimate the people of one frame; see :meth:`Pipeline.estimate`."""
-        ...
-
-
-@runtime_checkable
-class SequenceEstimator(Estimator, Protocol):
-    """Estimator with memory: the estimate of a frame depends on other frames of the recording.
-
-    Its ``estimate`` treats a frame alone.
-    """
-
-    def track(self, rig: Rig, frames: Iterable[Detections]) -> Iterator[Estimate]:
-        """Yield the estimate of every frame of a recording, in order; every call starts without a past.
-
-        Args:
-            rig: calibrated cameras.
-            frames: detections of each frame, in the order of time.
-        """
-        ...
 
 
 @dataclass(frozen=True)
@@ -68,34 +42,6 @@ class Pipeline:
     matching: Callable[[NDArray[np.float64], NDArray[np.int64]], Matching] = Matcher()
     reconstruction: Callable[[Rays, NDArray[np.int64], Skeleton], Poses] = PictorialStructure()
     duplicates: Callable[[Detections], NDArray[np.bool_]] = Duplicates()
-
-    @staticmethod
-    def preset(
-        name: str,
-        *,
-        appearance: AppearanceAffinity | None = None,
-        lag: float | None = None,
-        period: float | None = None,
-    ) -> Estimator:
-        """Return one of the presets in ``mvpose.presets.PRESETS``: the rows of the paper's ablation, a fast one,
-        and trackers.
-
-        Args:
-            name: name of the preset; with "+repair" behind it, the rig and the clocks are repaired first
-                (:class:`mvpose.calibration.repaired_pipeline.RepairedPipeline`).
-            appearance: scale of descriptor distances; for a re-ID network it is ``ReId.affinity``. The default is a
-                general scale.
-            lag: seconds of later frames that an estimate of a tracker waits for; by default that of
-                :class:`mvpose.tracking.TrackingPipeline`.
-            period: time between frames whose detections carry no time, seconds, for trackers; by default that of
-                :class:`mvpose.tracking.TrackingModel`.
-
-        Raises:
-            ValueError: an unknown name, a negative lag, or a period that is not positive.
-        """
-        from mvpose.presets import preset  # it imports this module
-
-        return preset(name, appearance=appearance, lag=lag, period=period)
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Estimate the people of one frame.

@@ -1,12 +1,13 @@
-"""Presets: the variants of the method by name; :meth:`mvpose.Pipeline.preset` makes them."""
+"""Presets: the variants of the method by name; :func:`preset` makes them."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from mvpose.affinity import AppearanceAffinity, FusedAffinity, GeometricAffinity
+from mvpose.estimators import Estimator
 from mvpose.matching import Matcher
-from mvpose.pipeline import Estimator, Pipeline, UnmatchedPipeline
+from mvpose.pipeline import Pipeline, UnmatchedPipeline
 from mvpose.reconstruction import Triangulation
 from mvpose.tracking.tracking_model import TrackingModel
 from mvpose.tracking.tracking_pipeline import TrackingPipeline
@@ -30,7 +31,7 @@ READ_HEATMAPS = frozenset({"full", "appearance", "geometry", "hungarian", "track
 """Presets that use heat maps where detections carry them; the others use keypoints only."""
 
 TRACKING = frozenset({"track", "track-fast"})
-"""Presets that are a :class:`mvpose.pipeline.SequenceEstimator`: frames come in order."""
+"""Presets that are a :class:`mvpose.estimators.SequenceEstimator`: frames come in order."""
 
 REPAIR = "+repair"
 """Suffix of a preset with which the rig and the clocks of the whole recording are repaired first."""
@@ -44,7 +45,21 @@ def without_repair(name: str) -> str:
 def preset(
     name: str, *, appearance: AppearanceAffinity | None = None, lag: float | None = None, period: float | None = None
 ) -> Estimator:
-    """Return one of ``PRESETS``; see :meth:`mvpose.Pipeline.preset`."""
+    """Return one of ``PRESETS``: the rows of the paper's ablation, a fast one, and trackers.
+
+    Args:
+        name: name of the preset; with "+repair" behind it, the rig and the clocks are repaired first
+            (:class:`mvpose.calibration.repaired_pipeline.RepairedPipeline`).
+        appearance: scale of descriptor distances; for a re-ID network it is ``ReId.affinity``. The default is a
+            general scale.
+        lag: seconds of later frames that an estimate of a tracker waits for; by default that of
+            :class:`mvpose.tracking.TrackingPipeline`.
+        period: time between frames whose detections carry no time, seconds, for trackers; by default that of
+            :class:`mvpose.tracking.TrackingModel`.
+
+    Raises:
+        ValueError: an unknown name, a negative lag, or a period that is not positive.
+    """
     if name.endswith(REPAIR):
         from mvpose.calibration.repaired_pipeline import RepairedPipeline  # only where it is used
 

@@ -158,7 +158,7 @@ def _ids(k: int, frame: Estimate, untracked: bool) -> Integers:
     if frame.ids is None:
         if len(frame) and not untracked:
             raise ValueError(
-                f"the people of frame {k} have no ids; estimate with a tracker (Pipeline.preset('track').track), or "
+                f"the people of frame {k} have no ids; estimate with a tracker (mvpose.preset('track').track), or "
                 "pass untracked=True to number the people of each frame"
             )
         return np.arange(len(frame))

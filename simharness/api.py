@@ -6,11 +6,11 @@ suite.
 ::
 
     import simharness
-    from mvpose import Pipeline
+    from mvpose import preset
 
     scenario = simharness.load_scenario("quickstart", overrides=["people.count=6", 'rendering.renderer="rays"'])
     recording = simharness.simulate(scenario)
-    pipeline = Pipeline.preset("fast")
+    pipeline = preset("fast")
     estimates = [pipeline.estimate(recording.rig, detections) for detections in recording.detections]
     simharness.score(recording, estimates).scores["pcp"]
     simharness.blame(scenario, seeds=5).shares[0].cause

@@ -77,7 +77,7 @@ def test_the_table_names_every_module(package):
     assert not gone
 
 
-@pytest.mark.parametrize("package", [pytest.param("mvpose", marks=pytest.mark.xfail(strict=True)), "simharness"])
+@pytest.mark.parametrize("package", FLOORS)
 def test_imports_go_down(package):
     upward = [
         f"{file.relative_to(ROOT)}:{line} imports {name}"

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mvpose import Detections, Estimate, Pipeline, Rig
+from mvpose import Detections, Estimate, Rig, preset
 from mvpose.arrays import Floats
-from mvpose.pipeline import Estimator, SequenceEstimator
+from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.scoring.pcp import percent, score_parts
 
@@ -28,7 +28,7 @@ def pcp(
         every: every how many frames are estimated, by a variant without memory.
         period: time between frames without times, seconds.
     """
-    estimator: Estimator = Pipeline.preset(variant, period=period)
+    estimator: Estimator = preset(variant, period=period)
     if isinstance(estimator, SequenceEstimator):
         every, estimates = 1, list(estimator.track(rig, frames))
     else:

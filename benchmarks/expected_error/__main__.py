@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 import simharness
-from mvpose import COCO17, SHELF14, Detections, Estimate, Pipeline, Rig
+from mvpose import COCO17, SHELF14, Detections, Estimate, Rig, preset
 from mvpose.arrays import Floats
-from mvpose.pipeline import Estimator, SequenceEstimator
+from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.report.expected_error import expected_median
 from simharness.reality.recording_file import read_recording
 from simharness.scoring.pairing import pair
@@ -110,7 +110,7 @@ def main() -> None:
     parser.add_argument("--shelf", type=Path, help="folder with Shelf, which is compared as well")
     parser.add_argument("--preset", default="track", help="variant of the method")
     options = parser.parse_args()
-    pipeline = Pipeline.preset(options.preset)
+    pipeline = preset(options.preset)
     print("| rig | real, mm | expected, mm | expected / real |\n|:--|--:|--:|--:|")
     rows: Iterable[tuple[str, float, float]] = on_simulated_rigs(pipeline)
     if options.shelf:

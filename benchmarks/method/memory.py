@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
+import mvpose
 from benchmarks.method.processes import peak_memory, report
 from benchmarks.method.report import against, caption, figure, table
 from benchmarks.method.scenes import frames
-from mvpose.pipeline import Pipeline
 
 PRESETS = ("fast", "full")
 SIZE = (31, 10)
@@ -50,7 +50,7 @@ def measure(*, quick: bool = False) -> list[Peak]:
 def in_process(preset: str, views: int, people: int) -> None:
     """Run some frames and print the peak memory as JSON, for a child process of :func:`measure`."""
     imports = peak_memory()
-    pipeline = Pipeline.preset(preset)
+    pipeline = mvpose.preset(preset)
     for scene in frames(views, people, 5):
         pipeline.estimate(scene.rig, scene.detections)
     print(json.dumps({"imports": imports, "total": peak_memory()}))

@@ -7,10 +7,10 @@ import tempfile
 import time
 from dataclasses import dataclass
 
+import mvpose
 from benchmarks.method.processes import report
 from benchmarks.method.report import against, caption, figure, table
 from benchmarks.method.scenes import HARD, frames
-from mvpose.pipeline import Pipeline
 
 PRESETS = ("fast", "full")
 IMPORTS = ("import numpy", "import numba", "import mvpose", "from mvpose import Pipeline")
@@ -56,7 +56,7 @@ def in_process(preset: str) -> None:
     """
     scenes = frames(5, 4, 5, conditions=HARD)
     begin = time.perf_counter()
-    pipeline = Pipeline.preset(preset)
+    pipeline = mvpose.preset(preset)
     for scene in scenes:
         pipeline.estimate(scene.rig, scene.detections)
     print(time.perf_counter() - begin)

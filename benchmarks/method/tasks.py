@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+import mvpose
 from benchmarks.method.scenes import Scene
 from mvpose.estimate import Estimate, Matching
 from mvpose.matching import Method, match
@@ -50,7 +51,7 @@ class Task:
 
 def estimating(preset: str) -> Task:
     """Create the task of a whole preset; it records the milliseconds of its stages."""
-    pipeline = Pipeline.preset(preset)
+    pipeline = mvpose.preset(preset)
 
     def note(case: Case, estimate: Estimate) -> Mapping[str, float]:
         return {stage: 1e3 * estimate.timings[stage] for stage in STAGES}

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import spearmanr
 
-from mvpose import Pipeline, Rig
+from mvpose import Rig, preset
 from mvpose.arrays import Floats
 from simharness import simulate
 from simharness.planning import FastLayer, Prediction, Volume
@@ -112,7 +112,7 @@ class Outcome:
 
 def simulated(scenario: Scenario) -> Outcome:
     """Simulate a scenario and score ``full`` on it."""
-    recording, pipeline = simulate(scenario), Pipeline.preset("full")
+    recording, pipeline = simulate(scenario), preset("full")
     parts, positions, errors = [], [], []
     for detections, truth in zip(recording.detections, recording.truth, strict=True):
         estimate = pipeline.estimate(recording.rig, detections)

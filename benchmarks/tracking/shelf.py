@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.method.report import MET, MISSED, caption, table
 from benchmarks.tracking.losses import LOSSES, Loss
 from benchmarks.tracking.trajectories import link, second_differences, short_ghosts
-from mvpose import Estimate, Pipeline
+from mvpose import Estimate, Pipeline, preset
 from mvpose.tracking import Tracker, track
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.evaluation import score_estimates
@@ -141,7 +141,7 @@ def _at(loss: Loss, recording: AnnotatedRecording, draws: int) -> Iterator[Figur
 
 
 def _pipeline(name: str) -> Pipeline:
-    pipeline = Pipeline.preset(name)
+    pipeline = preset(name)
     assert isinstance(pipeline, Pipeline)
     return pipeline
 

@@ -12,6 +12,7 @@ from mvpose.arrays import Floats, Integers
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.pipeline import Pipeline
+from mvpose.presets import preset
 
 _PACE = 0.6  # m/s, mean speed of people who stroll
 
@@ -43,7 +44,7 @@ class Visit:
 
 def fast() -> Pipeline:
     """Return the stages of the preset ``fast``."""
-    pipeline = Pipeline.preset("fast")
+    pipeline = preset("fast")
     assert isinstance(pipeline, Pipeline)
     return pipeline
 

@@ -15,7 +15,7 @@ import numpy as np
 import threadpoolctl
 
 from benchmarks.method.scenes import LIVE, ring, stick_people
-from mvpose import COCO17, Detections, Estimate, Pipeline, Rig
+from mvpose import COCO17, Detections, Estimate, Rig, preset
 from mvpose.arrays import Floats
 from mvpose.skeleton import Skeleton
 from mvpose.wholebody import body_part, complete, skeleton_by_name, with_body_boxes
@@ -67,7 +67,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=20)
     parser.add_argument("--rounds", type=int, default=20)
     options = parser.parse_args()
-    rig, pipeline = ring(options.views, options.people), Pipeline.preset("fast")
+    rig, pipeline = ring(options.views, options.people), preset("fast")
     print("| skeleton | joints beyond the body | median, ms | 95 %, ms |\n|:--|--:|--:|--:|")
     with threadpoolctl.threadpool_limits(1):
         for name in ("halpe26", "body25", "wholebody133", "openpose137"):

@@ -14,12 +14,12 @@ from mvpose.calibration.resampling import resampled
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.estimate import Estimate
-from mvpose.pipeline import Estimator, SequenceEstimator
+from mvpose.estimators import Estimator, SequenceEstimator
 
 
 @dataclass(frozen=True)
 class RepairedPipeline:
-    """Estimator of recordings (:class:`mvpose.pipeline.SequenceEstimator`) that repairs the rig first.
+    """Estimator of recordings (:class:`mvpose.estimators.SequenceEstimator`) that repairs the rig first.
 
     All frames are read before the first estimate. The repaired rig is used where the repair is not refused; its size is
     that of the believed calibration and of bone lengths together. Clocks are corrected where one is an alarm: an
@@ -39,7 +39,7 @@ class RepairedPipeline:
         return self.estimator.estimate(rig, detections)
 
     def track(self, rig: Rig, frames: Iterable[Detections]) -> Iterator[Estimate]:
-        """Repair the rig and the clocks, then yield the estimates (:meth:`mvpose.pipeline.SequenceEstimator.track`)."""
+        """Repair the rig and the clocks, then yield the estimates (:class:`mvpose.estimators.SequenceEstimator`)."""
         given = list(frames)
         if not given:
             return

@@ -8,8 +8,8 @@ from mvpose.cli.agreement import agreement, check
 from mvpose.cli.exit_codes import failing, note
 from mvpose.cli.inputs import Inputs
 from mvpose.cli.progress import bar
-from mvpose.pipeline import Estimator, Pipeline, SequenceEstimator
-from mvpose.presets import NEED_DESCRIPTORS, PRESETS
+from mvpose.estimators import Estimator, SequenceEstimator
+from mvpose.presets import NEED_DESCRIPTORS, PRESETS, preset
 from mvpose.recording import People
 from mvpose.skeleton import COCO17
 from mvpose.wholebody import body_of, body_part, whole_body
@@ -37,7 +37,7 @@ def estimator(method: str, *, lag: float, period: float) -> Estimator:
         raise ValueError(f"--method {method}: no such method; expected one of {', '.join(known)}")
     if not lag >= 0.0 or math.isnan(lag):
         raise ValueError(f"--lag must be 0 s or more, or inf, got {lag}")
-    return Pipeline.preset(method, lag=lag, period=period)
+    return preset(method, lag=lag, period=period)
 
 
 def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -> People:

@@ -16,7 +16,7 @@ from mvpose.tracking.tracking_model import TrackingModel
 
 @dataclass(frozen=True)
 class TrackingPipeline:
-    """Tracker of recordings (:class:`mvpose.pipeline.SequenceEstimator`), which keeps no state between them.
+    """Tracker of recordings (:class:`mvpose.estimators.SequenceEstimator`), which keeps no state between them.
 
     Attributes:
         pipeline: stages of one frame.

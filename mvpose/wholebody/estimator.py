@@ -15,7 +15,7 @@ from mvpose.camera import Rig
 from mvpose.checks import seal
 from mvpose.detections import Detections
 from mvpose.estimate import Estimate
-from mvpose.pipeline import Estimator, SequenceEstimator
+from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Triangulation
 from mvpose.skeleton import COCO17, Skeleton
@@ -55,7 +55,7 @@ class WholeBody:
 
 @dataclass(frozen=True)
 class WholeBodyTracking(WholeBody):
-    """As :class:`WholeBody`, of a tracker (:class:`mvpose.pipeline.SequenceEstimator`)."""
+    """As :class:`WholeBody`, of a tracker (:class:`mvpose.estimators.SequenceEstimator`)."""
 
     estimator: SequenceEstimator
 

@@ -16,7 +16,7 @@ from simharness.cli.options import JsonFile, Overrides, RecordingFile, Recording
 from simharness.cli.recording_group import recording_group
 
 if TYPE_CHECKING:
-    from mvpose.pipeline import Estimator
+    from mvpose.estimators import Estimator
 
 
 class HeadMapping(enum.StrEnum):
@@ -185,11 +185,11 @@ def evaluate_seeds(
 
 def _estimator(name: str, *, lag: float, period: float) -> Estimator:
     """Return a preset, or a user-defined estimator given as FILE.py:NAME."""
-    from mvpose import Pipeline
+    from mvpose import preset
     from simharness.trial.stages.estimators import user_estimator
 
     if ":" not in name:
-        return Pipeline.preset(name, lag=lag, period=period)
+        return preset(name, lag=lag, period=period)
     return user_estimator("--method", name)
 
 

@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mvpose.pipeline import SequenceEstimator
+from mvpose.estimators import SequenceEstimator
 from simharness.gate.reference_kernel import reference_work
 from simharness.trial.stages.estimation import EstimateFrames
 
 if TYPE_CHECKING:
     from mvpose import Detections, Rig
     from mvpose.arrays import Floats
-    from mvpose.pipeline import Estimator
+    from mvpose.estimators import Estimator
     from simharness.trial.stages.detected_sequence import DetectedSequence
 
 REPETITIONS = 3

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose import COCO17, Detections, Pipeline, Rig
+from mvpose import COCO17, Detections, Rig, preset
 from mvpose.arrays import Floats
 from mvpose.rays import Rays
 from mvpose.reconstruction import Triangulation
@@ -94,7 +94,7 @@ def _rays(terms: Sequence[CameraTerms], chosen: slice, many: int) -> Rays:
 
 def _by_variant(rig: Rig, terms: Sequence[CameraTerms], scenes: StandingScenes, variant: str) -> Reconstruction:
     """Return the estimates of a variant of the method."""
-    pipeline = Pipeline.preset(variant)
+    pipeline = preset(variant)
     shape = (len(scenes), scenes.people)
     close, paired = np.full((*shape, 17, 3), np.nan), np.full((*shape, 17, 3), np.nan)
     mixed = np.zeros(shape)

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose import Pipeline, Rig
+from mvpose import Rig, preset
 from mvpose.arrays import Bools, Floats, Integers
-from mvpose.pipeline import Estimator
+from mvpose.estimators import Estimator
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.detect import Detected, detect
 from simharness.planning.rehearsal_scene import SceneSettings, build_scene, has_objects, scenario_of, spread_over_volume
@@ -176,7 +176,7 @@ def _take(
     scenario = scenario_of(settings, frame, 0)
     sequence = simulate(scene)
     truth = coco17_to_shelf14(sequence.joints, head=settings.head.mapping)
-    pipeline, rule = Pipeline.preset(settings.variant), RULES.index(settings.head)
+    pipeline, rule = preset(settings.variant), RULES.index(settings.head)
     scored: dict[Condition, _Scored] = {}
     for clock in dict.fromkeys(_clock_fault(each) for each in conditions):
         exposures = schedule_exposures(rig, clock, scene.time, seed=seed)

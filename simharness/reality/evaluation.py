@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mvpose import Detections, Estimate, Matching
-from mvpose.pipeline import Estimator, SequenceEstimator
+from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.scoring.frame import score_frame

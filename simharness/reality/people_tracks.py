@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import linear_sum_assignment
 
-from mvpose import COCO17, SHELF14, Pipeline
+from mvpose import COCO17, SHELF14, preset
 from mvpose.arrays import Bools, Floats
 from simharness.detector.bias import body_axes
 from simharness.reality.annotated_recording import AnnotatedRecording
@@ -69,7 +69,7 @@ def track_people(recording: AnnotatedRecording) -> TrackedPeople:
     Raises:
         ValueError: nobody is found in any frame.
     """
-    method = Pipeline.preset("full")
+    method = preset("full")
     people = [
         _complete_enough(method.estimate(recording.rig, found).joints, recording.truth[frame])
         for frame, found in enumerate(recording.detections)

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mvpose import Pipeline
+from mvpose import preset
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.evaluation import evaluate
@@ -103,7 +103,7 @@ def compare(
     """
     if not twins:
         raise ValueError(f"{recorded.name}: expected one or more twins to compare with, got none")
-    estimators = {name: Pipeline.preset(name) for name in variants}
+    estimators = {name: preset(name) for name in variants}
     scores: list[Mapping[str, VariantScores]] = []
     with (reporter or Silence()).stage("evaluate", 1 + len(twins)) as advance:
         for each in (recorded, *twins):

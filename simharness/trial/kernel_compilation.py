@@ -20,9 +20,9 @@ import numpy as np
 from numba.core.errors import NumbaError
 from numba.core.sigutils import normalize_signature
 
-from mvpose import COCO17, Camera, Detections, Pipeline, Rig
+from mvpose import COCO17, Camera, Detections, Pipeline, Rig, preset
 from mvpose.estimate import Matching
-from mvpose.pipeline import SequenceEstimator
+from mvpose.estimators import SequenceEstimator
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS
 from mvpose.rays import ordered_rays
 
@@ -85,7 +85,7 @@ def compile_kernels(variants: Iterable[str]) -> None:
     described = replace(bare, descriptors=np.ones((2, 8)))
     for variant in variants:
         for detections in (described,) if variant in NEED_DESCRIPTORS else (bare, described):
-            estimator = Pipeline.preset(variant)
+            estimator = preset(variant)
             if len(estimator.estimate(rig, detections)) != 1:
                 raise RuntimeError(f"{variant}: expected one person from two perfect views, got another number")
             if isinstance(estimator, SequenceEstimator):
@@ -101,7 +101,7 @@ def compile_reconstruction(variants: Iterable[str]) -> None:
     rig, detections = _seen_person()
     _, rays = ordered_rays(rig, detections)
     for variant in variants:
-        estimator = Pipeline.preset(variant)
+        estimator = preset(variant)
         if isinstance(estimator, Pipeline):
             estimator.reconstruction(rays, Matching(np.zeros(2, np.int64)).labels, COCO17)
 

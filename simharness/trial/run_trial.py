@@ -17,7 +17,7 @@ import polars as pl
 import threadpoolctl
 
 from mvpose import Estimate
-from mvpose.pipeline import Estimator, SequenceEstimator
+from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.presets import PRESETS
 from mvpose.wholebody import complete
 from simharness.runtime.progress import Reporter, Silence

@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.method.scenes import ring
 from benchmarks.whole_body.__main__ import detected, main, whole_people
-from mvpose import COCO17, Pipeline
+from mvpose import COCO17, preset
 from mvpose.wholebody import SKELETONS, body_part, complete, skeleton_by_name
 
 
@@ -14,7 +14,7 @@ def test_the_people_of_the_benchmark_are_found_with_all_joints():
     rng, rig, skeleton = np.random.default_rng(3), ring(5, 4), skeleton_by_name("wholebody133")
     joints = whole_people(skeleton, 4, rng)
     detections = detected(rig, joints, skeleton, rng)
-    people = complete(rig, detections, Pipeline.preset("fast").estimate(rig, body_part(detections)))
+    people = complete(rig, detections, preset("fast").estimate(rig, body_part(detections)))
     assert len(people) == 4
     nearest = np.linalg.norm(people.joints[:, None] - joints, axis=-1).mean(axis=-1, where=np.isfinite(joints[..., 0]))
     true = joints[np.nanargmin(np.nan_to_num(nearest, nan=9.0), axis=1)]

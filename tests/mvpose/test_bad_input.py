@@ -10,7 +10,8 @@ from hypothesis.extra import numpy as arrays
 from people import crowd, look_at, ring
 from scipy.optimize import linear_sum_assignment
 
-from mvpose import COCO17, SHELF14, Camera, Detections, Pipeline, Rig
+import mvpose
+from mvpose import COCO17, SHELF14, Camera, Detections, Rig
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS
 from mvpose.skeleton import PANOPTIC19
 
@@ -158,7 +159,7 @@ def far_from_the_origin(distortion):
 def estimated(preset, frame, detections=None):
     """Estimate, after checking the properties that hold for any input."""
     detections = frame.detections() if detections is None else detections
-    estimate = Pipeline.preset(preset).estimate(frame.rig, detections)
+    estimate = mvpose.preset(preset).estimate(frame.rig, detections)
     placed = estimate.scores > 0
     assert ((estimate.scores >= 0) & (estimate.scores <= 1)).all()
     np.testing.assert_array_equal(np.isfinite(estimate.joints).all(axis=2), placed)
@@ -285,7 +286,7 @@ def test_missing_keypoints_give_no_people(preset):
 @pytest.mark.parametrize("preset", SEEING)
 def test_inconsistent_input_is_refused(preset):
     frame = clean(0)
-    estimate = Pipeline.preset(preset).estimate
+    estimate = mvpose.preset(preset).estimate
     with pytest.raises(ValueError, match="names view 4, but the rig has 3 cameras"):
         estimate(ring(3), frame.detections())
     with pytest.raises(ValueError, match=r"keypoints must be \(15, 14, 2\), got \(15, 17, 2\): skeleton 'shelf14'"):

@@ -5,7 +5,8 @@ import pytest
 from people import STANDING, crowd, detect, ring
 from scipy.optimize import linear_sum_assignment
 
-from mvpose import COCO17, Detections, Pipeline
+import mvpose
+from mvpose import COCO17, Detections
 from mvpose.reconstruction import Noise
 from mvpose.reconstruction.error_scale import SHARED
 
@@ -27,7 +28,7 @@ def test_the_score_of_exact_keypoints_is_their_score_times_the_probability_that_
     detections, person = detect(rig, people)
     own = np.array([0.9, 0.35, 0.6])
     detections = Detections.from_keypoints(detections.view, detections.keypoints, np.repeat(own[person, None], 17, 1))
-    estimate = Pipeline.preset(preset).estimate(rig, detections)
+    estimate = mvpose.preset(preset).estimate(rig, detections)
     scores = np.median(estimate.scores[assigned(estimate, people)], axis=1)  # a bone may pull single joints
     np.testing.assert_allclose(scores, own * own / (own + FLOOR), rtol=0.02)
 
@@ -37,7 +38,7 @@ def test_a_view_that_does_not_see_a_joint_counts_in_the_mean(preset):
     rig = ring(5)
     scores = np.full((5, 17), 0.9)
     scores[:2, 9] = 0.0
-    estimate = Pipeline.preset(preset).estimate(
+    estimate = mvpose.preset(preset).estimate(
         rig, Detections.from_keypoints(np.arange(5), rig.project(STANDING), scores)
     )
     assert estimate.scores[0, 9] == pytest.approx(0.6 * estimate.scores[0, 10], rel=0.02)
@@ -47,7 +48,7 @@ def test_a_view_that_does_not_see_a_joint_counts_in_the_mean(preset):
 def test_squared_errors_are_those_that_the_covariances_say(preset):
     """Keypoints with the errors of the error model: squared errors over covariances have the median of the t."""
     rng, rig, squares = np.random.default_rng(5), ring(5), []
-    pipeline = Pipeline.preset(preset)
+    pipeline = mvpose.preset(preset)
     for seed in range(40):
         people = crowd(2, spacing=1.5, seed=seed)
         depth = np.linalg.norm(people - rig.centers[:, None, None], axis=3)
@@ -66,7 +67,7 @@ def test_squared_errors_are_those_that_the_covariances_say(preset):
 
 @pytest.mark.parametrize("preset", ["full", "fast"])
 def test_nobody_is_lost_in_any_of_many_frames(preset):
-    rig, pipeline = ring(4), Pipeline.preset(preset)
+    rig, pipeline = ring(4), mvpose.preset(preset)
     people = crowd(3, spacing=1.2)
     rng = np.random.default_rng(7)
     found = []

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from people import crowd, detect, look_at, ring
 
-from mvpose import Camera, Detections, Pipeline, Rig
+import mvpose
+from mvpose import Camera, Detections, Rig
 from mvpose.detections import MOST_DETECTIONS
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS
 
@@ -21,7 +22,7 @@ def attempt(preset, make):
     refusal = None
     try:
         rig, detections = make()
-        estimate = Pipeline.preset(preset).estimate(rig, detections)
+        estimate = mvpose.preset(preset).estimate(rig, detections)
     except ValueError as error:
         refusal = str(error)
     if refusal is not None:
@@ -43,7 +44,7 @@ def uniform(count, views, seed=0):
 @pytest.mark.parametrize("preset", SEEING)
 def test_more_detections_than_a_frame_has_are_refused_at_once(preset):
     with pytest.raises(ValueError, match=r"at most 2000 detections, got 10000; pass one frame at a time"):
-        Pipeline.preset(preset).estimate(ring(5), uniform(10_000, 5))
+        mvpose.preset(preset).estimate(ring(5), uniform(10_000, 5))
 
 
 def test_the_largest_frame_is_estimated():

@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from people import ring
 
-from mvpose import Camera, Detections, Pipeline
+from mvpose import Camera, Detections, preset
 
 CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 2000, 1e-14)
 
@@ -74,5 +74,5 @@ def test_the_method_places_people_through_lenses_that_opencv_projects():
     joints = np.random.default_rng(1).uniform([-0.4, -0.4, 0.1], [0.4, 0.4, 1.8], (17, 3))
     pixels = [cv2.projectPoints(joints, cv2.Rodrigues(each.R)[0], each.t, each.K, lens)[0][:, 0] for each in rig]
     seen = Detections.from_keypoints(np.arange(4), np.array(pixels), np.ones((4, 17)))
-    (found,) = Pipeline.preset("fast").estimate(rig, seen).joints
+    (found,) = preset("fast").estimate(rig, seen).joints
     np.testing.assert_allclose(found, joints, atol=1e-4)

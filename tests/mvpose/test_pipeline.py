@@ -10,6 +10,7 @@ import pytest
 from people import crowd, detect, ring
 from scipy.optimize import linear_sum_assignment
 
+import mvpose
 from mvpose import Camera, Detections, Pipeline, Rig
 from mvpose.affinity import AppearanceAffinity, EpipolarAffinity, GeometricAffinity
 from mvpose.heatmaps import Heatmaps
@@ -38,7 +39,7 @@ def test_all_people_are_found_at_their_positions(preset, views, count):
     rig = Rig(list(ring(max(views, 5)))[:views])  # two cameras that face each other cannot triangulate
     people = crowd(count)
     detections, person = detect(rig, people)
-    estimate = Pipeline.preset(preset).estimate(rig, described(detections, person))
+    estimate = mvpose.preset(preset).estimate(rig, described(detections, person))
     assert len(estimate) == count
     assert errors(estimate, people).max() < (1e-3 if preset in ("fast", "no-3dps") else 0.04)  # bones pull a little
     labels = estimate.matching.labels
@@ -92,15 +93,15 @@ def test_appearance_decides_where_geometry_cannot():
     detections, _ = detect(rig, people, shuffle=False)
     person = np.array([0, 0, 1, 1])
     seen = described(detections, person)
-    assert len(Pipeline.preset("geometry").estimate(rig, seen)) == 1
-    labels = Pipeline.preset("full").estimate(rig, seen).matching.labels
-    assert labels.tolist() == Pipeline.preset("appearance").estimate(rig, seen).matching.labels.tolist() == [0, 0, 1, 1]
+    assert len(mvpose.preset("geometry").estimate(rig, seen)) == 1
+    labels = mvpose.preset("full").estimate(rig, seen).matching.labels
+    assert labels.tolist() == mvpose.preset("appearance").estimate(rig, seen).matching.labels.tolist() == [0, 0, 1, 1]
 
 
 def test_appearance_alone_needs_descriptors():
     detections, _ = detect(ring(3), crowd(1))
     with pytest.raises(ValueError, match="descriptors"):
-        Pipeline.preset("appearance").estimate(ring(3), detections)
+        mvpose.preset("appearance").estimate(ring(3), detections)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -110,7 +111,7 @@ def test_a_person_reported_twice_is_one_person(preset):
     twice = np.concatenate([np.arange(len(person))] * 2)
     keypoints = detections.keypoints[twice] + np.random.default_rng(1).normal(0, 0.5, (len(twice), 17, 2))
     again = Detections.from_keypoints(detections.view[twice], keypoints, detections.scores[twice])
-    estimate = Pipeline.preset(preset).estimate(rig, described(again, person[twice]))
+    estimate = mvpose.preset(preset).estimate(rig, described(again, person[twice]))
     assert len(estimate) == 2
     assert errors(estimate, people).max() < 0.06
     assert (np.bincount(estimate.matching.labels + 1)[1:] == 5).all()
@@ -124,7 +125,7 @@ def test_a_repeated_face_loses_no_joint(preset):
     scores = 0.9 * np.ones((len(twice), 17))
     scores[len(person) :] = [0.97] * 5 + [0.0] * 12
     again = Detections.from_keypoints(detections.view[twice], detections.keypoints[twice], scores)
-    estimate = Pipeline.preset(preset).estimate(rig, described(again, person[twice]))
+    estimate = mvpose.preset(preset).estimate(rig, described(again, person[twice]))
     assert len(estimate) == 2
     assert errors(estimate, people).max() < 0.06
 
@@ -201,7 +202,7 @@ def test_timings_add_up_and_the_estimate_is_complete():
 
 def test_an_unknown_preset_lists_the_known_ones():
     with pytest.raises(ValueError, match="full, appearance, geometry, hungarian, no-3dps, no-matching, fast"):
-        Pipeline.preset("best")
+        mvpose.preset("best")
 
 
 def test_the_method_stands_alone():

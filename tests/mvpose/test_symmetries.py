@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from relations import RELATIONS, Frame, frame, movement, people, rig, skeletons
 
-from mvpose import Detections, Pipeline
+import mvpose
+from mvpose import Detections
 from mvpose.duplicates import Duplicates
 from mvpose.ordering import canonical_order, number_views
 from mvpose.rays import viewing_rays
@@ -20,7 +21,7 @@ OPEN, DRIFT = 0.2, 1e-3  # standard deviation of such a joint, and the greatest 
 
 def changes(preset, seeds):
     """Return the scenes and relations by which people move further than rounding explains."""
-    pipeline, found, people, drifted = Pipeline.preset(preset), [], 0, 0
+    pipeline, found, people, drifted = mvpose.preset(preset), [], 0, 0
     for seed in seeds:
         given = frame(seed)
         estimate = pipeline.estimate(*given)
@@ -68,9 +69,9 @@ def test_sides_are_alike_in_every_skeleton(name, preset):
         scores = np.where(rng.random(keypoints.shape[:2]) < 0.15, 0.0, rng.uniform(0.4, 1.0, keypoints.shape[:2]))
         given = Frame(cameras, Detections.from_keypoints(view, keypoints, scores, skeleton=skeleton))
         changed, back = RELATIONS["renamed sides"][0](given, rng)
-        original = Pipeline.preset(preset).estimate(*given)
+        original = mvpose.preset(preset).estimate(*given)
         assert len(original) >= 1
-        assert movement(original.joints, back(Pipeline.preset(preset).estimate(*changed).joints)) < 1e-6
+        assert movement(original.joints, back(mvpose.preset(preset).estimate(*changed).joints)) < 1e-6
 
 
 @pytest.mark.parametrize("preset", ["full", "fast"])
@@ -78,8 +79,8 @@ def test_matchings_are_given_in_the_order_of_the_detections(preset):
     given = frame(4)
     twice, _ = RELATIONS["blank detections"][0](given, np.random.default_rng(0))
     twice, _ = RELATIONS["doubled detections"][0](twice, np.random.default_rng(0))
-    matching = Pipeline.preset(preset).estimate(*twice).matching
-    original = Pipeline.preset(preset).estimate(*given).matching
+    matching = mvpose.preset(preset).estimate(*twice).matching
+    original = mvpose.preset(preset).estimate(*given).matching
     assert original.people > 1
     rows = {row.tobytes(): index for index, row in enumerate(given.detections.keypoints)}
     which = np.array([rows.get(row.tobytes(), -1) for row in twice.detections.keypoints])

@@ -122,7 +122,7 @@ class TestBadInput:
     def test_a_user_defined_estimator_is_scored(self, simharness, tmp_path, shared_data):
         """The estimator is a preset, so its scores are those of the preset."""
         file, summary = tmp_path / "custom.py", tmp_path / "shelf.json"
-        file.write_text('from mvpose import Pipeline\n\ncustom = Pipeline.preset("fast")\n')
+        file.write_text('from mvpose import preset\n\ncustom = preset("fast")\n')
         methods = ["--method", "fast", "--method", f"{file}:custom"]
         assert (
             simharness("evaluate", "shelf", str(shared_data / "shelf"), *methods, "--json", str(summary)).exit_code == 0

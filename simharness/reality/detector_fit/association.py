@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from mvpose import COCO17, Detections, Pipeline
+from mvpose import COCO17, Detections, preset
 from mvpose.arrays import Bools, Floats
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Triangulation
@@ -75,7 +75,7 @@ def associate(sample: Sample, pixels: Floats, boxes: Floats) -> Association:
     fragments: list[NDArray[np.int64]] = []
     false: list[list[Floats]] = []
     consensus = np.full((frames, people, len(COCO17), 3), np.nan)
-    fast, triangulate = Pipeline.preset("fast"), Triangulation()
+    fast, triangulate = preset("fast"), Triangulation()
     for frame, found in enumerate(sample.detections):
         left, shown = np.ones(len(found), bool), np.full(len(found), -1)
         for view in range(views):

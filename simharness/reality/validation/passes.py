@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from mvpose import Pipeline
+from mvpose import preset
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.validation.frame_scores import FrameScores, score_frames
 from simharness.reality.validation.tally import Tally
@@ -70,7 +70,7 @@ def frame_scores(recording: AnnotatedRecording, variant: str) -> FrameScores:
     Raises:
         ValueError: an unknown preset.
     """
-    pipeline = Pipeline.preset(variant)
+    pipeline = preset(variant)
     estimates = [pipeline.estimate(recording.rig, detections).joints for detections in recording.detections]
     return score_frames(recording.truth, estimates)
 

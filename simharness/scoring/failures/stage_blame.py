@@ -25,7 +25,7 @@ import polars as pl
 from scipy.optimize import linear_sum_assignment
 
 from mvpose import COCO17, Detections, Estimate, Rig
-from mvpose.pipeline import Estimator
+from mvpose.estimators import Estimator
 from simharness.runtime.errors import naming_frame
 from simharness.scoring.failures.failure_classes import Failure, FailureKind, failures_of_frame
 from simharness.scoring.failures.substitution import perfect_detections, true_labels, with_labels

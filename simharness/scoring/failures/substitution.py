@@ -10,7 +10,8 @@ import numpy as np
 from mvpose import Detections, Estimate, Pipeline, Rig, Skeleton
 from mvpose.arrays import Integers
 from mvpose.estimate import Matching
-from mvpose.pipeline import Estimator, UnmatchedPipeline
+from mvpose.estimators import Estimator
+from mvpose.pipeline import UnmatchedPipeline
 from mvpose.rays import Rays, viewing_rays
 from mvpose.reconstruction import Poses
 from simharness.types.truth import KeypointError, Truth

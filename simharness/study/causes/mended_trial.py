@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from mvpose import Estimate, Rig
-from mvpose.pipeline import Estimator, SequenceEstimator
+from mvpose.estimators import Estimator, SequenceEstimator
 from simharness.runtime.errors import naming_frame
 from simharness.runtime.progress import Silence
 from simharness.runtime.stages import Stages

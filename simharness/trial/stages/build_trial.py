@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from mvpose import Rig
 from mvpose.affinity import AppearanceAffinity
-from mvpose.pipeline import Estimator
+from mvpose.estimators import Estimator
 from mvpose.presets import NEED_DESCRIPTORS, without_repair
 from simharness.capture.rendering.renderer import Unavailable
 from simharness.detector.descriptors import DescriptorSettings

@@ -1,7 +1,7 @@
 """Estimation stage: run every variant of the method on the detections of every frame.
 
 Variants without memory share the frames among all processes, in any order. A variant with memory
-(:class:`mvpose.pipeline.SequenceEstimator`) gets all frames in order in one process, beside the others.
+(:class:`mvpose.estimators.SequenceEstimator`) gets all frames in order in one process, beside the others.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from mvpose import Detections, Estimate, Rig
-from mvpose.pipeline import Estimator, SequenceEstimator
+from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.presets import PRESETS, READ_HEATMAPS, without_repair
 from simharness.runtime.errors import RunError, naming_frame
 from simharness.runtime.frame_pool import chunks_of, map_jobs

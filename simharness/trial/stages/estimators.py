@@ -1,7 +1,7 @@
 """Variants of a scenario: presets of :class:`mvpose.Pipeline` and user-defined estimators.
 
 A user-defined estimator is any object with ``estimate(rig, detections) -> mvpose.Estimate``, the protocol
-:class:`mvpose.pipeline.Estimator`. A scenario gives its place::
+:class:`mvpose.estimators.Estimator`. A scenario gives its place::
 
     variants = ["full", "mean", "lifted"]
 
@@ -13,7 +13,7 @@ The name refers to such an object, or to a class or function that returns one wh
 object may be a :class:`mvpose.Pipeline` with custom stages. A file is loaded alone, not as part of a package, and each
 process that estimates loads it once. Frames come in any order, so an estimator must not depend on earlier frames.
 
-An estimator with memory, such as a tracker, has ``track(rig, frames)`` (:class:`mvpose.pipeline.SequenceEstimator`)
+An estimator with memory, such as a tracker, has ``track(rig, frames)`` (:class:`mvpose.estimators.SequenceEstimator`)
 instead or as well: it yields one estimate for each frame, and gets all frames of a trial in order in one process.
 """
 
@@ -36,10 +36,10 @@ from typing import Any
 
 import numpy as np
 
-from mvpose import Detections, Estimate, Pipeline, Rig
+from mvpose import Detections, Estimate, Rig, preset
 from mvpose.affinity import AppearanceAffinity
 from mvpose.checks import as_array
-from mvpose.pipeline import Estimator
+from mvpose.estimators import Estimator
 from mvpose.skeleton import Skeleton
 from simharness.runtime.errors import RunError
 from simharness.scenario.sections.method_section import MethodSection, wrong_variants
@@ -68,7 +68,7 @@ def estimators_of(
     return {
         name: _user_estimator(name, places[name])
         if name in places
-        else Pipeline.preset(name, appearance=appearance, lag=method.lag, period=period)
+        else preset(name, appearance=appearance, lag=method.lag, period=period)
         for name in method.variants
     }
 

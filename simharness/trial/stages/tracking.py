@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from mvpose import Detections, Estimate, Rig
-from mvpose.pipeline import SequenceEstimator
+from mvpose.estimators import SequenceEstimator
 from simharness.runtime.errors import RunError
 
 

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.tracking.losses import LOSSES, Loss, without
 from benchmarks.tracking.shelf import Figures, Shelf
 from benchmarks.tracking.trajectories import link, second_differences, short_ghosts
-from mvpose import Camera, Detections, Estimate, Pipeline, Rig
+from mvpose import Camera, Detections, Estimate, Rig, preset
 from mvpose.skeleton import coco17_to_shelf14
 from mvpose.tracking import Tracker
 from simharness.reality.annotated_recording import AnnotatedRecording
@@ -120,7 +120,7 @@ def _turned(given: AnnotatedRecording, view: int, degrees: float, *, after: floa
 def test_a_camera_of_shelf_that_turns_is_named_and_none_that_stands():
     given = read_recording("shelf", SHELF)
     for turned, expected in ((given, []), (_turned(given, 1, 1.0, after=6.0), [1])):
-        tracker = Tracker(Pipeline.preset("fast"))
+        tracker = Tracker(preset("fast"))
         for detections in turned.timed_detections:
             tracker.advance(given.rig, detections)
         assert [drift.view for drift in tracker.drifts] == expected

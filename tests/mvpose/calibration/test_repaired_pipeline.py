@@ -7,11 +7,11 @@ import pytest
 from moving_people import disturbed, walk
 from people import ring
 
-from mvpose import Detections, Pipeline
+from mvpose import Detections, preset
 from mvpose.calibration.clocks import estimate_clocks
 from mvpose.calibration.repaired_pipeline import RepairedPipeline
 from mvpose.calibration.resampling import resampled
-from mvpose.pipeline import SequenceEstimator
+from mvpose.estimators import SequenceEstimator
 
 RIG = ring(4)
 PERIOD, FINE = 0.04, 0.005  # s: of frames, and of the true motion
@@ -47,11 +47,11 @@ def errors(estimates, motion):
 
 
 def test_clocks_that_are_off_cost_little_after_repair(motion):
-    plain = Pipeline.preset("fast")
+    plain = preset("fast")
     perfect = errors([plain.estimate(RIG, each) for each in filmed(motion, np.zeros(4))], motion)
     frames = filmed(motion, OFFSETS)
     unrepaired = errors([plain.estimate(RIG, each) for each in frames], motion)
-    estimates = list(Pipeline.preset("fast+repair", period=PERIOD).track(RIG, frames))
+    estimates = list(preset("fast+repair", period=PERIOD).track(RIG, frames))
     inner = slice(6, -6)  # pictures of the first and last frames were taken before and after the recording
     repaired = errors(estimates, motion)[inner].mean()
     assert unrepaired[inner].mean() > 1.5 * perfect[inner].mean()
@@ -64,7 +64,7 @@ def test_clocks_that_are_off_cost_little_after_repair(motion):
 
 def test_a_rig_that_is_off_is_repaired_before_people_are_estimated(motion):
     frames, rig = filmed(motion, np.zeros(4)), disturbed(RIG, 1.5, 0.1, seed=3, views=[2])
-    plain = Pipeline.preset("fast")
+    plain = preset("fast")
     unrepaired = errors([plain.estimate(rig, each) for each in frames], motion).mean()
     assert errors(RepairedPipeline(plain, PERIOD).track(rig, frames), motion).mean() < 0.7 * unrepaired
 
@@ -82,14 +82,14 @@ def test_detections_of_cameras_in_time_stay_as_they_are(motion):
 
 
 def test_presets_take_the_suffix():
-    assert isinstance(Pipeline.preset("full+repair"), SequenceEstimator)
-    assert isinstance(Pipeline.preset("track+repair", lag=0.0), RepairedPipeline)
+    assert isinstance(preset("full+repair"), SequenceEstimator)
+    assert isinstance(preset("track+repair", lag=0.0), RepairedPipeline)
     with pytest.raises(ValueError, match="unknown preset 'nothing'"):
-        Pipeline.preset("nothing+repair")
+        preset("nothing+repair")
 
 
 def test_no_frames_give_no_estimates():
-    assert list(RepairedPipeline(Pipeline.preset("fast")).track(RIG, [])) == []
+    assert list(RepairedPipeline(preset("fast")).track(RIG, [])) == []
 
 
 @pytest.mark.parametrize("what", ["nobody", "one view", "no keypoints", "late pictures", "no pictures"])
@@ -107,4 +107,4 @@ def test_recordings_with_little_in_them_are_estimated(motion, what):
         nobody = [each.select(np.zeros(len(each), bool)) for each in frames]
         frames = [replace(each, time=np.full(4, np.nan)) for each in nobody]
     for name in ("fast+repair", "track-fast+repair"):
-        assert len(list(Pipeline.preset(name, period=PERIOD).track(RIG, frames))) == len(frames)
+        assert len(list(preset(name, period=PERIOD).track(RIG, frames))) == len(frames)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mvpose import COCO17, Pipeline
+from mvpose import COCO17, preset
 from mvpose.formats.calibration.voxelpose import read_calibration
 from mvpose.formats.detection_files import DetectionFiles
 from mvpose.formats.joint_names import canonical
@@ -272,7 +272,7 @@ def test_bvh_of_real_people_on_shelf(shared_data):
     rig = read_calibration(folder / "calibration_shelf.json", size=(1032, 776))
     cameras = tuple(camera.name for camera in rig)
     frames = read_detections(DetectionFiles(folder / "openpose", cameras, np.arange(100)))
-    people = People.of_estimates(Pipeline.preset("track").track(rig, frames))
+    people = People.of_estimates(preset("track").track(rig, frames))
     files = dict(FORMATS["bvh"].write(Export(people, Options())))
     distances = []
     for row, identity in enumerate(people.ids):

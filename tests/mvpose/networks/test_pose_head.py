@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from onnx_graphs import Graph, dots, mean_color, picture, simcc_dots
 from people import ring
 
-from mvpose import COCO17, SHELF14, Detections, Pipeline, Skeleton
+import mvpose
+from mvpose import COCO17, SHELF14, Detections, Skeleton
 from mvpose.networks import Card, PoseHead, Session
 
 WHITE = (250, 250, 250)
@@ -216,7 +217,7 @@ def test_people_are_estimated_from_pictures(tmp_path, preset, kind):
     low, high = pixels.min(axis=1) - 25, pixels.max(axis=1) + 25
     found = head.detect(images, np.arange(5), np.concatenate([low, high - low], axis=1))
     np.testing.assert_allclose(found.keypoints, pixels, atol=0.25)
-    estimate = Pipeline.preset(preset).estimate(rig, found)
+    estimate = mvpose.preset(preset).estimate(rig, found)
     assert len(estimate) == 1
     np.testing.assert_allclose(estimate.joints[0], joints, atol=0.005)
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from onnx_graphs import Graph, dots, mean_color, picture
 
-from mvpose import Detections, Pipeline
+from mvpose import Detections, preset
 from mvpose.affinity import AppearanceAffinity, FusedAffinity
 from mvpose.networks import Card, ReId, Session
 
@@ -135,7 +135,7 @@ def test_the_scale_of_distances_is_on_the_card(tmp_path, reid):
     affinity = stated.affinity(None, stated.describe(bare, images), None)
     found = np.argmax(affinity[:4], axis=1) - 4
     assert found.tolist() == [0, 1, 3, 2]
-    full = replace(Pipeline.preset("full"), affinity=FusedAffinity(appearance=stated.affinity))
+    full = replace(preset("full"), affinity=FusedAffinity(appearance=stated.affinity))
     assert full.affinity.appearance.midpoint == 0.8
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from people import STANDING, crowd, detect, ring
 from scipy.optimize import linear_sum_assignment
 
-from mvpose import COCO17, Camera, Detections, Pipeline, Rig
+from mvpose import COCO17, Camera, Detections, Rig, preset
 from mvpose.rays import Rays, viewing_rays
 from mvpose.reconstruction.hypotheses import Hypotheses, Links
 from mvpose.reconstruction.unmatched import UnmatchedPictorialStructure, _best_pose, _strongest
@@ -245,7 +245,7 @@ def test_without_matching_a_limb_is_taken_from_a_neighbour(seed):
     scores[(person == 0) & (detections.view > 1), 9] = 0
     scores[person == 1] = 0.6
     detections = Detections.from_keypoints(detections.view, detections.keypoints, scores)
-    matched = Pipeline.preset("full").estimate(rig, detections)
+    matched = preset("full").estimate(rig, detections)
     joints, _, _, labels = find(rig, detections)
     assert len(joints) == len(matched) == 2
     assert np.linalg.norm(matched.joints[matched.matching.labels[person == 0][0], 9] - rear[9]) < 0.06

@@ -7,7 +7,7 @@ import pytest
 from people import STANDING, ring
 from scipy.spatial.transform import Rotation
 
-from mvpose import Detections, Pipeline, Rig
+from mvpose import Detections, Rig, preset
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.skeleton import COCO17
@@ -47,7 +47,7 @@ def pictures(rig: Rig, time: float, rng: np.random.Generator, *, noise: float = 
 
 def tracked(seconds: float, *, moved: Rig | None = None, at: float = 10.0, rig: Rig = RIG, seed: int = 0) -> Tracker:
     """Return a tracker after some seconds, in which the cameras may have moved to those of another rig."""
-    tracker, rng = Tracker(Pipeline.preset("fast")), np.random.default_rng(seed)
+    tracker, rng = Tracker(preset("fast")), np.random.default_rng(seed)
     for k in range(round(seconds * RATE)):
         really = rig if moved is None or k / RATE < at else moved
         tracker.advance(rig, pictures(really, k / RATE, rng))
@@ -121,7 +121,7 @@ def test_a_camera_that_turns_by_a_degree_is_named_within_seconds(view, axis):
 
 def test_two_cameras_that_move_one_after_the_other_are_both_named():
     one = turned(RIG, 1, 1.5, (0, 1, 0))
-    tracker, rng = Tracker(Pipeline.preset("fast")), np.random.default_rng(0)
+    tracker, rng = Tracker(preset("fast")), np.random.default_rng(0)
     for k in range(260):
         really = RIG if k < 100 else one if k < 180 else turned(one, 3, -1.5, (0, 1, 0))
         tracker.advance(RIG, pictures(really, k / RATE, rng))
@@ -217,12 +217,12 @@ def test_the_watch_goes_on_after_a_restoration_and_changes_no_estimate(tmp_path)
     moved, rng = turned(RIG, 1, 1.0, (0, 1, 0)), np.random.default_rng(3)
     frames = [pictures(RIG if k < 100 else moved, k / RATE, rng) for k in range(150)]
     blind = TrackingModel(drift=DriftModel(smallest=50.0))
-    one, other = Tracker(Pipeline.preset("fast")), Tracker(Pipeline.preset("fast"), model=blind)
+    one, other = Tracker(preset("fast")), Tracker(preset("fast"), model=blind)
     for k, frame in enumerate(frames):
         if k == 115:
             one.state().save(tmp_path / "people.npz")
         assert one.estimate(RIG, frame).joints.tobytes() == other.estimate(RIG, frame).joints.tobytes()
-    again = Tracker.restored(TrackerState.load(tmp_path / "people.npz"), Pipeline.preset("fast"))
+    again = Tracker.restored(TrackerState.load(tmp_path / "people.npz"), preset("fast"))
     assert again.drifts == ()
     for frame in frames[115:]:
         again.advance(RIG, frame)
@@ -234,7 +234,7 @@ def test_the_watch_goes_on_after_a_restoration_and_changes_no_estimate(tmp_path)
 
 
 def test_nobody_in_front_of_the_cameras_is_no_evidence():
-    tracker = Tracker(Pipeline.preset("fast"))
+    tracker = Tracker(preset("fast"))
     assert tracker.residuals is None
     empty = pictures(RIG, 0.0, np.random.default_rng(0)).select(np.zeros(15, bool))
     for k in range(100):

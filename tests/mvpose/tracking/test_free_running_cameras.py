@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from walking_people import film, identities, walking
 
-from mvpose import Detections, Pipeline
+import mvpose
+from mvpose import Detections
 from mvpose.tracking import Tracker, track
 from mvpose.tracking.recent_pictures import RecentPictures
 
@@ -44,8 +45,8 @@ def test_single_pictures_place_people_as_well_as_synchronised_ones(preset):
     times = np.arange(25) / RATE
     rig, parts, truth = _one_by_one(PATHS, times, noise=3.0)
     _, frames, together = film(PATHS, times, noise=3.0)
-    alone = list(track(Tracker(Pipeline.preset(preset)), rig, parts, lag=0.2))
-    best = list(track(Tracker(Pipeline.preset(preset)), rig, frames, lag=0.2))
+    alone = list(track(Tracker(mvpose.preset(preset)), rig, parts, lag=0.2))
+    best = list(track(Tracker(mvpose.preset(preset)), rig, frames, lag=0.2))
     settled = 20  # pictures, until everybody was seen by all cameras
     ids = identities(alone[settled:], truth[settled:])
     assert (ids == ids[0]).all()
@@ -56,7 +57,7 @@ def test_single_pictures_place_people_as_well_as_synchronised_ones(preset):
 
 def test_who_walks_in_is_found_within_a_tenth_of_a_second():
     rig, parts, _ = _one_by_one(PATHS, np.arange(30) / RATE, hidden=lambda frame, _, person: person == 2 and frame < 15)
-    tracker = Tracker(Pipeline.preset("fast"))
+    tracker = Tracker(mvpose.preset("fast"))
     people = np.array([len(tracker.estimate(rig, part)) for part in parts])
     assert (people[10:75] == 2).all()
     assert (people[75 + 15 :] == 3).all()
@@ -70,7 +71,7 @@ def test_false_detections_of_pictures_that_are_apart_in_time_are_nobody():
         keypoints = np.concatenate([given.keypoints, [rig[view].project(ghost)]])
         false = Detections.from_keypoints([*given.view, view], keypoints, np.full(keypoints.shape[:2], 0.9))
         parts[k] = Detections(false.view, false.keypoints, false.scores, false.boxes, false.box_scores, time=given.time)
-    tracker = Tracker(Pipeline.preset("fast"))
+    tracker = Tracker(mvpose.preset("fast"))
     assert [len(tracker.estimate(rig, part)) for part in parts][10:] == [1] * (len(parts) - 10)
 
 
@@ -131,10 +132,10 @@ def test_those_who_wait_keep_their_descriptors_if_all_have_some(described):
 @pytest.mark.parametrize("middle", [3, 40])
 def test_a_tracker_restored_between_pictures_goes_on_with_the_same_bytes(middle):
     rig, parts, _ = _one_by_one(PATHS, np.arange(12) / RATE, hidden=lambda frame, _, person: person == 2 and frame < 8)
-    tracker = Tracker(Pipeline.preset("fast"))
+    tracker = Tracker(mvpose.preset("fast"))
     for part in parts[:middle]:
         tracker.estimate(rig, part)
-    restored = Tracker.restored(tracker.state(), Pipeline.preset("fast"))
+    restored = Tracker.restored(tracker.state(), mvpose.preset("fast"))
     for part in parts[middle:]:
         one, other = tracker.estimate(rig, part), restored.estimate(rig, part)
         assert one.joints.tobytes() == other.joints.tobytes()

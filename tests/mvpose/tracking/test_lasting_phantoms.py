@@ -7,7 +7,7 @@ import pytest
 from people import STANDING, ring
 from walking_people import film, identities
 
-from mvpose import Detections, Pipeline
+from mvpose import Detections, preset
 from mvpose.tracking import Tracker, track
 from mvpose.tracking.displacement import note_displacement, staying
 from mvpose.tracking.existence import Clutter, Existence, log_odds
@@ -47,12 +47,12 @@ def test_posters_that_meet_by_chance_are_no_people_after_the_first_seconds():
     ghosts, alone = [], []
     for seed in range(3):
         frames = with_phantoms(walking, *phantoms(seed))
-        estimates = list(track(Tracker(Pipeline.preset("fast")), rig, frames, lag=0.2))
+        estimates = list(track(Tracker(preset("fast")), rig, frames, lag=0.2))
         ids = identities(estimates, truth)
         assert (ids >= 0).all()
         assert (ids == ids[0]).all()
         ghosts += [len(each) - 2 for each in estimates[20:]]
-        alone += [len(Pipeline.preset("fast").estimate(rig, each)) - 2 for each in frames[20:]]
+        alone += [len(preset("fast").estimate(rig, each)) - 2 for each in frames[20:]]
     assert np.mean(alone) > 1.0
     assert np.mean(ghosts) < 0.2 * np.mean(alone)
 
@@ -63,7 +63,7 @@ def test_people_who_stand_still_among_posters_remain_people():
     rig, frames, truth = film(still, np.zeros(len(times)), rig=RIG, noise=4.0)  # nobody moves at all
     frames = [replace(each, time=np.full(5, time)) for each, time in zip(frames, times, strict=True)]
     frames = with_phantoms(frames, *phantoms(7, count=2))
-    ids = identities(track(Tracker(Pipeline.preset("fast")), rig, frames, lag=0.2), truth)
+    ids = identities(track(Tracker(preset("fast")), rig, frames, lag=0.2), truth)
     assert (ids >= 0).all()
     assert (ids == ids[0]).all()
 

@@ -7,7 +7,7 @@ import pytest
 from people import ring
 from walking_people import walking
 
-from mvpose import Detections, Pipeline, Rig
+from mvpose import Detections, Rig, preset
 from mvpose.tracking import Tracker
 
 PATHS = [(-1.0, -0.6, 2.0, 0.0), (1.0, 0.6, -2.0, 0.0)]
@@ -27,7 +27,7 @@ def _seen(camera, time, readout):
 
 def _error(rig, readout):
     """Mean error of the joints after a while, metres."""
-    tracker, errors = Tracker(Pipeline.preset("fast")), []
+    tracker, errors = Tracker(preset("fast")), []
     for time in np.arange(20) / 25:
         pixels = np.concatenate([_seen(camera, time, readout) for camera in rig])
         view = np.repeat(np.arange(len(rig)), len(PATHS))

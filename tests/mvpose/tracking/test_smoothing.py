@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from walking_people import film, identities
 
-from mvpose import Pipeline
+from mvpose import preset
 from mvpose.tracking import Tracker, TrackingModel, track
 from mvpose.tracking.motion import condition, predict, transition
 from mvpose.tracking.smoothing import smooth_joint, smoother_gain
@@ -68,7 +68,7 @@ def test_later_frames_make_estimates_better_and_smoother():
     rig, frames, truth = film(PATHS, times, noise=6.0)
     errors, bends = [], []
     for lag in (0.0, 0.2, np.inf):
-        estimates = list(track(Tracker(Pipeline.preset("fast")), rig, frames, lag=lag))
+        estimates = list(track(Tracker(preset("fast")), rig, frames, lag=lag))
         assert [len(each) for each in estimates] == [2] * len(times)
         assert [each.time for each in estimates] == pytest.approx(list(times))
         ids = identities(estimates, truth)
@@ -85,7 +85,7 @@ def test_a_lag_also_corrects_the_first_frame():
     paths, errors = [(-1.0, 0.0, 0.5, 0.0), (1.0, 1.0, 0.0, 0.0)], []
     for seed in range(4):
         rig, frames, truth = film(paths, np.arange(15) / 25.0, noise=6.0, seed=seed)
-        firsts = [next(track(Tracker(Pipeline.preset("fast")), rig, frames, lag=lag)) for lag in (0.0, 0.4)]
+        firsts = [next(track(Tracker(preset("fast")), rig, frames, lag=lag)) for lag in (0.0, 0.4)]
         errors.append([np.linalg.norm(np.sort(first.joints, axis=0) - np.sort(truth[0], axis=0)) for first in firsts])
     alone, corrected = np.mean(errors, axis=0)
     assert corrected < 0.8 * alone
@@ -93,8 +93,8 @@ def test_a_lag_also_corrects_the_first_frame():
 
 def test_without_a_lag_estimates_are_those_of_the_tracker():
     rig, frames, _ = film(PATHS, np.arange(6) / 25)
-    tracker = Tracker(Pipeline.preset("fast"))
-    for one, other in zip(track(Tracker(Pipeline.preset("fast")), rig, frames), frames, strict=True):
+    tracker = Tracker(preset("fast"))
+    for one, other in zip(track(Tracker(preset("fast")), rig, frames), frames, strict=True):
         np.testing.assert_array_equal(one.joints, tracker.estimate(rig, other).joints)
 
 

@@ -5,7 +5,7 @@ import pytest
 from people import ring
 from walking_people import film, identities
 
-from mvpose import Detections, Pipeline, Rig
+from mvpose import Detections, Rig, preset
 from mvpose.rays import viewing_rays
 from mvpose.tracking import Tracker, TrackingModel
 from mvpose.tracking.association import TrackAffinity
@@ -88,7 +88,7 @@ def test_who_was_taken_for_a_ghost_is_a_person_once_two_cameras_agree(seconds):
         keypoints = np.concatenate([[rig[0].project(small)], given.keypoints])
         frames[k] = Detections.from_keypoints([0, *given.view], keypoints, np.full(keypoints.shape[:2], 0.9))
         frames[k] = _timed(frames[k], times[k])
-    tracker = Tracker(Pipeline.preset("fast"), model=TrackingModel())
+    tracker = Tracker(preset("fast"), model=TrackingModel())
     estimates = [tracker.estimate(rig, frame) for frame in frames]
     there = identities(estimates, truth)[:, 0] >= 0
     assert not there[:65].any()

@@ -8,7 +8,8 @@ import pytest
 from people import ring
 from walking_people import film, identities, walking
 
-from mvpose import Detections, Pipeline
+import mvpose
+from mvpose import Detections
 from mvpose.tracking import Tracker, TrackingModel
 
 PATHS = [(-0.8, -0.5, 0.5, 0.2), (0.8, 0.6, -0.4, -0.3), (0.0, 1.2, 0.3, -0.5)]
@@ -16,7 +17,7 @@ RATE = 25.0
 
 
 def _run(rig, frames, *, preset="fast", **settings):
-    tracker = Tracker(Pipeline.preset(preset), model=TrackingModel(**settings))
+    tracker = Tracker(mvpose.preset(preset), model=TrackingModel(**settings))
     return [tracker.estimate(rig, frame) for frame in frames]
 
 
@@ -33,7 +34,7 @@ def _errors(estimates, truth):
 @pytest.mark.parametrize("preset", ["full", "fast", "no-3dps", "geometry", "hungarian"])
 def test_the_first_frame_alone_is_estimated_as_the_pipeline_does(preset):
     rig, frames, _ = film(PATHS, [0.0])
-    alone, tracked = Pipeline.preset(preset).estimate(rig, frames[0]), _run(rig, frames, preset=preset)[0]
+    alone, tracked = mvpose.preset(preset).estimate(rig, frames[0]), _run(rig, frames, preset=preset)[0]
     assert len(alone) == len(PATHS)
     order = [int(np.argmin(np.linalg.norm(alone.joints - each, axis=(1, 2)))) for each in tracked.joints]
     assert sorted(order) == list(range(len(PATHS)))
@@ -48,7 +49,7 @@ def test_people_keep_their_identities_and_are_found_better_than_frame_by_frame()
     ids = identities(estimates, truth)
     assert (ids == ids[0]).all()
     assert sorted(ids[0]) == [0, 1, 2]
-    alone = [Pipeline.preset("fast").estimate(rig, frame) for frame in frames]
+    alone = [mvpose.preset("fast").estimate(rig, frame) for frame in frames]
     assert _errors(estimates, truth)[5:].mean() < 0.9 * _errors(alone, truth)[5:].mean()
 
 
@@ -92,7 +93,7 @@ def test_two_false_detections_that_meet_for_a_moment_are_nobody():
         given = frames[frame]
         keypoints = np.concatenate([given.keypoints, [rig[view].project(ghost) for view in views]])
         frames[frame] = Detections.from_keypoints([*given.view, *views], keypoints, np.full(keypoints.shape[:2], 0.9))
-    assert len(Pipeline.preset("fast").estimate(rig, frames[5])) == 3
+    assert len(mvpose.preset("fast").estimate(rig, frames[5])) == 3
     assert [len(each) for each in _run(rig, frames)] == [2] * 20
 
 
@@ -124,7 +125,7 @@ def test_who_leaves_is_reported_for_less_than_half_a_second():
 def test_the_same_frames_give_the_same_bytes_also_from_a_copy_in_the_middle():
     rig, frames, _ = film(PATHS, np.arange(12) / RATE)
     whole = _run(rig, frames)
-    tracker = Tracker(Pipeline.preset("fast"))
+    tracker = Tracker(mvpose.preset("fast"))
     for frame in frames[:6]:
         tracker.estimate(rig, frame)
     for resumed in (pickle.loads(pickle.dumps(tracker)), copy.deepcopy(tracker), tracker):
@@ -136,7 +137,7 @@ def test_the_same_frames_give_the_same_bytes_also_from_a_copy_in_the_middle():
 
 def test_memory_does_not_grow():
     rig, frames, _ = film(PATHS[:1], np.arange(4) / RATE)
-    tracker = Tracker(Pipeline.preset("fast"))
+    tracker = Tracker(mvpose.preset("fast"))
     sizes = []
     for k in range(60):
         late = _at(frames[k % 4], k * 20.0)
@@ -147,7 +148,7 @@ def test_memory_does_not_grow():
 
 def test_nobody_for_a_minute_and_a_jump_of_an_hour():
     rig, frames, _ = film(PATHS[:1], np.arange(3) / RATE)
-    tracker = Tracker(Pipeline.preset("fast"))
+    tracker = Tracker(mvpose.preset("fast"))
     for frame in frames:
         assert len(tracker.estimate(rig, frame)) == 1
     for k in range(60):
@@ -173,7 +174,7 @@ def _at(frame, time):
 )
 def test_bad_times_are_refused(time, message):
     rig, frames, _ = film(PATHS, [0.0])
-    tracker, frame = Tracker(Pipeline.preset("fast")), frames[0]
+    tracker, frame = Tracker(mvpose.preset("fast")), frames[0]
     tracker.estimate(rig, frame)
     with pytest.raises(ValueError, match=message):
         tracker.estimate(
@@ -183,7 +184,7 @@ def test_bad_times_are_refused(time, message):
 
 def test_another_rig_is_refused():
     rig, frames, _ = film(PATHS, [0.0])
-    tracker = Tracker(Pipeline.preset("fast"))
+    tracker = Tracker(mvpose.preset("fast"))
     tracker.estimate(rig, frames[0])
     with pytest.raises(ValueError, match="one rig and one skeleton"):
         tracker.estimate(ring(6), frames[0])

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from walking_people import film, identities
 
-from mvpose import Detections, Pipeline
+import mvpose
+from mvpose import Detections
 from mvpose.tracking import Tracker, track
 
 PATHS = [(-0.8, -0.5, 0.5, 0.2), (0.8, 0.6, -0.4, -0.3)]
@@ -13,7 +14,7 @@ pytestmark = pytest.mark.filterwarnings("error")
 
 
 def _tracker(preset="fast"):
-    return Tracker(Pipeline.preset(preset))
+    return Tracker(mvpose.preset(preset))
 
 
 def _at(frame, time):
@@ -37,7 +38,7 @@ def _bytes(estimate):
 def test_one_frame_alone_is_that_of_the_pipeline_to_the_byte(preset):
     for seed in range(4):
         rig, frames, _ = film([*PATHS, (0.0, 1.2, 0.3, -0.5)], [0.0], noise=6.0, seed=seed)
-        alone, tracked = Pipeline.preset(preset).estimate(rig, frames[0]), _tracker(preset).estimate(rig, frames[0])
+        alone, tracked = mvpose.preset(preset).estimate(rig, frames[0]), _tracker(preset).estimate(rig, frames[0])
         assert len(alone) == 3
         assert _bytes(tracked)[:-1] == _bytes(alone)[:-1]
         assert tracked.freedom.tobytes() == alone.freedom.tobytes()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from people import STANDING, ring
 
-from mvpose import Detections, Pipeline
+from mvpose import Detections, Pipeline, preset
 from mvpose.affinity import AppearanceAffinity, FusedAffinity
 from mvpose.tracking import Tracker, TrackerState, TrackingModel
 from mvpose.tracking.looks import learn_looks, look_distances
@@ -49,7 +49,7 @@ def _identity(estimate, place):
 def _film(before, after, clothes, *, away, seed, described=True, tracker=None):
     """Identities of people before and after all but those in both at one place are away for some seconds."""
     rng = np.random.default_rng(seed)
-    tracker = tracker or Tracker(Pipeline.preset("fast"))
+    tracker = tracker or Tracker(preset("fast"))
     stay = {person: place for person, place in before.items() if after.get(person) == place}
     steps = np.arange(1.0, max(away, 1.0)) if away > 4 else np.arange(0.0, away, 0.2)
     for places, times in ((before, np.arange(8) / 25), (stay, 0.3 + steps), (after, 0.3 + away + np.arange(8) / 25)):
@@ -127,15 +127,15 @@ def test_looks_are_forgotten_after_their_memory_and_saved_with_the_state(tmp_pat
     before, after = {0: SPOTS[0], 1: SPOTS[1]}, {0: SPOTS[2], 1: SPOTS[3]}
     first, later = _film(before, after, clothes, away=60.0, seed=0)
     assert first == later
-    short = Tracker(Pipeline.preset("fast"), model=TrackingModel(reappearance=Reappearance(looks_memory=30.0)))
+    short = Tracker(preset("fast"), model=TrackingModel(reappearance=Reappearance(looks_memory=30.0)))
     first, later = _film(before, after, clothes, away=60.0, seed=0, tracker=short)
     assert not set(first.values()) & set(later.values())
-    rng, tracker = np.random.default_rng(0), Tracker(Pipeline.preset("fast"))
+    rng, tracker = np.random.default_rng(0), Tracker(preset("fast"))
     known = [tracker.estimate(RIG, _frame(k / 25, before, clothes, rng)) for k in range(8)][-1]
     for time in range(1, 30):
         tracker.estimate(RIG, _frame(time, {}, clothes, rng))
     tracker.state().save(tmp_path / "looks.npz")
-    tracker = Tracker.restored(TrackerState.load(tmp_path / "looks.npz"), Pipeline.preset("fast"))
+    tracker = Tracker.restored(TrackerState.load(tmp_path / "looks.npz"), preset("fast"))
     back = [tracker.estimate(RIG, _frame(30 + k / 25, after, clothes, rng)) for k in range(8)][-1]
     assert {person: _identity(back, place) for person, place in after.items()} == {
         person: _identity(known, place) for person, place in before.items()
@@ -144,7 +144,7 @@ def test_looks_are_forgotten_after_their_memory_and_saved_with_the_state(tmp_pat
 
 def test_no_more_people_are_remembered_than_asked():
     model = TrackingModel(reappearance=Reappearance(most=5))
-    tracker, rng = Tracker(Pipeline.preset("fast"), model=model), np.random.default_rng(0)
+    tracker, rng = Tracker(preset("fast"), model=model), np.random.default_rng(0)
     clothes = _clothes(40, DIFFERENT, rng)
     for k in range(20):
         for step in range(4):
@@ -155,7 +155,7 @@ def test_no_more_people_are_remembered_than_asked():
 
 
 def test_descriptors_may_come_late_or_be_missing_but_not_change_their_length():
-    rng, tracker = np.random.default_rng(0), Tracker(Pipeline.preset("fast"))
+    rng, tracker = np.random.default_rng(0), Tracker(preset("fast"))
     clothes, places = _clothes(2, DIFFERENT, rng), {0: SPOTS[0], 1: SPOTS[1]}
     for k in range(12):
         frame = _frame(k / 25, places, clothes, rng, described=k % 3 > 0)
@@ -191,6 +191,6 @@ def test_the_scale_is_that_of_the_pipeline():
     before, after = {0: SPOTS[0], 1: SPOTS[1]}, {0: SPOTS[2], 1: SPOTS[3]}
     for midpoint, comes_back in ((1.0, True), (0.4, False)):
         affinity = FusedAffinity(appearance=AppearanceAffinity(midpoint=midpoint))
-        pipeline = Pipeline(affinity, Pipeline.preset("fast").matching, Pipeline.preset("fast").reconstruction)
+        pipeline = Pipeline(affinity, preset("fast").matching, preset("fast").reconstruction)
         first, later = _film(before, after, clothes, away=60.0, seed=0, tracker=Tracker(pipeline))
         assert (first == later) == comes_back

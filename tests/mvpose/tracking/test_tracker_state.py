@@ -9,7 +9,7 @@ import pytest
 from people import look_at, ring
 from walking_people import film
 
-from mvpose import COCO17, SHELF14, Detections, Pipeline, Rig
+from mvpose import COCO17, SHELF14, Detections, Rig, preset
 from mvpose.tracking import Tracker, TrackerState, TrackingModel, track
 
 PATHS = [(-0.8, -0.5, 0.5, 0.2), (0.8, 0.6, -0.4, -0.3), (0.0, 1.2, 0.3, -0.5)]
@@ -26,7 +26,7 @@ def _film(count=20, **options):
 
 
 def _tracker():
-    return Tracker(Pipeline.preset("fast"))
+    return Tracker(preset("fast"))
 
 
 def _bytes(estimates):
@@ -53,14 +53,14 @@ def test_a_restored_tracker_goes_on_with_the_same_bytes(middle):
     rig, frames, expected, path = middle
     state = TrackerState.load(path)
     for given in (state, pickle.loads(pickle.dumps(state))):
-        tracker = Tracker.restored(given, Pipeline.preset("fast"))
+        tracker = Tracker.restored(given, preset("fast"))
         assert tracker.time == pytest.approx(11 / RATE)
         assert _bytes([tracker.estimate(rig, frame) for frame in frames]) == expected
 
 
 def test_saving_changes_neither_the_state_nor_the_tracker(middle, tmp_path):
     rig, frames, expected, path = middle
-    tracker = Tracker.restored(TrackerState.load(path), Pipeline.preset("fast"))
+    tracker = Tracker.restored(TrackerState.load(path), preset("fast"))
     estimates = []
     for frame in frames:
         state = tracker.state()
@@ -77,9 +77,9 @@ def test_another_process_goes_on_with_the_same_bytes(middle, tmp_path):
     rig, frames, expected, path = middle
     (tmp_path / "rest.pkl").write_bytes(pickle.dumps((rig, frames, str(path))))
     code = (
-        "import pickle, sys; from mvpose import Pipeline; from mvpose.tracking import Tracker, TrackerState\n"
+        "import pickle, sys; from mvpose import preset; from mvpose.tracking import Tracker, TrackerState\n"
         "rig, frames, path = pickle.load(open(sys.argv[1], 'rb'))\n"
-        "tracker = Tracker.restored(TrackerState.load(path), Pipeline.preset('fast'))\n"
+        "tracker = Tracker.restored(TrackerState.load(path), preset('fast'))\n"
         "estimates = [tracker.estimate(rig, frame) for frame in frames]\n"
         "result = [(e.joints.tobytes(), e.covariance.tobytes(), e.scores.tobytes(), e.ids.tobytes(), e.time)"
         " for e in estimates]\n"
@@ -92,7 +92,7 @@ def test_another_process_goes_on_with_the_same_bytes(middle, tmp_path):
 def test_a_lag_can_start_from_a_restored_tracker(middle):
     rig, frames, _, path = middle
     estimates = [
-        list(track(Tracker.restored(TrackerState.load(path), Pipeline.preset("fast")), rig, frames, lag=lag))
+        list(track(Tracker.restored(TrackerState.load(path), preset("fast")), rig, frames, lag=lag))
         for lag in (0.0, 0.1)
     ]
     assert [len(each) for each in estimates] == [len(frames)] * 2
@@ -103,11 +103,11 @@ def test_other_rigs_and_skeletons_are_refused(middle):
     moved = Rig([*list(rig)[:3], look_at([0.0, -5.0, 2.0], [0, 0, 1.0], name="moved"), rig[4]])
     for wrong, message in ((ring(6), "of 5 cameras, got 6"), (moved, r"camera 3 \('moved'\) has another calibration")):
         with pytest.raises(ValueError, match=message):
-            Tracker.restored(TrackerState.load(path), Pipeline.preset("fast")).estimate(wrong, frames[0])
+            Tracker.restored(TrackerState.load(path), preset("fast")).estimate(wrong, frames[0])
     with pytest.raises(ValueError, match="one rig and one skeleton, but the skeleton 'shelf14' of 14 joints"):
         Tracker.restored(TrackerState.load(path)).estimate(rig, Detections.empty(SHELF14))
     same = pickle.loads(pickle.dumps(rig))
-    Tracker.restored(TrackerState.load(path), Pipeline.preset("fast")).estimate(same, frames[0])
+    Tracker.restored(TrackerState.load(path), preset("fast")).estimate(same, frames[0])
 
 
 def test_files_of_other_kinds_and_versions_are_refused(middle, tmp_path):
@@ -157,7 +157,7 @@ def test_a_thousand_frames_of_people_who_come_and_go_leave_the_state_small(lag):
         frames[k] = Detections(
             given.view, given.keypoints, given.scores, given.boxes, given.box_scores, time=frame.time
         )
-    tracker = Tracker(Pipeline.preset("fast"), model=TrackingModel())
+    tracker = Tracker(preset("fast"), model=TrackingModel())
     sizes, known = [], set()
     for estimate in track(tracker, rig, frames, lag=lag):
         known |= set(estimate.ids.tolist())

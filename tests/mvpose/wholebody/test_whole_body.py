@@ -8,9 +8,10 @@ import pytest
 from people import ring
 from whole_people import seen, standing
 
-from mvpose import COCO17, SHELF14, Detections, Estimate, Pipeline, Skeleton
+import mvpose
+from mvpose import COCO17, SHELF14, Detections, Estimate, Skeleton
+from mvpose.estimators import SequenceEstimator
 from mvpose.formats.joint_names import KNOWN
-from mvpose.pipeline import SequenceEstimator
 from mvpose.skeleton import Skeleton as _Skeleton
 from mvpose.wholebody import SKELETONS, body_part, read_skeleton, skeleton_by_name, whole_body, with_body_boxes
 
@@ -121,8 +122,8 @@ class TestBody:
     def test_it_is_the_same_to_the_bit_with_and_without_other_joints(self, preset, name):
         skeleton, rig = skeleton_by_name(name), ring(4)
         detections, _ = seen(rig, standing(skeleton), skeleton)
-        alone = Pipeline.preset(preset).estimate(rig, body_alone(detections))
-        whole = whole_body(Pipeline.preset(preset)).estimate(rig, detections)
+        alone = mvpose.preset(preset).estimate(rig, body_alone(detections))
+        whole = whole_body(mvpose.preset(preset)).estimate(rig, detections)
         assert len(alone) == 3
         same(on_body(whole, skeleton), alone)
         np.testing.assert_array_equal(whole.matching.labels, alone.matching.labels)
@@ -130,11 +131,11 @@ class TestBody:
     def test_tracks_are_the_same_to_the_bit(self):
         skeleton, rig = skeleton_by_name("halpe26"), ring(4)
         frames = [seen(rig, standing(skeleton, shift=0.02 * k), skeleton, seed=k)[0] for k in range(12)]
-        tracker = Pipeline.preset("track-fast")
+        tracker = mvpose.preset("track-fast")
         alone = list(tracker.track(rig, map(body_alone, frames)))
         whole = list(whole_body(tracker).track(rig, iter(frames)))
         assert isinstance(whole_body(tracker), SequenceEstimator)
-        assert not isinstance(whole_body(Pipeline.preset("fast")), SequenceEstimator)
+        assert not isinstance(whole_body(mvpose.preset("fast")), SequenceEstimator)
         assert len(whole) == len(alone) == 12
         for one, other in zip(whole, alone, strict=True):
             same(on_body(one, skeleton), other)
@@ -148,7 +149,7 @@ class TestBody:
         rig = ring(4)
         detections = body_alone(seen(rig, standing(skeleton_by_name("body25")), skeleton_by_name("body25"))[0])
         assert body_part(detections) is detections
-        pipeline = Pipeline.preset("fast")
+        pipeline = mvpose.preset("fast")
         same(whole_body(pipeline).estimate(rig, detections), pipeline.estimate(rig, detections))
 
 
@@ -158,7 +159,7 @@ class TestOtherJoints:
         skeleton, rig = skeleton_by_name(name), ring(5)
         joints = standing(skeleton)
         detections, person = seen(rig, joints, skeleton, noise=0.0)
-        estimate = whole_body(Pipeline.preset("fast")).estimate(rig, detections)
+        estimate = whole_body(mvpose.preset("fast")).estimate(rig, detections)
         assert estimate.joints.shape == joints.shape
         for row in range(3):
             (true,) = set(person[estimate.matching.labels == row])
@@ -170,7 +171,7 @@ class TestOtherJoints:
         squares, shares = [], []
         for seed in range(6):
             detections, person = seen(rig, joints, skeleton, noise=2.0, seed=seed)
-            estimate = whole_body(Pipeline.preset("fast")).estimate(rig, detections)
+            estimate = whole_body(mvpose.preset("fast")).estimate(rig, detections)
             for row in range(len(estimate)):
                 true = person[np.flatnonzero(estimate.matching.labels == row)[0]]
                 error = estimate.joints[row, 17:] - joints[true, 17:]
@@ -186,14 +187,14 @@ class TestOtherJoints:
         scores, toe = detections.scores.copy(), skeleton.index("right_small_toe")
         scores[detections.view > 0, toe] = 0.0
         fewer = with_body_boxes(detections.view, detections.keypoints, scores, skeleton=skeleton)
-        estimate = whole_body(Pipeline.preset("fast")).estimate(rig, fewer)
+        estimate = whole_body(mvpose.preset("fast")).estimate(rig, fewer)
         assert np.isnan(estimate.joints[:, toe]).all()
         assert (estimate.scores[:, toe] == 0).all()
         assert np.isfinite(estimate.joints[:, toe - 1]).all()
 
     def test_nobody(self):
         skeleton, rig = skeleton_by_name("halpe26"), ring(3)
-        estimate = whole_body(Pipeline.preset("full")).estimate(rig, Detections.empty(skeleton))
+        estimate = whole_body(mvpose.preset("full")).estimate(rig, Detections.empty(skeleton))
         assert estimate.joints.shape == (0, 26, 3)
         assert pickle.loads(pickle.dumps(estimate)).covariance.shape == (0, 26, 3, 3)
 
@@ -201,7 +202,7 @@ class TestOtherJoints:
         """Five views of four people: far below the time of a frame at 25 Hz, even on a busy machine."""
         skeleton, rig = skeleton_by_name("wholebody133"), ring(5)
         detections, _ = seen(rig, standing(skeleton, 4), skeleton)
-        estimator = whole_body(Pipeline.preset("fast"))
+        estimator = whole_body(mvpose.preset("fast"))
         estimator.estimate(rig, detections)
         taken = []
         for _ in range(20):
@@ -215,7 +216,7 @@ class TestOtherJoints:
     def test_a_skeleton_without_a_body_is_refused(self, skeleton):
         detections = Detections.from_keypoints([0], np.zeros((1, 2, 2)), np.ones((1, 2)), skeleton=skeleton)
         with pytest.raises(ValueError, match="skeleton 'odd' has no joint of COCO17"):
-            whole_body(Pipeline.preset("fast")).estimate(ring(2), detections)
+            whole_body(mvpose.preset("fast")).estimate(ring(2), detections)
 
     def test_an_estimator_without_labels_is_refused(self):
         class Foreign:

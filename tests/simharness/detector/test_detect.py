@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from worlds import within, world
 
-from mvpose import Pipeline
+from mvpose import preset
 from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
 from simharness.scenario.load import load
@@ -61,7 +61,7 @@ def test_perfect_detections_are_reconstructed_to_under_a_millimetre():
     for variant, worst, usual in (("fast", 1e-3, 1e-3), ("no-3dps", 1e-3, 1e-3), ("full", 3e-3, 1e-3)):
         errors = []
         for t, frame in enumerate(frames):
-            estimate = Pipeline.preset(variant).estimate(trial.exposures.believed_rig, frame.detections)
+            estimate = preset(variant).estimate(trial.exposures.believed_rig, frame.detections)
             away = np.linalg.norm(estimate.joints[:, None] - sequence.joints[t], axis=-1)
             nearest = np.nanmean(away, axis=-1).argmin(axis=1)
             assert sorted(nearest) == [0, 1, 2, 3]

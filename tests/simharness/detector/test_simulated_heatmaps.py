@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mvpose import Camera, Detections, Pipeline, Rig
+from mvpose import Camera, Detections, Rig, preset
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.heatmaps import ASPECT, PADDING, Peaks, drop_outside_crops
 from simharness.scenario.sections.detector_section import HeatmapHeadSection
@@ -170,7 +170,7 @@ def test_the_method_uses_rivals():
     for others in (none, rivals):
         maps = Peaks(boxes, keypoints, scores, others, HeatmapHeadSection(size="96x72")).heatmaps()
         detections = Detections(np.arange(4), keypoints, scores, boxes, np.full(4, 0.9), likelihoods=maps)
-        found = Pipeline.preset("full").estimate(rig, detections)
+        found = preset("full").estimate(rig, detections)
         assert len(found.joints) == 1
         assert np.linalg.norm(found.joints[0] - body, axis=-1).max() < 0.02
         spread.append(np.trace(found.covariance[0, knees], axis1=1, axis2=2))

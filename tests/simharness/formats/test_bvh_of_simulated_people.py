@@ -3,7 +3,7 @@
 import numpy as np
 
 import simharness
-from mvpose import COCO17, Pipeline
+from mvpose import COCO17, preset
 from mvpose.formats.joint_names import canonical
 from mvpose.formats.writers import write_people
 from mvpose.recording import People
@@ -23,7 +23,7 @@ def test_joints_of_the_files(tmp_path):
         "quickstart", overrides=["duration=0.8", "rate=25", "people.count=2", 'rendering.renderer="rays"']
     )
     recording = simharness.simulate(scenario)
-    tracks = Pipeline.preset("track-fast", period=0.04).track(recording.rig, recording.detections)
+    tracks = preset("track-fast", period=0.04).track(recording.rig, recording.detections)
     people = People.of_estimates(tracks, COCO17, 0.04)
     paths = {path.stem: path for path in write_people(people, tmp_path, formats=["bvh"])}
     distances, errors, errors_before = [], [], []

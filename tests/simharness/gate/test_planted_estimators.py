@@ -44,12 +44,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from mvpose import Estimate, Matching, Pipeline
+from mvpose import Estimate, Matching, preset
 
 
 class Same:
     def __init__(self):
-        self.method = Pipeline.preset("fast")
+        self.method = preset("fast")
 
     def estimate(self, rig, detections):
         return self.spoil(self.method.estimate(rig, detections), zlib.crc32(detections.keypoints.tobytes()))

@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 from typer.testing import CliRunner
 
-from mvpose import COCO17, Estimate, Pipeline, Rig
+from mvpose import COCO17, Estimate, Rig, preset
 from mvpose.cli.app import app
 from mvpose.formats.calibration.voxelpose import read_calibration
 from simharness.reality.evaluation import evaluate, score_estimates
@@ -44,7 +44,7 @@ def test_the_files_hold_what_python_gives_for_the_same_rig(shared_data, results,
     rig = Rig(read_calibration(shared_data / "shelf" / "calibration_shelf.json", size=size).cameras)
     numbers = zip(recording.detections, range(FRAMES), strict=True)
     frames = [replace(frame, time=np.full(5, number * 0.04)) for frame, number in numbers]
-    track = Pipeline.preset("track", period=0.04).track(rig, frames)
+    track = preset("track", period=0.04).track(rig, frames)
     for frame, estimate in zip(range(FRAMES - 10), track, strict=False):  # the last frames see one more within the lag
         np.testing.assert_allclose(estimates[frame, estimate.ids], estimate.joints, atol=1e-9)
         assert np.isfinite(estimates[frame]).any(axis=(1, 2)).sum() == len(estimate)
@@ -55,5 +55,5 @@ def test_their_pcp_is_that_of_the_evaluation(shared_data, estimates):
     recording = read_recording("shelf", shared_data / "shelf")
     of_files = [Estimate.of_joints(people[np.isfinite(people).any(axis=(1, 2))]) for people in estimates[:FRAMES]]
     pcp = score_estimates(recording, {"files": of_files}).summary()["variants"]["files"]["pcp"]
-    expected = evaluate(recording, {"track": Pipeline.preset("track", period=0.04)}).summary()["variants"]["track"]
+    expected = evaluate(recording, {"track": preset("track", period=0.04)}).summary()["variants"]["track"]
     assert pcp == pytest.approx(expected["pcp"], abs=0.2)

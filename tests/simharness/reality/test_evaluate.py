@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_recording import PERSON, Fixed, small_recording
 
-from mvpose import Detections, Estimate, Matching, Pipeline
+from mvpose import Detections, Estimate, Matching, preset
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.evaluation import evaluate
 from simharness.reality.recording_file import read_recording
@@ -63,7 +63,7 @@ def test_detections_of_one_view_with_one_label_are_counted():
 @pytest.mark.slow
 def test_shelf_reaches_the_goal_with_geometry_alone(shared_data):
     """With the true correspondences PCP is 97.2; the paper reports 96.9 for its full method."""
-    methods = {name: Pipeline.preset(name) for name in ("full", "fast")}
+    methods = {name: preset(name) for name in ("full", "fast")}
     variants = evaluate(read_recording("shelf", shared_data / "shelf"), methods).summary()["variants"]
     for name, scores in variants.items():
         assert scores["pcp"] >= 97.0, name

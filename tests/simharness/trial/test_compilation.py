@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import mvpose
-from mvpose import Camera, Detections, Pipeline, Rig
+from mvpose import Camera, Detections, Rig, preset
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS
 from simharness.scenario.load import load
 from simharness.trial.kernel_compilation import Compilation, compile_kernels, picture_kernels
@@ -44,9 +44,9 @@ def test_a_real_frame_compiles_nothing_more():
         assert any(module.startswith(f"mvpose.{stage}") for module, _ in before), stage
     for variant in PRESETS:
         seen = Detections.from_keypoints(np.repeat([0, 1, 2], 4), pixels, scores)
-        Pipeline.preset(variant).estimate(rig, replace(seen, descriptors=rng.random((12, 5))))
+        preset(variant).estimate(rig, replace(seen, descriptors=rng.random((12, 5))))
         if variant not in NEED_DESCRIPTORS:
-            Pipeline.preset(variant).estimate(rig, seen)
+            preset(variant).estimate(rig, seen)
     assert signatures() == before
 
 

@@ -14,6 +14,7 @@ from moments import crowd, moment, ring
 from trials import measured as measure
 from trials import simulated
 
+import mvpose
 from mvpose import Pipeline
 from mvpose.presets import PRESETS
 from simharness import assert_robust
@@ -48,7 +49,7 @@ class Custom:
     preset: str = "fast"
 
     def estimate(self, rig, detections):
-        return Pipeline.preset(self.preset).estimate(rig, detections)
+        return mvpose.preset(self.preset).estimate(rig, detections)
 
 
 class Silent:
@@ -106,7 +107,7 @@ class Needs:
 
 
 instance = Custom("no-3dps")
-pipeline = Pipeline.preset("hungarian")
+pipeline = mvpose.preset("hungarian")
 number = 3
 
 
@@ -220,7 +221,7 @@ class TestLoading:
 class TestAnswers:
     def test_estimates_are_those_of_the_object_and_timed(self, file):
         estimate = UserEstimator("custom", f"{file}:Silent").estimate(RIG, SEEN)
-        np.testing.assert_array_equal(estimate.joints, Pipeline.preset("fast").estimate(RIG, SEEN).joints)
+        np.testing.assert_array_equal(estimate.joints, mvpose.preset("fast").estimate(RIG, SEEN).joints)
         assert len(estimate) == 2
         assert 0 < estimate.timings["total"] < 60
 

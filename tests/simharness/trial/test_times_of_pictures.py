@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from moments import crowd, estimate_of, moment, recorded, ring
 
-from mvpose import Pipeline, Rig
+from mvpose import Rig, preset
 from simharness.scenario.load import load
 from simharness.trial.run_trial import run_trial
 
@@ -68,8 +68,8 @@ def test_the_readout_of_a_rolling_shutter_helps_trackers_only(trial):
     unknown = Rig([replace(camera, readout=0.0) for camera in result.detected.rig])
     assert all(camera.readout == 0.03 for camera in result.detected.rig)
     blind = {
-        "fast": [Pipeline.preset("fast").estimate(unknown, seen) for seen in frames],
-        "track-fast": list(Pipeline.preset("track-fast").track(unknown, frames)),
+        "fast": [preset("fast").estimate(unknown, seen) for seen in frames],
+        "track-fast": list(preset("track-fast").track(unknown, frames)),
     }
     for one, other in zip(blind["fast"], result.estimates["fast"], strict=True):
         assert one.joints.tobytes() == other.joints.tobytes()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from moments import crowd, moment, ring
 
-from mvpose import SHELF14, Detections, Estimate, Pipeline
+from mvpose import SHELF14, Detections, Estimate, preset
 from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
 from simharness.trial.archive import pack_detected, pack_estimates, unpack_detected, unpack_estimates
@@ -26,7 +26,7 @@ from mvpose import Estimate, Pipeline
 class Counting:
     # The score of everybody is the number of frames so far, in hundredths.
     def track(self, rig, frames):
-        fast = Pipeline.preset("fast")
+        fast = preset("fast")
         for number, detections in enumerate(frames, start=1):
             joints = fast.estimate(rig, detections).joints
             yield Estimate.of_joints(joints, scores=np.full(len(joints), number / 100))
@@ -37,7 +37,7 @@ class Late:
     def track(self, rig, frames):
         waiting = []
         for detections in frames:
-            waiting.append(Estimate.of_joints(Pipeline.preset("fast").estimate(rig, detections).joints))
+            waiting.append(Estimate.of_joints(preset("fast").estimate(rig, detections).joints))
             if len(waiting) > 2:
                 yield waiting.pop(0)
         yield from waiting
@@ -141,13 +141,13 @@ class TestOrder:
 
     def test_the_presets_are_those_of_mvpose(self, tracked):
         recording = tracked.recording
-        estimates = Pipeline.preset("track-fast", lag=0.2, period=0.1).track(recording.rig, recording.detections)
+        estimates = preset("track-fast", lag=0.2, period=0.1).track(recording.rig, recording.detections)
         assert of_bytes(estimates) == of_bytes(tracked.estimates["track-fast"])
 
     def test_the_lag_is_that_of_the_scenario(self, scenario):
         loaded = scenario("track-fast", lines="method.lag = 0.0")
         result = run_trial(loaded, until="estimate")
-        estimator = Pipeline.preset("track-fast", lag=0.0, period=0.1)
+        estimator = preset("track-fast", lag=0.0, period=0.1)
         estimates = estimator.track(result.recording.rig, result.recording.detections)
         assert of_bytes(estimates) == of_bytes(result.estimates["track-fast"])
 
@@ -230,7 +230,7 @@ def test_the_time_after_the_last_frame_is_shared_by_the_frames_that_waited_for_i
 def test_an_error_of_a_preset_names_the_frame():
     frames = [Detections.empty(), Detections.empty(SHELF14)]
     with pytest.raises(RunError, match=r"^frame 1: ValueError: a tracker serves one rig and one skeleton"):
-        track_frames(Pipeline.preset("track-fast"), RIG, frames)
+        track_frames(preset("track-fast"), RIG, frames)
 
 
 class TestArchives:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from moments import crowd, estimate_of, moment, recorded, ring
 from trials import simulated
 
-from mvpose import COCO17, Camera, Detections, Pipeline, Rig
+from mvpose import COCO17, Camera, Detections, Rig, preset
 from mvpose.estimate import Matching
 from mvpose.matching import Matcher
 from mvpose.reconstruction import PictorialStructure, Triangulation
@@ -24,7 +24,7 @@ from simharness.scoring.failures.substitution import perfect_detections, true_la
 RIG = ring(4)
 PEOPLE = crowd(3, spacing=1.2)
 MOMENT = moment(RIG, PEOPLE)
-FAST = Pipeline.preset("fast")
+FAST = preset("fast")
 VARIANTS = ("full", "fast", "no-matching")
 
 
@@ -72,18 +72,16 @@ def exchanging(affinity, view):
 class TestStages:
     @pytest.mark.parametrize("variant", VARIANTS)
     def test_exact_detections_have_no_failures(self, variant):
-        assert blamed(Pipeline.preset(variant), MOMENT) == []
+        assert blamed(preset(variant), MOMENT) == []
 
     @pytest.mark.parametrize("variant", VARIANTS)
     def test_a_phantom_in_all_views_is_blamed_on_detection_and_removed_by_true_labels(self, variant):
         phantom = moment(RIG, crowd(1, seed=9) + [0.0, 1.4, 0.0])
-        assert blamed(Pipeline.preset(variant), joined(MOMENT, phantom, person=-1)) == [
-            (-1, "ghost", "detection", True)
-        ]
+        assert blamed(preset(variant), joined(MOMENT, phantom, person=-1)) == [(-1, "ghost", "detection", True)]
 
     @pytest.mark.parametrize("variant", VARIANTS)
     def test_a_person_without_detections_is_blamed_on_detection_and_not_removed_by_true_labels(self, variant):
-        assert blamed(Pipeline.preset(variant), only(MOMENT[1].person != 1)) == [(1, "missed", "detection", False)]
+        assert blamed(preset(variant), only(MOMENT[1].person != 1)) == [(1, "missed", "detection", False)]
 
     def test_left_and_right_exchanged_in_most_views_is_blamed_on_detection(self):
         legs = np.array([COCO17.index(f"{side}_{part}") for part in ("knee", "ankle") for side in ("left", "right")])
@@ -236,10 +234,10 @@ class TestSubstitution:
 
     def test_a_pipeline_with_given_labels_keeps_its_other_stages(self):
         labels = np.arange(4)
-        labelled = with_labels(Pipeline.preset("fast"), labels)
+        labelled = with_labels(preset("fast"), labels)
         assert labelled.reconstruction == Triangulation()
         np.testing.assert_array_equal(labelled.labels, labels)
-        assert isinstance(with_labels(Pipeline.preset("no-matching"), labels).reconstruction, PictorialStructure)
+        assert isinstance(with_labels(preset("no-matching"), labels).reconstruction, PictorialStructure)
         assert with_labels(Fixed(PEOPLE, PEOPLE), labels) is None
 
     def test_people_with_true_labels_are_not_suppressed_as_duplicates(self):

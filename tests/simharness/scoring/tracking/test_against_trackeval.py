@@ -86,10 +86,10 @@ def test_scores_of_simulated_people(place, simulated):
 def simulated():
     """True joints of a second of a simulated scene, and the estimates of a tracker."""
     import simharness
-    from mvpose import Pipeline
+    from mvpose import preset
     from mvpose.tracking import Tracker, track
 
     scenario = simharness.load_scenario("quickstart", overrides=["duration=1", 'rendering.renderer="rays"'])
     recording = simharness.run_trial(scenario, until="detect").recording
     truth = np.stack([true.joints for true in recording.truth])
-    return truth, list(track(Tracker(Pipeline.preset("fast")), recording.rig, recording.detections))
+    return truth, list(track(Tracker(preset("fast")), recording.rig, recording.detections))
