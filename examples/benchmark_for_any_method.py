@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 import simharness
 from mvpose import Detections
 from mvpose.formats.calibration.panoptic import read_calibration
-from mvpose.formats.openpose import read_frame
+from mvpose.formats.detections.openpose import read_frame
 from mvpose.recording import People
 from mvpose.tracking import Tracker, TrackingModel, track
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 import simharness
 from mvpose import preset
 from mvpose.formats.calibration.voxelpose import read_calibration, write_calibration
-from mvpose.formats.openpose import people_file, read_frame
+from mvpose.formats.detections.openpose import people_file, read_frame
 
 
 def people_of(folder: Path, *, size: tuple[int, int], frames: int) -> None:

@@ -9,10 +9,9 @@ from pathlib import Path
 
 from mvpose.camera import Camera
 from mvpose.files.message_text import listed
+from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
+from mvpose.formats.detections.sources import Source, assign
 from mvpose.formats.pictures import PictureSource, of_cameras, open_pictures
-from mvpose.formats.views.assignment import assign
-from mvpose.formats.views.plausibility import UNKNOWN_SIZE
-from mvpose.formats.views.sources import Source
 
 _ABOUT, _ABOUT_SHARE = 3, 0.02  # pictures, and share of them, by which headers of videos are often wrong
 
@@ -52,7 +51,7 @@ def assigned(cameras: Sequence[Camera], sources: Sequence[PictureSource]) -> lis
     """Return the pictures of each camera, found by the names of the cameras.
 
     Raises:
-        ValueError: as :func:`mvpose.formats.views.assignment.assign`.
+        ValueError: as :func:`mvpose.formats.detections.sources.assign`.
     """
     by_path = {source.path: source for source in sources}
     named = [Source(source.name, source.path) for source in sources]

@@ -97,8 +97,8 @@ def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: N
     """
     with exit_on_error(left=_LEFT):
         from mvpose.cli.camera_pictures import assigned, check_lengths, check_sizes, common_rate, open_videos
-        from mvpose.formats.calibration.registry import read_calibration
-        from mvpose.formats.views.plausibility import UNKNOWN_SIZE
+        from mvpose.formats.calibration.calibration_formats import read_calibration
+        from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
 
         folder = wanted.out.absolute()
         detections = folder.with_name(f"{folder.name}-detections")

@@ -130,9 +130,9 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
         ValueError: anything wrong with a file or an option.
     """
     from mvpose.cli.progress import bar
-    from mvpose.formats.calibration.registry import read_calibration
-    from mvpose.formats.views import plausibility
-    from mvpose.formats.views.recording import read_recording
+    from mvpose.formats.calibration.calibration_formats import read_calibration
+    from mvpose.formats.detections import plausibility
+    from mvpose.formats.detections.recorded_frames import read_recording
 
     if choices.fps is not None and choices.times is not None:
         raise ValueError("--fps and --times: give one of them")

@@ -98,7 +98,7 @@ def write_new(original: Path, path: Path, rig: Rig) -> None:
         ValueError: the format cannot hold the rig.
         OSError: a file cannot be written.
     """
-    from mvpose.formats.calibration.registry import write_like
+    from mvpose.formats.calibration.calibration_formats import write_like
 
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=".", suffix=".partial") as partial:

@@ -12,7 +12,7 @@ from mvpose.cli.inputs import Inputs
 from mvpose.cli.output_folder import RESULTS
 from mvpose.cli.progress import bar
 from mvpose.files.atomic_files import atomic_folder
-from mvpose.formats.writers import Options, check_formats, write_people
+from mvpose.formats.people import Options, check_formats, write_people
 from mvpose.recording import People
 
 if TYPE_CHECKING:

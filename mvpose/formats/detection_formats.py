@@ -7,8 +7,8 @@ mvpose as a library call :func:`register` instead.
 
 from __future__ import annotations
 
-from mvpose.formats import coco_results, openpose
 from mvpose.formats.detection_files import ReadDetections
+from mvpose.formats.detections import coco_results, openpose
 
 FORMATS: dict[str, ReadDetections] = {
     "openpose": openpose.read_detections,

@@ -24,7 +24,7 @@ def read_people(path: str | Path, *, skeleton: Skeleton = COCO17) -> People:
     """Read tracked people.
 
     Args:
-        path: a folder of results, or the table in it (:mod:`mvpose.formats.writers.tables`).
+        path: a folder of results, or the table in it (:mod:`mvpose.formats.people.people_tables`).
         skeleton: joints to read; other joints of the table are left out, and joints that it lacks are missing.
 
     Returns:

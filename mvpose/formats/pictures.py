@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.files.input_files import read_bytes
-from mvpose.formats.openpose import file_numbers, natural_order
+from mvpose.formats.detections.openpose import file_numbers, natural_order
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 """Endings of pictures in folders."""

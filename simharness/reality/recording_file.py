@@ -20,7 +20,7 @@ from pydantic import ValidationError
 
 from mvpose import Rig
 from mvpose.files.message_text import all_in_one_line, one_line
-from mvpose.formats.calibration.registry import read_calibration
+from mvpose.formats.calibration.calibration_formats import read_calibration
 from mvpose.formats.detection_files import DetectionFiles
 from mvpose.formats.detection_formats import FORMATS as DETECTION_FORMATS
 from mvpose.formats.joint_names import JointNames, to_shelf14

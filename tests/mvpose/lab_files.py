@@ -8,8 +8,8 @@ import numpy as np
 from people import STANDING, look_at
 
 from mvpose import COCO17, Rig
+from mvpose.formats.detections.openpose import people_file
 from mvpose.formats.joint_names import KNOWN
-from mvpose.formats.openpose import people_file
 
 WALKERS = np.stack([STANDING + [-0.9, 0.4, 0.0], STANDING * [1, 1, 1.05] + [0.6, -0.5, 0.0]])
 

@@ -13,10 +13,10 @@ from typing import Any
 
 from mvpose import Rig
 from mvpose.files.message_text import listed, shown
-from mvpose.formats.calibration.calibration_format import CalibrationFile
+from mvpose.formats.calibration.calibration_file import CalibrationFile
 from mvpose.formats.calibration.camera_entry import is_camera, read_camera
 from mvpose.formats.calibration.opencv import values_of, write_values
-from mvpose.formats.openpose import natural_order
+from mvpose.formats.detections.openpose import natural_order
 
 SUFFIXES = (".json", ".yml", ".yaml", ".xml", ".toml")
 """Endings of calibration files."""

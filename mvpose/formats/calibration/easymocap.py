@@ -14,8 +14,8 @@ from typing import Any
 from scipy.spatial.transform import Rotation
 
 from mvpose import Camera, Rig
-from mvpose.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
-from mvpose.formats.calibration.entries import camera, check_names, image_size
+from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.camera_entry import camera, check_names, image_size
 from mvpose.formats.calibration.file_storage import matrix, missing_half, read_beside, write_storage
 
 _EXPECTS = "a list names, and for each name K_, dist_, R_ or Rot_, and T_"

@@ -20,11 +20,16 @@ from typing import Any
 import numpy as np
 
 from mvpose import Camera, Rig
-from mvpose.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
-from mvpose.formats.calibration.camera_entry import is_camera, read_camera
-from mvpose.formats.calibration.entries import check_names
-from mvpose.formats.calibration.file_storage import matrix, missing_half, read_beside, read_storage, write_storage
-from mvpose.formats.calibration.storage_values import with_matrices
+from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.camera_entry import check_names, is_camera, read_camera
+from mvpose.formats.calibration.file_storage import (
+    matrix,
+    missing_half,
+    read_beside,
+    read_storage,
+    with_matrices,
+    write_storage,
+)
 
 _K = ("camera_matrix", "K", "cameraMatrix", "intrinsics", "M")  # of a stereo pair, with 1 and 2 appended
 _TERMS = ("distortion_coefficients", "dist", "distCoeffs", "distortion", "D")

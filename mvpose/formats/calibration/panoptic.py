@@ -16,9 +16,8 @@ import numpy as np
 from mvpose import Camera, Rig
 from mvpose.checks import as_array
 from mvpose.files.input_files import CALIBRATION, read_json_object
-from mvpose.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
-from mvpose.formats.calibration.camera_entry import is_camera
-from mvpose.formats.calibration.entries import camera, check_names, image_size
+from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.camera_entry import camera, check_names, image_size, is_camera
 
 _KEYS = ("name", "resolution", "K", "distCoef", "R", "t")
 _EXPECTS = "{'cameras': [{" + ", ".join(_KEYS) + "}, ...]}"

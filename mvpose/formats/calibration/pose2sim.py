@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 from mvpose import Camera, Rig
 from mvpose.files.input_files import CALIBRATION, parse_toml, read_bytes
 from mvpose.files.message_text import one_line, shown
-from mvpose.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
-from mvpose.formats.calibration.entries import camera, check_names, image_size
+from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.camera_entry import camera, check_names, image_size
 
 _KEYS = ("size", "matrix", "distortions", "rotation", "translation")
 _METADATA = "metadata"

@@ -16,8 +16,8 @@ import numpy as np
 from mvpose import Camera, Rig
 from mvpose.checks import as_array
 from mvpose.files.input_files import CALIBRATION, read_json_object
-from mvpose.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
-from mvpose.formats.calibration.entries import check_names
+from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.camera_entry import check_names
 
 _KEYS = ("fx", "fy", "cx", "cy", "R", "T", "k", "p")
 _EXPECTS = "an object of cameras, each with " + ", ".join(_KEYS)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mvpose import Detections, Rig
 from mvpose.files.atomic_files import atomic_folder
-from mvpose.formats.openpose import people_file
+from mvpose.formats.detections.openpose import people_file
 from mvpose.skeleton import PANOPTIC19
 from simharness.formats.panoptic_poses import body_scene, confidences
 from simharness.outputs.benchmark.cameras import hd_names, renamed, write_cameras

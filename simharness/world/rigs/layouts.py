@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.camera import Camera, Rig
-from mvpose.formats.calibration.registry import read_calibration
-from mvpose.formats.views.plausibility import UNKNOWN_SIZE
+from mvpose.formats.calibration.calibration_formats import read_calibration
+from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.types.random_streams import stream
 from simharness.world.rigs.camera_positions import camera_positions

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.camera import Camera, Rig
-from mvpose.formats.calibration.selection import select
+from mvpose.formats.calibration.calibration_formats import select
 
 # HD cameras of the Panoptic Studio. cmu0 to cmu4: the rigs used to test transfer of methods between rigs; the others
 # are cmu0 with fewer or more cameras, each set a prefix of the next.

@@ -11,7 +11,7 @@ from mvpose import Rig
 from mvpose.calibration import Repair
 from mvpose.cli.app import app
 from mvpose.formats.calibration import easymocap, pose2sim
-from mvpose.formats.calibration.registry import read_calibration
+from mvpose.formats.calibration.calibration_formats import read_calibration
 
 NAMES = ["cam0", "cam1", "cam2", "cam3"]
 

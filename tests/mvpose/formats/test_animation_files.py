@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from mvpose import COCO17, preset
 from mvpose.formats.calibration.voxelpose import read_calibration
 from mvpose.formats.detection_files import DetectionFiles
+from mvpose.formats.detections.openpose import read_detections
 from mvpose.formats.joint_names import canonical
-from mvpose.formats.openpose import read_detections
-from mvpose.formats.writers import FORMATS, Export, Options
+from mvpose.formats.people import FORMATS, Export, Options
 from mvpose.recording import People
 from mvpose.skeleton_fit.body import Body
 from mvpose.skeleton_fit.kinematics import Pose

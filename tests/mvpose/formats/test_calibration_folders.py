@@ -9,8 +9,8 @@ from lab_files import studio
 
 from mvpose import Rig
 from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
+from mvpose.formats.calibration.calibration_formats import read_calibration, write_like
 from mvpose.formats.calibration.file_storage import write_storage
-from mvpose.formats.calibration.registry import read_calibration, write_like
 
 RIG = studio()
 SIZE = (1280, 960)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mvpose import Camera, Rig
-from mvpose.formats.calibration import registry
-from mvpose.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
-from mvpose.formats.calibration.registry import read_calibration, register
+from mvpose.formats.calibration import calibration_formats
+from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.calibration_formats import read_calibration, register
 
 LINES = "toy calibration\nleft 500 0 0\nright 500 1 0\nback 500 1 1\n"
 
@@ -30,7 +30,7 @@ TOY = CalibrationFormat(
 
 @pytest.fixture
 def toy_file(tmp_path, monkeypatch):
-    monkeypatch.setattr(registry, "FORMATS", list(registry.FORMATS))
+    monkeypatch.setattr(calibration_formats, "FORMATS", list(calibration_formats.FORMATS))
     path = tmp_path / "rig.toy"
     path.write_text(LINES)
     return path
@@ -54,7 +54,7 @@ def test_the_message_about_an_unknown_file_lists_what_is_registered(toy_file):
     register(TOY)
     with pytest.raises(ValueError, match=r"expected one of Toy \(text\): lines of name, foc") as after:
         read_calibration(toy_file, size=(640, 480))
-    for name in (each.name for each in registry.FORMATS[1:]):
+    for name in (each.name for each in calibration_formats.FORMATS[1:]):
         assert name in str(before.value)
         assert name in str(after.value)
 
@@ -62,7 +62,7 @@ def test_the_message_about_an_unknown_file_lists_what_is_registered(toy_file):
 def test_every_shipped_format_recognises_what_it_writes(tmp_path):
     K = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
     rig = Rig([Camera(K=K, R=np.eye(3), t=np.array([k, 0.0, 2.0]), size=(640, 480), name=f"c{k}") for k in (0, 1)])
-    written = [each for each in registry.FORMATS if each.write is not None]
+    written = [each for each in calibration_formats.FORMATS if each.write is not None]
     assert len(written) >= 5
     for each in written:
         folder = tmp_path / each.name

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mvpose import COCO17
-from mvpose.formats.coco_results import read_detections
 from mvpose.formats.detection_files import DetectionFiles
+from mvpose.formats.detections.coco_results import read_detections
 from mvpose.formats.joint_names import KNOWN, JointNames
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mvpose import COCO17
-from mvpose.formats.openpose import read_frame, read_people
+from mvpose.formats.detections.openpose import read_frame, read_people
 
 # OpenPose's own names of BODY_25, from its documentation of the output format.
 # fmt: off

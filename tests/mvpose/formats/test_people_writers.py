@@ -10,8 +10,8 @@ import pytest
 
 from mvpose import COCO17, Skeleton
 from mvpose.formats.joint_names import canonical
-from mvpose.formats.writers import FORMATS, Export, Options, PeopleFormat, check_formats, register, write_people
-from mvpose.formats.writers.export import marker_label
+from mvpose.formats.people import FORMATS, Export, Options, PeopleFormat, check_formats, register, write_people
+from mvpose.formats.people.people_files import marker_label
 from mvpose.recording import People
 
 J = len(COCO17)
@@ -170,7 +170,7 @@ class TestTables:
 
     def test_covariances_turn_with_the_axes(self):
         pytest.importorskip("polars")
-        from mvpose.formats.writers.tables import table
+        from mvpose.formats.people.people_tables import table
 
         people = recording()
         upright, turned = (table(Export(people, Options(up=up))) for up in ("z", "y"))

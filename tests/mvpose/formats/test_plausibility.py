@@ -7,7 +7,7 @@ import pytest
 from people import look_at, ring
 
 from mvpose import Rig
-from mvpose.formats.views.plausibility import (
+from mvpose.formats.detections.plausibility import (
     UNKNOWN_SIZE,
     check_extents,
     check_principal_points,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mvpose import COCO17
-from mvpose.formats.writers import Options, write_people
+from mvpose.formats.people import Options, write_people
 from mvpose.recording import People
 
 FRAMES = range(3, 9)  # in which the person is there

@@ -15,9 +15,8 @@ from lab_files import (
     write_rtmlib_arrays,
 )
 
-from mvpose.formats.views.assignment import assign
-from mvpose.formats.views.recording import read_recording
-from mvpose.formats.views.sources import Source, find_sources
+from mvpose.formats.detections.recorded_frames import read_recording
+from mvpose.formats.detections.sources import Source, assign, find_sources
 
 NAMES = ["cam0", "cam1", "cam2", "cam3"]
 

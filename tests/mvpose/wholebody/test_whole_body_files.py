@@ -12,7 +12,7 @@ from whole_people import standing
 from mvpose import COCO17, Detections
 from mvpose.cli.app import app
 from mvpose.formats.calibration import pose2sim
-from mvpose.formats.views.recording import read_recording
+from mvpose.formats.detections.recorded_frames import read_recording
 from mvpose.wholebody import body_part, read_skeleton, register, skeleton_by_name
 
 NAMES = ["cam0", "cam1", "cam2", "cam3"]

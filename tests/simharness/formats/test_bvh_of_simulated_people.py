@@ -5,7 +5,7 @@ import numpy as np
 import simharness
 from mvpose import COCO17, preset
 from mvpose.formats.joint_names import canonical
-from mvpose.formats.writers import write_people
+from mvpose.formats.people import write_people
 from mvpose.recording import People
 from simharness.world.motion.mocap.bvh import read_bvh
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mvpose import COCO17
-from mvpose.formats.writers import Options, write_people
+from mvpose.formats.people import Options, write_people
 from mvpose.recording import People
 from mvpose.skeleton import PANOPTIC19
 from simharness.formats.joint_tracks import TrackFiles

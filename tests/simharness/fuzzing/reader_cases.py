@@ -20,7 +20,7 @@ from test_store import make_record
 from test_track_formats import cells, tracks, write_c3d, write_mat, write_trc
 
 from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
-from mvpose.formats.calibration.registry import read_calibration
+from mvpose.formats.calibration.calibration_formats import read_calibration
 from mvpose.formats.detection_files import DetectionFiles
 from mvpose.formats.detection_formats import FORMATS as DETECTIONS
 from mvpose.networks import Session

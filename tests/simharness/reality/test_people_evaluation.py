@@ -10,8 +10,8 @@ from small_recording import PERSON, small_recording
 from typer.testing import CliRunner
 
 from mvpose import COCO17, Skeleton
+from mvpose.formats.people import write_people
 from mvpose.formats.people_table import read_people
-from mvpose.formats.writers import write_people
 from mvpose.recording import People
 from simharness.cli import app
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence

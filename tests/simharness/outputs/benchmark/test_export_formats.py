@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mvpose import COCO17
+from mvpose.formats.detections.openpose import people_file, read_people
 from mvpose.formats.joint_names import BODY_25
-from mvpose.formats.openpose import people_file, read_people
 from mvpose.skeleton import PANOPTIC19
 from mvpose.wholebody import skeleton_by_name
 from simharness.formats.panoptic_poses import body_scene, confidences

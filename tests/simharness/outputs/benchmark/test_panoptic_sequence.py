@@ -15,7 +15,7 @@ from trials import simulated
 
 from mvpose import COCO17
 from mvpose.formats.calibration.panoptic import read_calibration
-from mvpose.formats.openpose import read_frame
+from mvpose.formats.detections.openpose import read_frame
 from mvpose.skeleton import PANOPTIC19
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
 from simharness.runtime.errors import RunError

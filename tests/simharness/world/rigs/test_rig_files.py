@@ -3,8 +3,8 @@ import pytest
 
 from mvpose.camera import Camera, Rig
 from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
+from mvpose.formats.calibration.calibration_formats import read_calibration
 from mvpose.formats.calibration.file_storage import write_storage
-from mvpose.formats.calibration.registry import read_calibration
 from simharness.scenario.load import load
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.world.rigs.layouts import aligned, build_rig, look_at

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.formats.writers.export import marker_label
+from mvpose.formats.people.people_files import marker_label
 from mvpose.recording import People
 from mvpose.skeleton_fit import FittedBody
 

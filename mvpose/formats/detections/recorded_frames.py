@@ -11,10 +11,9 @@ import numpy as np
 from mvpose.arrays import Floats, Integers
 from mvpose.detections import Detections
 from mvpose.files.message_text import listed
+from mvpose.formats.detections.sources import Assignment, assign, find_sources
+from mvpose.formats.detections.view_people import Picture, ViewPeople, read_view
 from mvpose.formats.joint_names import JointNames
-from mvpose.formats.views.assignment import Assignment, assign
-from mvpose.formats.views.sources import find_sources
-from mvpose.formats.views.view_people import Picture, ViewPeople, read_view
 from mvpose.skeleton import COCO17, Skeleton
 from mvpose.wholebody import skeleton_by_name, with_body_boxes
 
@@ -81,7 +80,7 @@ def read_recording(
 
     Args:
         cameras: names of the V cameras, in the order of the rig.
-        paths: see :func:`mvpose.formats.views.sources.find_sources`.
+        paths: see :func:`mvpose.formats.detections.sources.find_sources`.
         skeleton: joints of the files; None: by their number.
         all_joints: keep the joints beyond COCO-17, on a skeleton of :mod:`mvpose.wholebody`.
         frames: first and last frame to take, by the numbers in the files; None: all.

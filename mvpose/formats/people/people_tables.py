@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mvpose.formats.writers.export import Export
+from mvpose.formats.people.people_files import Export
 
 _COVARIANCE = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2), "yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
 
@@ -58,3 +58,12 @@ def table(export: Export) -> Any:
     if people.covariance is None:
         result = result.with_columns(pl.lit(None, pl.Float64).alias(f"cov_{name}") for name in _COVARIANCE)
     return result
+
+
+def write_lengths(export: Export) -> Iterator[tuple[str, bytes]]:
+    """Yield the bone lengths of each person, from its fitted body: person, bone, metres.
+
+    Both sides of the body have the same lengths; ``hip`` and ``shoulder`` are half the distance between both sides.
+    """
+    lines = [f"{fit.identity},{bone},{metres:.4f}" for fit in export.bodies for bone, metres in fit.lengths.items()]
+    yield "bone_lengths.csv", ("\n".join(["person,bone,metres", *lines]) + "\n").encode()

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mvpose.formats.writers.export import Export
+from mvpose.formats.people.people_files import Export
 
 _DECIMALS = 6  # micrometres, microseconds
 

@@ -24,9 +24,9 @@ from mvpose.arrays import Floats
 from mvpose.files.archives import arrays_of
 from mvpose.files.input_files import read_bytes, read_json
 from mvpose.files.message_text import listed, shown
-from mvpose.formats import coco_results, openpose
+from mvpose.formats.detections import coco_results, openpose
+from mvpose.formats.detections.sources import SUFFIXES, Source
 from mvpose.formats.joint_names import KNOWN, JointNames, to_coco17
-from mvpose.formats.views.sources import SUFFIXES, Source
 from mvpose.skeleton import COCO17
 from mvpose.wholebody import known_names
 

@@ -10,8 +10,7 @@ from typing import Literal
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.formats.writers.uniform import uniform
-from mvpose.recording import People
+from mvpose.recording import People, uniform
 from mvpose.skeleton_fit import FittedBody, fit_bodies
 
 Up = Literal["z", "y"]

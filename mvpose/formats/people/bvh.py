@@ -14,8 +14,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from mvpose.formats.writers.animation import Hierarchy, hierarchy
-from mvpose.formats.writers.export import Export
+from mvpose.formats.people.animation import Hierarchy, hierarchy
+from mvpose.formats.people.people_files import Export
 
 _UNIT = 100.0  # centimetres in a metre
 _ORDER = "ZXY"

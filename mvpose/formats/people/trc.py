@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mvpose.formats.writers.export import Export, each_person, marker_label
+from mvpose.formats.people.people_files import Export, each_person, marker_label
 
 _KEYS = (
     "DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame", "OrigNumFrames",

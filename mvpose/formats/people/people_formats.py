@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mvpose.files.atomic_files import write_atomic
-from mvpose.formats.writers import bone_lengths, bvh, c3d, gltf, panoptic, people_json, rerun, tables, trc
-from mvpose.formats.writers.export import Export, Options
+from mvpose.formats.people import bvh, c3d, gltf, panoptic_poses, people_json, people_tables, rerun, trc
+from mvpose.formats.people.people_files import Export, Options
 from mvpose.recording import People
 
 
@@ -38,13 +38,13 @@ class PeopleFormat:
 FORMATS: dict[str, PeopleFormat] = {
     "trc": PeopleFormat(trc.write, "person_ID.trc"),
     "c3d": PeopleFormat(c3d.write, "person_ID.c3d, or people.c3d", ("c3d",)),
-    "csv": PeopleFormat(tables.write_csv, "poses.csv", ("polars",)),
-    "parquet": PeopleFormat(tables.write_parquet, "poses.parquet", ("polars",)),
+    "csv": PeopleFormat(people_tables.write_csv, "poses.csv", ("polars",)),
+    "parquet": PeopleFormat(people_tables.write_parquet, "poses.parquet", ("polars",)),
     "json": PeopleFormat(people_json.write, "people.json"),
-    "panoptic": PeopleFormat(panoptic.write, "hdPose3d/body3DScene_FRAME.json"),
+    "panoptic": PeopleFormat(panoptic_poses.write, "hdPose3d/body3DScene_FRAME.json"),
     "bvh": PeopleFormat(bvh.write, "person_ID.bvh"),
     "gltf": PeopleFormat(gltf.write, "people.glb"),
-    "lengths": PeopleFormat(bone_lengths.write, "bone_lengths.csv"),
+    "lengths": PeopleFormat(people_tables.write_lengths, "bone_lengths.csv"),
     "rrd": PeopleFormat(rerun.write, "people.rrd", ("rerun",), "rerun-sdk"),
 }
 """Registered formats by name."""
@@ -82,7 +82,7 @@ def write_people(
     Args:
         people: people of a recording.
         folder: folder of the files.
-        formats: names of formats in :data:`mvpose.formats.writers.registry.FORMATS`.
+        formats: names of formats in :data:`mvpose.formats.people.people_formats.FORMATS`.
         options: choices that formats leave open.
 
     Returns:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mvpose.arrays import Bools
-from mvpose.formats.writers.export import Export
+from mvpose.formats.people.people_files import Export
 from mvpose.skeleton import Skeleton
 
 _COLORS = ((31, 119, 180), (255, 127, 14), (44, 160, 44), (214, 39, 40), (148, 103, 189), (140, 86, 75))  # by person

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.formats.writers.export import Export, each_person, marker_label
+from mvpose.formats.people.people_files import Export, each_person, marker_label
 from mvpose.recording import People
 
 _MOST_TEXTS = 255  # of a parameter; the following ones are in LABELS2, LABELS3 and so on

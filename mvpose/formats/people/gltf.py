@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from mvpose.formats.writers.animation import Hierarchy, hierarchy
-from mvpose.formats.writers.export import AXES, Export
+from mvpose.formats.people.animation import Hierarchy, hierarchy
+from mvpose.formats.people.people_files import AXES, Export
 
 _FLOAT, _SHORT = 5126, 5123  # component types
 _VERTICES, _TRIANGLES = 34962, 34963  # targets of buffer views

@@ -3,8 +3,8 @@
 To add a format, write one module and register it once:
 
 1. a module beside this one with a function ``read(path, *, size, only) -> Rig`` of at least two cameras
-   (:mod:`.voxelpose` is an example; :mod:`.entries` converts the numbers of one camera, with messages that name it),
-   and a constant ``FORMAT``, a :class:`~mvpose.formats.calibration.calibration_format.CalibrationFormat`. Its
+   (:mod:`.voxelpose` is an example; :mod:`.camera_entry` converts the numbers of one camera, with messages that name
+   it), and a constant ``FORMAT``, a :class:`~mvpose.formats.calibration.calibration_file.CalibrationFormat`. Its
    ``recognises`` looks at the content: ``lambda file: "my_cameras" in (file.json or {})``, or at ``file.content``, the
    bytes of a text file;
 2. ``FORMAT`` in the list :data:`FORMATS` below, before more general formats. Programs that use mvpose as a library
@@ -15,17 +15,17 @@ Readers convert to our conventions: metres, z up, ``x_cam = R x + t``, OpenCV's 
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from mvpose import Rig
+from mvpose import Camera, Rig
 from mvpose.files.message_text import one_line
 from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
-from mvpose.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
 from mvpose.formats.calibration.camera_folder import only_file, read_folder, suffix_of, write_folder
-from mvpose.formats.calibration.selection import select
 
 FORMATS: list[CalibrationFormat] = [
     panoptic.FORMAT,
@@ -113,3 +113,30 @@ def read_calibration(
         return select(rig, only, key=key)
     except ValueError as error:
         raise ValueError(one_line(f"{path}: {error}")) from None
+
+
+_SHOWN = 12  # names that a message repeats
+
+
+def select(cameras: Sequence[Camera] | Rig, only: Sequence[str], *, key: str = "cameras.only") -> Rig:
+    """Return the rig of the cameras named in ``only``, in that order; of all cameras where ``only`` is empty.
+
+    ``key`` is the key that holds the names, for messages.
+
+    Raises:
+        ValueError: a name that no camera has, a name given twice, or fewer than two names.
+    """
+    if not only:
+        return Rig(list(cameras))
+    by_name = {camera.name: camera for camera in cameras}
+    for name in only:
+        if name not in by_name:
+            near = difflib.get_close_matches(name, by_name, n=1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            known = ", ".join(list(by_name)[:_SHOWN]) + (", ..." if len(by_name) > _SHOWN else "")
+            raise ValueError(f"{key}: the rig has no camera {name!r}; {hint}its {len(by_name)} cameras are {known}")
+        if list(only).count(name) > 1:
+            raise ValueError(f"{key}: {name!r} is given more than once; remove the repetition")
+    if len(only) < 2:
+        raise ValueError(f"{key}: expected at least 2 cameras, to triangulate, got {len(only)}")
+    return Rig([by_name[name] for name in only])

@@ -30,7 +30,7 @@ def with_sizes(rig: Rig, extents: Floats, *, size: tuple[int, int] | None = None
 
     Args:
         rig: cameras, of which some have :data:`UNKNOWN_SIZE`.
-        extents: region of the keypoints, (V, 2, 2), :meth:`mvpose.formats.views.recording.RecordedFrames.extents`.
+        extents: region of the keypoints, (V, 2, 2), :meth:`.RecordedFrames.extents`.
         size: width and height, pixels.
 
     Returns:

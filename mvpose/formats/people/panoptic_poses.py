@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.formats.writers.export import Export
+from mvpose.formats.people.people_files import Export
 
 _VERSION = 0.7  # of the dataset's files
 _DECIMALS = 4  # of centimetres: micrometres
