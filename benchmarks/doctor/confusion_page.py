@@ -23,7 +23,7 @@ _TEMPLATES = Path(__file__).parent / "templates"
 def write_page(folder: Path) -> None:
     """Write ``confusion.html`` of a folder from its ``doctor.json``: requirements, and alarms by fault."""
     summary = json.loads((folder / "doctor.json").read_text())
-    rows = [Row(**row) for row in summary["bars"]]
+    rows = [Row(**row) for row in summary["bounds"]]
     matrix = {fault: Counter(counts) for fault, counts in summary["confusion"].items()}
     (folder / "confusion.html").write_text(_page(rows, matrix))
 

@@ -56,7 +56,7 @@ def trials(recordings: Mapping[str, BenchRecording], draws: int | None = None) -
 
     Args:
         recordings: recordings by name.
-        draws: number of draws of each case, instead of those of the issue.
+        draws: number of draws of each case, instead of the usual number.
     """
     names = list(recordings)
     rigs, shelf = [name for name in names if name.startswith("rig")], [name for name in names if name == "shelf"]

@@ -59,7 +59,7 @@ def write(path: Path, recordings: Iterable[BenchRecording]) -> None:
 
 
 class Recordings(Mapping[str, BenchRecording]):
-    """Recordings of a file by name; each is read when it is asked for.
+    """Recordings of a file by name; each is read when it is first needed.
 
     Raises:
         ValueError: no such file.

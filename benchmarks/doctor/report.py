@@ -1,4 +1,4 @@
-"""Tables of the benchmark: each bar with what was measured, and faults against findings."""
+"""Tables of the benchmark: each bound with what was measured, and faults against findings."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ _DIAGNOSED = ("clean", "moved", "conventions", "faults", "refusals")
 
 @dataclass(frozen=True)
 class Row:
-    """One bar.
+    """One figure beside its bound.
 
     Attributes:
         what: what is measured.
-        bar: what is asked for.
+        bound: what the share or the error is bounded by.
         measured: what was measured, as text.
-        met: whether the bar is met; None without a bar.
+        met: whether the bound is met; None without a bound.
         trials: number of trials.
     """
 
     what: str
-    bar: str
+    bound: str
     measured: str
     met: bool | None
     trials: int
 
 
 def rows_of(results: Results) -> list[Row]:
-    """Return the bars that the results say something about."""
+    """Return the bounds about which the results say something."""
     by: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
     for key, result in results.items():
         experiment, recording, case, _ = key.split("/")
@@ -101,7 +101,7 @@ def print_report(results: Results) -> None:
     """Print both tables."""
     for row in rows_of(results):
         mark = {True: "✓", False: "✗", None: " "}[row.met]
-        print(f"{row.what:62s} {row.bar:26s} {mark} {row.measured}  ({row.trials})")
+        print(f"{row.what:62s} {row.bound:26s} {mark} {row.measured}  ({row.trials})")
     matrix = confusion_of(results)
     if matrix:
         print("\nalarms by fault, recordings:")
@@ -111,11 +111,11 @@ def print_report(results: Results) -> None:
 
 
 def write_report(results: Results, folder: Path) -> None:
-    """Write bars, confusion matrix and misses into a folder: ``doctor.json``, ``doctor.md``, ``confusion.html``."""
+    """Write bounds, confusion matrix and misses into a folder: ``doctor.json``, ``doctor.md``, ``confusion.html``."""
     folder.mkdir(parents=True, exist_ok=True)
     rows, matrix, misses = rows_of(results), confusion_of(results), misses_of(results)
     summary = {
-        "bars": [asdict(row) for row in rows],
+        "bounds": [asdict(row) for row in rows],
         "confusion": {fault: dict(counts) for fault, counts in matrix.items()},
         "misses": misses,
     }
@@ -127,13 +127,13 @@ def write_report(results: Results, folder: Path) -> None:
 
 
 def _share(
-    what: str, results: Sequence[Mapping[str, Any]], key: str, bar: float | None, *, most: bool = False
+    what: str, results: Sequence[Mapping[str, Any]], key: str, bound: float | None, *, most: bool = False
 ) -> Row | None:
     if not results:
         return None
     share = 100.0 * float(np.mean([each[key] for each in results]))
-    met = None if bar is None else share <= bar if most else share >= bar
-    text = "" if bar is None else f"{'<=' if most else '>='} {bar:g} %"
+    met = None if bound is None else share <= bound if most else share >= bound
+    text = "" if bound is None else f"{'<=' if most else '>='} {bound:g} %"
     return Row(what, text, f"{share:.1f} %", met, len(results))
 
 
@@ -276,8 +276,8 @@ def _markdown(rows: Sequence[Row], matrix: Mapping[str, Counter[str]], misses: S
     marks = {True: "yes", False: "**no**", None: ""}
     kinds = kinds_of(matrix)
     lines = [
-        "# The doctor", "", "| what | bar | measured | met | trials |", "|---|---|---|---|---|",
-        *(f"| {row.what.strip()} | {row.bar} | {row.measured} | {marks[row.met]} | {row.trials} |" for row in rows),
+        "# The doctor", "", "| what | bound | measured | met | trials |", "|---|---|---|---|---|",
+        *(f"| {row.what.strip()} | {row.bound} | {row.measured} | {marks[row.met]} | {row.trials} |" for row in rows),
         "", "## Faults (rows) and alarms (columns), recordings with an alarm of each kind", "",
         f"| fault | recordings | {' | '.join(kinds)} |", "|---" * (len(kinds) + 2) + "|",
         *(

@@ -75,14 +75,14 @@ class SubsetFigures:
             f"{each!s:17} real {self.real[each]:5.1f}  predicted {self.predicted[each]:5.1f}" for each in self.real
         ]
         lines.append(
-            f"Spearman: {self.rank():.3f} over all (bar .93), {self.rank(2):.3f} over pairs (bar .85); "
-            f"mean absolute difference {self.mean_difference:.2f} (bar 3)"
+            f"Spearman: {self.rank():.3f} over all (bound .93), {self.rank(2):.3f} over pairs (bound .85); "
+            f"mean absolute difference {self.mean_difference:.2f} (bound 3)"
         )
         for size in sorted({len(each) for each in self.real}):
             chosen, best = self.chosen(size)
             lines.append(
                 f"best of {size}: predicted {chosen} with a real PCP of {self.real[chosen]:.1f}; really {best} with "
-                f"{self.real[best]:.1f}: {self.real[best] - self.real[chosen]:.1f} lost (bar 1)"
+                f"{self.real[best]:.1f}: {self.real[best] - self.real[chosen]:.1f} lost (bound 1)"
             )
         return "\n".join(lines)
 

@@ -167,7 +167,7 @@ def trials(count: int, first: int) -> None:
         print(
             f"seed {scenario.seed}: {len(scenario.cameras.positions)} cameras, {scenario.people.count} people: PCP "
             f"{real:.1f}, predicted {figure.value:.1f} ({figure.low:.1f} to {figure.high:.1f}); so far {inside} of "
-            f"{done} inside, {100 * inside / done:.1f} % (bar 85 to 95), mean difference {np.mean(apart):.2f}",
+            f"{done} inside, {100 * inside / done:.1f} % (bound 85 to 95), mean difference {np.mean(apart):.2f}",
             flush=True,
         )
 
@@ -225,8 +225,8 @@ def maps(count: int, first: int, recordings: int) -> None:
         )
         simulated_error, expected, *parts = np.array(pairs).T
         print(
-            f"  so far {len(pairs)} places: {_agreement(simulated_error, expected)} (bars .9, 20 %); of the two halves "
-            f"of the recordings: {_agreement(*parts)}",
+            f"  so far {len(pairs)} places: {_agreement(simulated_error, expected)} (bound .9, 20 %); of the two "
+            f"halves of the recordings: {_agreement(*parts)}",
             flush=True,
         )
 

@@ -1,4 +1,4 @@
-"""Losses of pictures of a recording, and what is asked of the tracker then."""
+"""Losses of pictures of a recording, and the bounds of the tracker then."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _CYCLE, _DARK_FROM = 3.0, 2.0  # seconds: cycle of black pictures, and the time 
 
 @dataclass(frozen=True)
 class Loss:
-    """What is lost of a recording, and what is asked of the tracker then.
+    """What is lost of a recording, and the bounds of the tracker then.
 
     Attributes:
         name: name in the table.
@@ -24,9 +24,9 @@ class Loss:
         step: every how many frames one is left.
         black: whether all cameras are black for one second in every three.
         lag: lag of the smoother, seconds.
-        pcp: least PCP with the lag; None where nothing is asked.
+        pcp: least PCP with the lag; None without a bound.
         pcp_at_once: the same without a lag.
-        below_full: PCP by which the tracker may be below ``full`` on the same frames; None where nothing is asked.
+        below_full: PCP by which the tracker may be below ``full`` on the same frames; None without a bound.
         switches: most identity switches.
     """
 

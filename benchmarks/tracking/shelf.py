@@ -1,4 +1,4 @@
-"""Losses of pictures on real Shelf: the tracker beside what is asked of it.
+"""Losses of pictures on real Shelf: the tracker beside its bounds.
 
 The method without memory (``full``) gets the same pictures; its people are linked from frame to frame by distance, so
 that it has identities to compare.
@@ -22,7 +22,7 @@ from simharness.reality.evaluation import score_estimates
 from simharness.reality.recording_file import read_recording
 
 _DRAWS = 5  # of the pictures that are lost at random
-_SHORT_GHOSTS = 0.05  # in a frame, asked of the tracker where all pictures are there
+_SHORT_GHOSTS = 0.05  # in a frame, bound where all pictures are there
 _TRACKERS = {"track": "full", "track-fast": "fast"}  # stages of one frame
 _TITLES = ["full", "track, lag", "track", "track-fast, lag", "track-fast"]
 
@@ -38,9 +38,9 @@ class Figures:
         draws: number of draws.
         pcp: mean PCP of actors 1 to 3.
         worst_pcp: least PCP of a draw.
-        least_pcp: least PCP that is asked, or None.
+        least_pcp: lower bound of PCP, or None.
         switches: most identity switches of actors 1 to 4 in a draw.
-        most_switches: most switches that are asked, or None.
+        most_switches: upper bound of the switches, or None.
         short_ghosts: estimates in a frame that are none of the actors, and whose track lives under five frames.
         median_mm: median of the second differences of the joints, mm.
         high_mm: their 95th percentile, mm.
@@ -61,7 +61,7 @@ class Figures:
 
 
 class Shelf:
-    """Losses of pictures on real Shelf, the recording in this folder, beside what is asked.
+    """Losses of pictures on real Shelf, the recording in this folder, beside the bounds.
 
     Args:
         folder: folder of Shelf's calibration, truth and detections, as ``simharness evaluate shelf`` takes it.
@@ -79,7 +79,7 @@ class Shelf:
 
     def table_of(self, rows: list[Figures]) -> str:
         """Format the rows as text."""
-        lines, rules = [["Shelf, 300 frames", "", "asked: lag", "none", *_TITLES]], []
+        lines, rules = [["Shelf, 300 frames", "", "bound: lag", "none", *_TITLES]], []
         for loss in dict.fromkeys(row.loss for row in rows):
             cells = [row for row in rows if row.loss == loss]
             rules.append(len(lines) - 1)
@@ -135,9 +135,9 @@ def _at(loss: Loss, recording: AnnotatedRecording, draws: int) -> Iterator[Figur
     yield full
     equal = None if loss.below_full is None else full.pcp - loss.below_full
     for method, stages in _TRACKERS.items():
-        for lag, asked in ((loss.lag, loss.pcp), (0.0, loss.pcp_at_once)):
+        for lag, bound in ((loss.lag, loss.pcp), (0.0, loss.pcp_at_once)):
             runs = [list(track(Tracker(_pipeline(stages)), each.rig, each.detections, lag=lag)) for each in left]
-            yield _figures(loss, method, lag, left, runs, equal if asked is None else asked)
+            yield _figures(loss, method, lag, left, runs, equal if bound is None else bound)
 
 
 def _pipeline(name: str) -> Pipeline:

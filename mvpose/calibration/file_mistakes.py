@@ -1,6 +1,6 @@
 """Catalogue of mistakes in the files of a rig: what each one is called, how it is mended, and the reading without it.
 
-The prior of each mistake follows how often users report it (issues of Pose2Sim, caliscope, EasyMocap, OpenCV's forum):
+The prior of each mistake follows how often users report it (threads of Pose2Sim, caliscope, EasyMocap, OpenCV's forum):
 extrinsics from camera to world and units are the most frequent ones.
 """
 

@@ -58,7 +58,7 @@ def write_doctor_page(
         rig: the rig as it was given.
         frames: detections of each frame.
         diagnosis: what is wrong.
-        repair: the corrected rig, where one was asked for.
+        repair: the corrected rig, where there is one.
         sightings: keypoints matched over time and views; by default they are matched here, with the corrected rig where
             there is one (:func:`mvpose.calibration.gather`).
         clocks: offsets of the clocks of all cameras with intervals; by default those of findings and of the repair.

@@ -56,7 +56,7 @@ def write_page(
         people: people of the T frames.
         rig: V cameras.
         frames: detections of the T frames.
-        diagnosis: what the doctor found, where it was asked.
+        diagnosis: what the doctor found, where the recording was examined.
         doctor_page: address of the doctor's page, relative to the folder.
         pictures: function that returns the picture of a frame and view; by default people are drawn on plain ground.
         moving: pictures for a film of each camera, in a folder beside the page; without them there is none.

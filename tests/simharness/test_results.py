@@ -148,7 +148,7 @@ class TestFindings:
     """Every figure of a finding is one of a committed file, which an invisible comment behind it names."""
 
     FINDINGS = re.split(
-        r"\n(?=\d+\. )",
+        r"\n### (?=\d+\. )",
         re.search(r"## Ten findings\n(.*?)\n## ", (ROOT / "results" / "README.md").read_text(), re.S)[1],
     )[1:]
 
@@ -192,8 +192,8 @@ class TestFindings:
 
     @pytest.mark.parametrize("finding", FINDINGS, ids=lambda finding: finding.split(".")[0])
     def test_figures_are_those_of_the_files(self, finding):
-        (comment,) = re.findall(r"<!-- (.*?) -->", finding, re.S)
-        text = " ".join(re.sub(r"<!-- .*? -->", "", finding, flags=re.S).split())
+        (comment,) = re.findall(r"<!--\s(.*?)\s-->", finding, re.S)
+        text = " ".join(re.sub(r"<!--.*?-->", "", finding, flags=re.S).split())
         figures = [each.rsplit(maxsplit=1) for each in comment.split(";")]
         assert figures
         for named, number in figures:

@@ -8,7 +8,7 @@
 - RTMLib: its arrays, frame by frame, JSON ``[{"keypoints": (n, J, 2), "scores": (n, J)}]``, or npz with these names.
 
 The skeleton is that which is declared, or else the usual one with this number of joints. Everything becomes COCO-17, or
-stays on its skeleton where all joints are asked for and :mod:`mvpose.wholebody` knows it.
+stays on its skeleton where all joints are requested and :mod:`mvpose.wholebody` knows it.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def read_view(source: Source, *, skeleton: JointNames | None = None, all_joints:
 
     Raises:
         ValueError: a file that cannot be read, is of no known layout, has an unknown number of joints, or scores that
-            are not 0..1; no picture at all; or all joints are asked for of a skeleton that is not shipped.
+            are not 0..1; no picture at all; or all joints are requested of a skeleton that is not shipped.
     """
     if source.path.is_dir():
         view = _read_folder(source, skeleton)
@@ -113,7 +113,7 @@ def _whole(path: Path, picture: Picture) -> Picture:
         joints = USUAL.get(len(joints), joints)  # MMPose has other names for the points of hands and faces
     if joints.name not in (*known_names(), "coco17"):
         raise ValueError(
-            f"{path}: all joints of the skeleton {joints.name} are asked for; expected one of "
+            f"{path}: all joints of the skeleton {joints.name} are requested; expected one of "
             f"{', '.join(known_names())}, or a TOML file that describes it; or take those of the body only"
         )
     scores = np.clip(np.nan_to_num(picture.scores), 0.0, 1.0)

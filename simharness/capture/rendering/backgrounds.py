@@ -55,7 +55,7 @@ class Background:
         labels: what the faces are labelled with, (k + 1,): see
             :attr:`~simharness.capture.rendering.scene_topology.SceneTopology.mesh`.
         ids: label of each pixel, (h, w).
-        lit: the same in the light that was asked for last.
+        lit: the same in the light of the latest request.
     """
 
     to_rays: NDArray[np.float64]
@@ -69,7 +69,7 @@ class Background:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of memory, with those of colours, whether they were asked for or not."""
+        """Bytes of memory, with those of colours, whether they were requested or not."""
         return self.corners.nbytes + _BYTES_PER_PIXEL * self.triangle.size
 
 

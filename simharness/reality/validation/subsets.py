@@ -19,7 +19,7 @@ from simharness.statistics.intervals import Interval
 from simharness.types.random_streams import stream
 
 FILLED = RULES[2]
-"""Rule of subsets unless another is asked for: with few cameras, missing ears would hide all other losses."""
+"""Default rule of subsets: with few cameras, missing ears would hide all other losses."""
 
 MOST = 40
 """Largest number of subsets of a camera count that are tried; of more, so many are drawn."""
