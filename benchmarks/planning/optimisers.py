@@ -23,7 +23,7 @@ from simharness.planning.candidates import Candidate, candidates_in, far_enough
 from simharness.planning.limits import Limits
 from simharness.planning.rig_value import RigValue
 from simharness.planning.room import Room
-from simharness.planning.search import Found, exchange_search, refine
+from simharness.planning.search import CandidateSet, exchange_search, refine
 from simharness.planning.value_fit import fit_value
 
 FIRST_SEED = 2000  # no room of the benchmark of plans
@@ -67,7 +67,7 @@ def _exchange(
     terms = [value.terms(each) for each in candidates]
     sets = exchange_search(value, terms, Limits.of(room, candidates, count), starts=starts, seed=seed)
     chosen, found = sets[0]
-    start = Found(tuple(candidates[k] for k in chosen), found)
+    start = CandidateSet(tuple(candidates[k] for k in chosen), found)
     return refine(value, room, start, seed=seed, key="benchmark").value
 
 

@@ -17,11 +17,10 @@ from benchmarks.method.report import table
 from benchmarks.planning.peer import PROGRAM, peer_rig
 from benchmarks.planning.rooms import draw_room
 from simharness.planning.candidates import Candidate
-from simharness.planning.ledger import Ledger
-from simharness.planning.plan import plan
-from simharness.planning.rig_comparison import rig_of, simulate_rigs
+from simharness.planning.plan_rig import plan_rig
+from simharness.planning.rig_comparison import corner_rig, rig_of, ring_rig, simulate_rigs
 from simharness.planning.scene_results import interval_of
-from simharness.planning.usual_rigs import corner_rig, ring_rig
+from simharness.planning.search import Ledger
 
 RIGS = ("plan", "corners", "ring", "peer")
 FIRST_SEED = 1000
@@ -58,7 +57,7 @@ def _compare(seed: int, options: argparse.Namespace, program: str) -> dict[str, 
     count = room.keys.cameras.count
     assert count is not None
     start = time.perf_counter(), time.process_time()
-    planned = plan(room, count, simulate=0, curve=(), starts=options.starts, most=options.candidates, seed=seed)
+    planned = plan_rig(room, count, simulate=0, curve=(), starts=options.starts, most=options.candidates, seed=seed)
     seconds = time.perf_counter() - start[0]
     begun = time.perf_counter()
     folder = Path.cwd() if options.out is None else options.out.parent

@@ -12,7 +12,7 @@ from simharness.cli.exit_codes import exit_on_error
 from simharness.cli.options import command_line
 
 if TYPE_CHECKING:
-    from simharness.planning.plan_result import Plan
+    from simharness.planning.plan_result import RigPlan
 
 INTERRUPTED = 130
 
@@ -97,7 +97,7 @@ def plan(
             typer.echo(f"preview: {page}")
             return
         from simharness.outputs.planning.plan_page import write_plan
-        from simharness.planning.plan import plan as plan_rig
+        from simharness.planning.plan_rig import plan_rig
 
         try:
             with reporter() as bars:
@@ -114,7 +114,7 @@ def plan(
     typer.echo(f"report: {page}")
 
 
-def _show(planned: Plan) -> None:
+def _show(planned: RigPlan) -> None:
     """Print the sentences and the cameras of a plan."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table

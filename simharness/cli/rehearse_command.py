@@ -117,8 +117,7 @@ def rehearse(
             volume_of,
         )
         from simharness.outputs.planning.rehearsal_page import render_rehearsal
-        from simharness.planning.rehearse import Effort
-        from simharness.planning.rehearse import rehearse as rehearse_rig
+        from simharness.planning.rehearse_rig import RehearsalEffort, rehearse_rig
         from simharness.planning.rig_file import read_rig
         from simharness.runtime.progress import reporter
         from simharness.scenario.presets import read_profile
@@ -153,7 +152,9 @@ def rehearse(
                 target=wanted,
                 subsets=subsets,
                 seed=seed,
-                effort=Effort(scenes=scenes, crowd_scenes=min(_CROWD, scenes), workers=workers or os.cpu_count() or 1),
+                effort=RehearsalEffort(
+                    scenes=scenes, crowd_scenes=min(_CROWD, scenes), workers=workers or os.cpu_count() or 1
+                ),
                 name=name,
                 reporter=bars,
             )

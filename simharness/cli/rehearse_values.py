@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simharness.planning.rehearsal import Target
+from simharness.planning.rehearsal_result import Target
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.scenario.sections.detector_section import DetectorSection

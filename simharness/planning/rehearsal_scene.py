@@ -1,4 +1,7 @@
-"""Scenes in which a rig is rehearsed: people who walk, stand and reach in the volume, on an open floor."""
+"""Scenes in which a rig is rehearsed: people who walk, stand and reach in the volume, on an open floor.
+
+The simulator has people around the origin: the smallest rectangle around the volume becomes one around the origin.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from mvpose import Rig
 from mvpose.arrays import Floats
-from simharness.planning.scene_frame import SceneFrame
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.reality.validation.frame_scores import RULES, HeadRule
@@ -68,6 +70,62 @@ class SceneSettings:
     whole: tuple[int, ...] = ()
 
 
+@dataclass(frozen=True)
+class SceneFrame:
+    """Position of a volume's rectangle in the world of the rig.
+
+    Attributes:
+        center: middle of the rectangle, (2,), metres.
+        bearing: direction of its first side from the world's x axis, radians.
+        half: half its sides, (2,), metres.
+    """
+
+    center: Floats
+    bearing: float
+    half: Floats
+
+    @classmethod
+    def around(cls, outline: Floats) -> SceneFrame:
+        """Return the frame of the rectangle of least area around a polygon (n, 2), metres.
+
+        One side of that rectangle lies on a side of the convex hull (Freeman and Shapira, Communications of the ACM
+        1975); of equal ones the first is taken, so that an upright rectangle keeps its axes.
+        """
+        from scipy.spatial import ConvexHull
+
+        hull = outline[ConvexHull(outline).vertices]
+        sides = np.roll(hull, -1, axis=0) - hull
+        # In the first quadrant, smallest first: a rectangle's sides are equivalent, and 0 keeps the axes.
+        bearings = np.unique(np.round(np.arctan2(sides[:, 1], sides[:, 0]) % (np.pi / 2), 9))
+        frames = [cls._at(hull, float(bearing)) for bearing in bearings]
+        return min(frames, key=lambda frame: round(float(frame.half.prod()), 9))
+
+    @classmethod
+    def _at(cls, points: Floats, bearing: float) -> SceneFrame:
+        local = points @ _turn(bearing)
+        low, high = local.min(axis=0), local.max(axis=0)
+        return cls(_turn(bearing) @ ((low + high) / 2), bearing, (high - low) / 2)
+
+    @property
+    def axes(self) -> Floats:
+        """Axes of the rectangle in the world as columns, (2, 2)."""
+        return _turn(self.bearing)
+
+    def to_world(self, places: Floats) -> Floats:
+        """Return places (..., 2) of the scene in the world, metres."""
+        return places @ self.axes.T + self.center
+
+    def to_scene(self, places: Floats) -> Floats:
+        """Return places (..., 2) of the world in the scene, metres."""
+        return (places - self.center) @ self.axes
+
+    def rig(self, rig: Rig) -> Rig:
+        """Return a rig of the world in the scene."""
+        turn, shift = np.eye(3), np.array([*self.center, 0.0])
+        turn[:2, :2] = self.axes
+        return Rig([replace(each, R=each.R @ turn, t=each.R @ shift + each.t) for each in rig])
+
+
 def scenario_of(settings: SceneSettings, frame: SceneFrame, seed: int) -> Scenario:
     """Return the scenario of a scene; its people fill a square as large as the rectangle of the volume."""
     half = float(np.sqrt(frame.half.prod()))
@@ -111,12 +169,6 @@ def build_scene(scenario: Scenario, rig: Rig) -> Scene:
     )
 
 
-def _may_fit(scenario: Scenario, spacing: float) -> bool:
-    """Return whether discs of this diameter around all people have the room for it, in the densest packing."""
-    side = 2 * scenario.people.area + spacing
-    return scenario.people.count * spacing**2 * np.sqrt(3) / 2 <= side**2
-
-
 def spread_over_volume(scene: Scene, settings: SceneSettings, frame: SceneFrame, take: int) -> Scene:
     """Return a scene whose people are spread over the rectangle of the volume, with the obstacles.
 
@@ -134,6 +186,12 @@ def spread_over_volume(scene: Scene, settings: SceneSettings, frame: SceneFrame,
     return replace(
         scene, solids=solids, model=compile_model([Kinematics(take_off(body)) for body in scene.bodies], solids)
     )
+
+
+def _may_fit(scenario: Scenario, spacing: float) -> bool:
+    """Return whether discs of this diameter around all people have the room for it, in the densest packing."""
+    side = 2 * scenario.people.area + spacing
+    return scenario.people.count * spacing**2 * np.sqrt(3) / 2 <= side**2
 
 
 def _moved(root: Floats, turn: Rotation, stretch: Floats) -> Floats:
@@ -155,3 +213,8 @@ def _solid(obstacle: Obstacle, frame: SceneFrame, number: int) -> Solid:
     half = (float(obstacle.size[0]) / 2, float(obstacle.size[1]) / 2, float(obstacle.size[2]) / 2)
     box = Box((x, y, float(obstacle.center[2])), half, obstacle.yaw - frame.bearing)
     return Solid("clutter", f"obstacle{number}", box_mesh([box], [_OBSTACLE]), (box,), box)
+
+
+def _turn(bearing: float) -> Floats:
+    c, s = np.cos(bearing), np.sin(bearing)
+    return np.array([[c, -s], [s, c]])

@@ -42,7 +42,7 @@ _ROUNDING = 1e-6  # metres
 
 
 @dataclass(frozen=True)
-class Lens:
+class LensChoice:
     """Camera model with its lens, in one of its two orientations.
 
     Attributes:
@@ -99,7 +99,7 @@ class Room:
     mounts: tuple[Mount, ...]
     obstacles: tuple[Box, ...]
     doors: Floats
-    lenses: tuple[Lens, ...]
+    lenses: tuple[LensChoice, ...]
     fixed: tuple[Camera, ...]
     detector: DetectorSection
     file: str = ""
@@ -333,7 +333,7 @@ def _box(keys: ObstacleKeys) -> Box:
     return Box((*keys.center, keys.base + z / 2), (x / 2, y / 2, z / 2), float(np.radians(keys.yaw)))
 
 
-def _lens(keys: LensKeys, index: int) -> Lens:
+def _lens(keys: LensKeys, index: int) -> LensChoice:
     key = f"lenses[{index}]"
     if keys.fov is not None and keys.focal is not None:
         raise ValueError(f"{key}.fov and {key}.focal are both given: keep one of them")
@@ -344,12 +344,12 @@ def _lens(keys: LensKeys, index: int) -> Lens:
         fov = float(np.degrees(2 * np.arctan(keys.sensor / (2 * keys.focal))))
     else:
         fov = keys.fov or _DEFAULT_FOV
-    lens = Lens(keys.name, intrinsics(fov, keys.size), keys.size, np.array(keys.distortion), keys.cost)
+    lens = LensChoice(keys.name, intrinsics(fov, keys.size), keys.size, np.array(keys.distortion), keys.cost)
     check_lens(lens.camera((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), name=keys.name))
     return lens
 
 
-def _turned(lens: Lens) -> Lens:
+def _turned(lens: LensChoice) -> LensChoice:
     """Return the lens of the camera turned by 90 degrees, whose pictures are turned back."""
     width, height = lens.size
     K = np.array([[lens.K[0, 0], 0.0, (height - 1) / 2], [0.0, lens.K[1, 1], (width - 1) / 2], [0.0, 0.0, 1.0]])

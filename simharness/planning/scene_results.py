@@ -25,7 +25,7 @@ class Condition:
 
 
 @dataclass(frozen=True)
-class Scores:
+class SceneScores:
     """Scores of one scene under one condition, of people inside the volume; NaN where nothing was scored.
 
     Attributes:
@@ -60,7 +60,7 @@ class SceneResult:
     inside: Bools
     parts: Floats
     errors: Floats
-    scores: Mapping[Condition, Scores]
+    scores: Mapping[Condition, SceneScores]
 
 
 def interval_of(results: Sequence[SceneResult], condition: Condition, score: str) -> Interval:
@@ -69,7 +69,7 @@ def interval_of(results: Sequence[SceneResult], condition: Condition, score: str
     Args:
         results: one for each seed.
         condition: the condition.
-        score: name of a field of :class:`Scores`.
+        score: name of a field of :class:`SceneScores`.
     """
     values = [getattr(each.scores[condition], score) for each in results]
     # A mixed group is one of hundreds in a scene, not an event that lasts for all of it.

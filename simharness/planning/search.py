@@ -5,28 +5,30 @@ Programming 1978); exchanges of single members (Fedorov's algorithm for designs 
 what it loses, and several randomised starts the rest. ``benchmarks/planning/optimisers.py`` compares it with
 differential evolution and dual annealing at equal time.
 
-Every start and every refinement draws from its own stream and is a step of a :class:`~.ledger.Ledger`, so that the
+Every start and every refinement draws from its own stream and is a step of a :class:`Ledger`, so that the
 result depends on the seed alone and an interrupted search goes on.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from mvpose.arrays import Floats
+from mvpose.files.atomic_files import write_atomic
+from mvpose.files.input_files import read_json_object
 from simharness.planning.candidates import Candidate, far_enough, moved
-from simharness.planning.ledger import Ledger
 from simharness.planning.limits import Limits
 from simharness.planning.room import Room
 from simharness.types.random_streams import stream
 
 Terms = TypeVar("Terms")
-
 _PASSES = 6  # exchanges of each camera, at most
 _GAIN = 1e-9  # smaller gains are rounding
 _SHARE = 0.5  # of the candidates, drawn for each step of all greedy starts but the first
@@ -36,6 +38,46 @@ _STEPS = (  # metres along the edges of the mount, then degrees of bearing and t
     (0.1, 0.1, 0.1, 2.0, 2.0),
 )
 _DRAWS = 8  # random movements of each camera at each scale
+
+
+class Ledger:
+    """Results of finished steps by name: JSON values, written to a file whenever one more is finished.
+
+    Args:
+        path: the file; None: nothing is kept.
+        identity: text that changes with everything that determines the results. A file of another identity, or one
+            that cannot be read, is begun anew.
+    """
+
+    def __init__(self, path: Path | None, identity: str) -> None:
+        self._path = path
+        self._identity = identity
+        self._steps: dict[str, Any] = {}
+        if path is not None and path.is_file():
+            try:
+                kept = read_json_object(path, what="finished steps of a search")
+                if kept["identity"] == identity:
+                    self._steps = dict(kept["steps"])
+            except (ValueError, KeyError, TypeError, OSError):
+                self._steps = {}
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._steps
+
+    def result(self, name: str, work: Callable[[], Any]) -> Any:
+        """Return the result of a step: the kept one, or that of ``work``, which is kept from then on.
+
+        The result is that of a round trip through JSON in both cases, so that an interrupted run gives the same.
+        """
+        if name not in self._steps:
+            self._steps[name] = json.loads(json.dumps(work()))
+            self._write()
+        return self._steps[name]
+
+    def _write(self) -> None:
+        if self._path is not None:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            write_atomic(self._path, json.dumps({"identity": self._identity, "steps": self._steps}).encode())
 
 
 class Value(Protocol[Terms]):
@@ -55,7 +97,7 @@ class Value(Protocol[Terms]):
 
 
 @dataclass(frozen=True)
-class Found:
+class CandidateSet:
     """Set of cameras with its value."""
 
     candidates: tuple[Candidate, ...]
@@ -94,6 +136,52 @@ def exchange_search(
             found[tuple(chosen)] = value
         advance(1)
     return sorted(found.items(), key=lambda each: (-each[1], each[0]))
+
+
+def refine(
+    values: Value[Terms],
+    room: Room,
+    found: CandidateSet,
+    *,
+    seed: int,
+    key: str,
+    fixed: Sequence[Terms] = (),
+    steps: Sequence[Sequence[float]] = _STEPS,
+) -> CandidateSet:
+    """Return a set of cameras whose places and directions are improved by small movements of one camera at a time.
+
+    Each camera tries both directions of each parameter and some random movements, from large to small ones, and takes
+    each movement that improves the set.
+
+    Args:
+        values: value of sets.
+        room: the room.
+        found: set to start from.
+        seed: seed of the draws.
+        key: name of the stream of draws.
+        fixed: contributions of the cameras that hang already.
+        steps: sizes of the movements, three in metres and two in degrees each.
+    """
+    rng = stream(seed, "plan", "refine", key)
+    cameras = list(found.candidates)
+    terms = [values.terms(each) for each in cameras]
+    best = found.value
+    for sizes in steps:
+        scale = np.array([*sizes[:3], *np.radians(sizes[3:])])
+        for slot in range(len(cameras)):
+            draws = rng.standard_normal((_DRAWS, 5))
+            others = [*fixed, *terms[:slot], *terms[slot + 1 :]]
+            for step in np.vstack([np.eye(5), -np.eye(5), draws]) * scale:
+                # A step that succeeds is taken again, as long as it improves the set.
+                while (changed := moved(room, cameras[slot], step)) is not None:
+                    if not far_enough(room, [*cameras[:slot], changed, *cameras[slot + 1 :]], room.fixed):
+                        break
+                    trial = values.terms(changed)
+                    value = values.value([*others, trial])
+                    if value <= best + _GAIN:
+                        break
+                    cameras[slot], terms[slot], best = changed, trial, value
+    return CandidateSet(tuple(cameras), float(best))
 
 
 def _start(
@@ -137,49 +225,3 @@ def _exchanged(
         if gained[top] > best + _GAIN:
             chosen[slot], best, unchanged = int(pool[top]), float(gained[top]), 0
     return sorted(chosen), float(best)
-
-
-def refine(
-    values: Value[Terms],
-    room: Room,
-    found: Found,
-    *,
-    seed: int,
-    key: str,
-    fixed: Sequence[Terms] = (),
-    steps: Sequence[Sequence[float]] = _STEPS,
-) -> Found:
-    """Return a set of cameras whose places and directions are improved by small movements of one camera at a time.
-
-    Each camera tries both directions of each parameter and some random movements, from large to small ones, and takes
-    each movement that improves the set.
-
-    Args:
-        values: value of sets.
-        room: the room.
-        found: set to start from.
-        seed: seed of the draws.
-        key: name of the stream of draws.
-        fixed: contributions of the cameras that hang already.
-        steps: sizes of the movements, three in metres and two in degrees each.
-    """
-    rng = stream(seed, "plan", "refine", key)
-    cameras = list(found.candidates)
-    terms = [values.terms(each) for each in cameras]
-    best = found.value
-    for sizes in steps:
-        scale = np.array([*sizes[:3], *np.radians(sizes[3:])])
-        for slot in range(len(cameras)):
-            draws = rng.standard_normal((_DRAWS, 5))
-            others = [*fixed, *terms[:slot], *terms[slot + 1 :]]
-            for step in np.vstack([np.eye(5), -np.eye(5), draws]) * scale:
-                # A step that succeeds is taken again, as long as it improves the set.
-                while (changed := moved(room, cameras[slot], step)) is not None:
-                    if not far_enough(room, [*cameras[:slot], changed, *cameras[slot + 1 :]], room.fixed):
-                        break
-                    trial = values.terms(changed)
-                    value = values.value([*others, trial])
-                    if value <= best + _GAIN:
-                        break
-                    cameras[slot], terms[slot], best = changed, trial, value
-    return Found(tuple(cameras), float(best))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mvpose.arrays import Bools, Floats
-from simharness.planning.coverage import largest_rectangle
-from simharness.planning.rehearsal import Rehearsal
+from simharness.planning.floor_coverage import largest_rectangle
+from simharness.planning.rehearsal_result import Rehearsal
 from simharness.statistics.intervals import Interval
 
 _LITTLE = 0.5  # points of PCP: less is no reason to buy or to move a camera

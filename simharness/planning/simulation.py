@@ -19,9 +19,15 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.estimators import Estimator
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.detect import Detected, detect
-from simharness.planning.rehearsal_scene import SceneSettings, build_scene, has_objects, scenario_of, spread_over_volume
-from simharness.planning.scene_frame import SceneFrame
-from simharness.planning.scene_results import Condition, SceneResult, Scores
+from simharness.planning.rehearsal_scene import (
+    SceneFrame,
+    SceneSettings,
+    build_scene,
+    has_objects,
+    scenario_of,
+    spread_over_volume,
+)
+from simharness.planning.scene_results import Condition, SceneResult, SceneScores
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.validation.frame_scores import RULES, score_frames
 from simharness.runtime.frame_pool import map_jobs
@@ -149,10 +155,10 @@ class _Scored(NamedTuple):
         """Return the scores of the frames of several parts."""
         return cls(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
-    def scores(self, inside: Bools) -> Scores:
+    def scores(self, inside: Bools) -> SceneScores:
         """Return the scores of the people inside the volume, (F, P)."""
         groups = int(self.groups.sum())
-        return Scores(
+        return SceneScores(
             pcp=100.0 * _average(self.correct[inside]),
             recall=100.0 * _average(self.found[inside].astype(float)),
             mpjpe_mm=1000.0 * _average(self.error[inside]),

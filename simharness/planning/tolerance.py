@@ -20,7 +20,7 @@ CLIFF = 5.0
 
 
 @dataclass(frozen=True)
-class Fault:
+class FaultKind:
     """Kind of error.
 
     Attributes:
@@ -38,18 +38,18 @@ class Fault:
     levels: tuple[float, ...]
 
 
-FAULTS: Mapping[str, Fault] = MappingProxyType(
+FAULTS: Mapping[str, FaultKind] = MappingProxyType(
     {
-        "rotation": Fault("rotation", "orientation of the cameras", "°", 1.0, (0.25, 0.5, 1.0, 2.0)),
-        "translation": Fault("translation", "position of the cameras", "cm", 100.0, (0.25, 0.5, 1.0, 2.0)),
-        "clock_offset": Fault("clock_offset", "clocks of the cameras", "ms", 1000.0, (10.0, 33.0, 67.0)),
+        "rotation": FaultKind("rotation", "orientation of the cameras", "°", 1.0, (0.25, 0.5, 1.0, 2.0)),
+        "translation": FaultKind("translation", "position of the cameras", "cm", 100.0, (0.25, 0.5, 1.0, 2.0)),
+        "clock_offset": FaultKind("clock_offset", "clocks of the cameras", "ms", 1000.0, (10.0, 33.0, 67.0)),
     }
 )
 """Kinds of errors by key. 33 and 67 ms are one and two frames of a film of 30 frames per second."""
 
 
 @dataclass(frozen=True)
-class Tolerance:
+class FaultTolerance:
     """What errors of one kind cost a rig.
 
     Attributes:
@@ -61,7 +61,7 @@ class Tolerance:
             None where it is beyond the largest.
     """
 
-    fault: Fault
+    fault: FaultKind
     pcp: tuple[Interval, ...]
     mpjpe_mm: tuple[Interval, ...]
     loss: tuple[Interval, ...]
@@ -86,7 +86,7 @@ def fault_conditions(cameras: Sequence[int]) -> list[Condition]:
     return [Condition(whole, key, level / fault.scale) for key, fault in FAULTS.items() for level in fault.levels]
 
 
-def tolerances(results: Sequence[SceneResult], cameras: Sequence[int]) -> tuple[Tolerance, ...]:
+def tolerances(results: Sequence[SceneResult], cameras: Sequence[int]) -> tuple[FaultTolerance, ...]:
     """Return the tolerance of a rig to every kind of error.
 
     Args:
@@ -99,7 +99,7 @@ def tolerances(results: Sequence[SceneResult], cameras: Sequence[int]) -> tuple[
         conditions = [Condition(whole, key, level / fault.scale) for level in fault.levels]
         loss = tuple(loss_of(results, each, Condition(whole)) for each in conditions)
         found.append(
-            Tolerance(
+            FaultTolerance(
                 fault,
                 tuple(interval_of(results, each, "pcp") for each in conditions),
                 tuple(interval_of(results, each, "mpjpe_mm") for each in conditions),

@@ -12,11 +12,10 @@ from markupsafe import Markup
 
 from mvpose.files.atomic_files import write_atomic
 from simharness.outputs.documents import fill_template
-from simharness.outputs.planning.plan_plots import buying_curve, place_map, rig_bars
-from simharness.outputs.planning.room_plots import room_from_above, room_from_side
+from simharness.outputs.planning.plan_plots import buying_curve, place_map, rig_bars, room_from_above, room_from_side
 from simharness.planning.candidates import candidates_in, places_in
-from simharness.planning.plan_result import Plan, sentences
-from simharness.planning.rig_toml import write_rig
+from simharness.planning.plan_result import RigPlan, sentences
+from simharness.planning.rig_file import write_rig
 from simharness.planning.room import Room
 from simharness.runtime.version import code_version
 
@@ -31,7 +30,7 @@ _KEY_OF_PLACES = (
 )
 
 
-def write_plan(plan: Plan, folder: Path, *, command: str = "") -> Path:
+def write_plan(plan: RigPlan, folder: Path, *, command: str = "") -> Path:
     """Write ``planned.toml``, ``plan.json`` and ``plan.html``; return the page.
 
     Args:
@@ -89,7 +88,7 @@ def render_preview(room: Room) -> str:
     )
 
 
-def render_plan(plan: Plan, *, command: str = "") -> str:
+def render_plan(plan: RigPlan, *, command: str = "") -> str:
     """Return the page of a plan."""
     room, target = plan.room, plan.room.keys.target
     scenes = f"on the same {plan.simulated_scenes} simulated scenes" if plan.best.simulated else "not simulated"
@@ -152,7 +151,7 @@ def _facts(room: Room) -> list[tuple[str, str]]:
     return facts + ([("may fail", f"{objective.failing}")] if objective.failing else [])
 
 
-def _cards(plan: Plan) -> list[dict[str, str]]:
+def _cards(plan: RigPlan) -> list[dict[str, str]]:
     figures, predicted = plan.figures, plan.best.predicted
     how = f"simulation, {plan.simulated_scenes} scenes" if plan.best.simulated else "fast layer"
     usual = [each for each in plan.alternatives if each.title in ("corners", "ring")]
@@ -182,7 +181,7 @@ def _cards(plan: Plan) -> list[dict[str, str]]:
     return cards
 
 
-def _camera_rows(plan: Plan) -> list[list[str]]:
+def _camera_rows(plan: RigPlan) -> list[list[str]]:
     rows = []
     for camera, built in zip(plan.cameras, plan.rig, strict=True):
         forward = built.R[2]
@@ -202,7 +201,7 @@ def _camera_rows(plan: Plan) -> list[list[str]]:
     return rows
 
 
-def _points(plan: Plan) -> list[dict[str, Any]]:
+def _points(plan: RigPlan) -> list[dict[str, Any]]:
     return [
         {
             "now": point.cameras == len(plan.rig),

@@ -11,10 +11,19 @@ from markupsafe import Markup
 from mvpose import Camera
 from mvpose.arrays import Floats
 from simharness.outputs.documents import fill_template, provenance_sentence
-from simharness.outputs.planning import curves
-from simharness.outputs.planning.floor_maps import Scale, ellipse_map, floor_map, simulated_map
+from simharness.outputs.planning.rehearsal_plots import (
+    MapColors,
+    crowd_curve,
+    ellipse_map,
+    floor_map,
+    matching_curve,
+    simulated_map,
+    subset_curve,
+    tolerance_bottom,
+    tolerance_curve,
+)
 from simharness.outputs.planning.rig_view_3d import rig_view_3d
-from simharness.planning.rehearsal import HEIGHTS, Estimated, ExtraCamera, Rehearsal
+from simharness.planning.rehearsal_result import HEIGHTS, Estimated, ExtraCamera, Rehearsal
 from simharness.runtime.number_text import fixed, signed
 from simharness.statistics.intervals import Interval
 
@@ -36,7 +45,7 @@ def render_rehearsal(rehearsal: Rehearsal, *, provenance: Mapping[str, Any]) -> 
     Returns:
         A self-contained HTML document.
     """
-    bottom = curves.tolerance_bottom(rehearsal)
+    bottom = tolerance_bottom(rehearsal)
     return fill_template(
         "rehearsal.html",
         name=rehearsal.name,
@@ -50,20 +59,20 @@ def render_rehearsal(rehearsal: Rehearsal, *, provenance: Mapping[str, Any]) -> 
         heights=_heights(rehearsal),
         cameras=_camera_rows(rehearsal),
         extra=_extra(rehearsal.extra),
-        crowd=Markup(curves.crowd_curve(rehearsal, name="crowd")),
-        matching=Markup(curves.matching_curve(rehearsal, name="matching")),
+        crowd=Markup(crowd_curve(rehearsal, name="crowd")),
+        matching=Markup(matching_curve(rehearsal, name="matching")),
         tolerances=[
             {
                 "title": each.fault.title,
                 "limit": each.limit,
                 "svg": Markup(
-                    curves.tolerance_curve(each, rehearsal.whole.pcp, name=f"tolerance-{each.fault.key}", bottom=bottom)
+                    tolerance_curve(each, rehearsal.whole.pcp, name=f"tolerance-{each.fault.key}", bottom=bottom)
                 ),
             }
             for each in rehearsal.tolerances
         ],
         subsets=_subset_rows(rehearsal),
-        subset_curve=Markup(curves.subset_curve(rehearsal, name="sets")) if _all_sets(rehearsal) else None,
+        subset_curve=Markup(subset_curve(rehearsal, name="sets")) if _all_sets(rehearsal) else None,
         scenes=len(rehearsal.scenes),
         target=rehearsal.target,
         command=provenance.get("command") or "",
@@ -117,11 +126,11 @@ def _cards(rehearsal: Rehearsal) -> list[dict[str, str]]:
 def _maps(rehearsal: Rehearsal) -> list[dict[str, Any]]:
     """Return the maps with title, source and caption."""
     prediction, scenes = rehearsal.prediction, rehearsal.scenes
-    pcp, error = Scale(_LEAST_PCP, 100.0), Scale(_BEST_MM, _WORST_MM, better="low")
+    pcp, error = MapColors(_LEAST_PCP, 100.0), MapColors(_BEST_MM, _WORST_MM, better="low")
     parts = simulated_map(rehearsal, [100.0 * np.where(each.inside, each.parts, np.nan) for each in scenes])
     off = simulated_map(rehearsal, [1000.0 * np.where(each.inside, each.errors, np.nan) for each in scenes])
     ellipses, factor = ellipse_map(rehearsal, name="map-ellipses")
-    views = Scale(0.0, float(len(rehearsal.rig)), digits=1)
+    views = MapColors(0.0, float(len(rehearsal.rig)), digits=1)
     rows: list[tuple[str, str, str, str]] = [
         (
             "Cameras that see a person whole",
@@ -152,7 +161,7 @@ def _maps(rehearsal: Rehearsal) -> list[dict[str, Any]]:
             "Recall, %",
             _LAYER,
             "Probability that a person is found.",
-            floor_map(rehearsal, 100.0 * prediction.recall, Scale(50.0, 100.0), name="map-recall"),
+            floor_map(rehearsal, 100.0 * prediction.recall, MapColors(50.0, 100.0), name="map-recall"),
         ),
         (
             "Error ellipses",
@@ -166,7 +175,7 @@ def _maps(rehearsal: Rehearsal) -> list[dict[str, Any]]:
             _LAYER,
             "Probability that not all detections of a person are matched rightly.",
             floor_map(
-                rehearsal, 100.0 * prediction.risk, Scale(0.0, 50.0, better="none"), name="map-risk", outlined=False
+                rehearsal, 100.0 * prediction.risk, MapColors(0.0, 50.0, better="none"), name="map-risk", outlined=False
             ),
         ),
     ]
@@ -178,7 +187,7 @@ def _maps(rehearsal: Rehearsal) -> list[dict[str, Any]]:
 
 def _heights(rehearsal: Rehearsal) -> list[tuple[str, Markup]]:
     """Return the maps of coverage by height."""
-    scale = Scale(0.0, float(len(rehearsal.rig)))
+    scale = MapColors(0.0, float(len(rehearsal.rig)))
     return [
         (
             f"{height:g} m",

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 
 from mvpose import Camera
 from mvpose.arrays import Floats
-from simharness.outputs.planning.floor_maps import EXTRA, GOOD, corners_of, outline_of
-from simharness.planning.rehearsal import Rehearsal
+from simharness.outputs.planning.rehearsal_plots import EXTRA, GOOD, corners_of, outline_of
+from simharness.planning.rehearsal_result import Rehearsal
 from simharness.planning.sentences import grid_spacing
 from simharness.world.rigs.layouts import look_at
 from simharness.world.rigs.lenses import intrinsics

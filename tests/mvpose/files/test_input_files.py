@@ -108,7 +108,7 @@ AROUND = {
     "mvpose/files/archives.py": "bytes that were read",
     "mvpose/formats/people_table.py": "bytes that were read",
     "simharness/runtime/parquet_tables.py": "bytes that were read",
-    "simharness/planning/ledger.py": "text that was just written",
+    "simharness/planning/search.py": "text that was just written",
     "simharness/outputs/run/film.py": "a film that was just written",
     "simharness/runtime/code_digest.py": "code",
     "simharness/runtime/machine.py": "what the kernel says of the machine",

@@ -7,7 +7,7 @@ import pytest
 
 from simharness.detector.conditions import VISIBLE
 from simharness.planning import FastLayer, Obstacle, Volume
-from simharness.planning.joint_error import covariance, expected_distance, information
+from simharness.planning.camera_terms import covariance, expected_distance, information
 from simharness.planning.standing_people import APART, bearings_of, pose_pool, standing_scenes
 from simharness.planning.visibility import see, seen_joints
 from simharness.scenario.presets import read_profile

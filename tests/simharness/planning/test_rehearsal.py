@@ -11,12 +11,12 @@ import pytest
 from headless_browser import find_browser, run_browser
 from typer.testing import CliRunner
 
-import simharness.planning.rehearse
+import simharness.planning.rehearse_rig
 from simharness.cli import app
-from simharness.outputs.planning.floor_maps import outline_of
 from simharness.outputs.planning.rehearsal_page import render_rehearsal
-from simharness.planning.rehearsal import HEIGHTS
-from simharness.planning.rehearse import Effort, rehearse
+from simharness.outputs.planning.rehearsal_plots import outline_of
+from simharness.planning.rehearsal_result import HEIGHTS
+from simharness.planning.rehearse_rig import RehearsalEffort, rehearse_rig
 from simharness.planning.rig_file import read_rig
 from simharness.planning.sentences import good_rectangle, sentences
 from simharness.planning.volume import Volume
@@ -25,13 +25,13 @@ from simharness.trial.provenance import provenance
 
 pytestmark = pytest.mark.slow
 
-TINY = Effort(scenes=2, crowd_scenes=1, crowds=(1,), most=2, around=3)
+TINY = RehearsalEffort(scenes=2, crowd_scenes=1, crowds=(1,), most=2, around=3)
 VOLUME = Volume.box(2.0, 2.0)
 
 
 def a_rehearsal(rig, **changes):
     content = dict(detector=read_profile("typical"), volume=VOLUME, people=2, effort=TINY)
-    return rehearse(rig, **content | changes)
+    return rehearse_rig(rig, **content | changes)
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +105,7 @@ def test_the_command_writes_page_and_json(rehearsal, tmp_path, monkeypatch):
         asked.update(options, rig=rig)
         return rehearsal
 
-    monkeypatch.setattr(simharness.planning.rehearse, "rehearse", remembered)
+    monkeypatch.setattr(simharness.planning.rehearse_rig, "rehearse_rig", remembered)
     options = "--room 8x8x3 --volume 4x3@1,0.5 --people 6 --obstacle 1.5,0,0.4,2,1.8 --subsets --scenes 2"
     result = CliRunner().invoke(app, ["rehearse", "corners4", *options.split(), "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output

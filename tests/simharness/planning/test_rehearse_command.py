@@ -10,8 +10,8 @@ from mvpose import Rig
 from mvpose.formats.calibration.voxelpose import write_calibration
 from simharness.cli import app
 from simharness.cli.rehearse_values import clutter_of, obstacle_of, room_of, surroundings_of, target_of, volume_of
-from simharness.outputs.planning.floor_maps import corners_of
-from simharness.planning.rehearse import rehearse
+from simharness.outputs.planning.rehearsal_plots import corners_of
+from simharness.planning.rehearse_rig import rehearse_rig
 from simharness.planning.room_file import read_room
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
@@ -30,7 +30,7 @@ def test_nothing_visible_is_one_message():
         ]
     )
     with pytest.raises(ValueError, match="nothing is visible"):
-        rehearse(away, detector=read_profile("typical"), volume=Volume.box(2.0, 2.0))
+        rehearse_rig(away, detector=read_profile("typical"), volume=Volume.box(2.0, 2.0))
 
 
 @pytest.mark.parametrize(

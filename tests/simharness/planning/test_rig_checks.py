@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mvpose import Rig
-from simharness.planning.coverage import covered_rectangle, whole_people
+from simharness.planning.floor_coverage import covered_rectangle, whole_people
 from simharness.planning.rig_checks import check_rig
 from simharness.planning.rig_file import read_rig
 from simharness.planning.visibility import Obstacle

@@ -14,16 +14,14 @@ from typer.testing import CliRunner
 from mvpose import Rig
 from simharness.cli import app
 from simharness.planning.candidates import candidates_in
-from simharness.planning.ledger import Ledger
-from simharness.planning.plan import plan
-from simharness.planning.rig_comparison import rig_of
-from simharness.planning.rig_toml import CALIBRATION, write_rig
-from simharness.planning.rig_value import RigValue
+from simharness.planning.plan_rig import plan_rig
+from simharness.planning.rig_comparison import corner_rig, rig_of, ring_rig
+from simharness.planning.rig_file import CALIBRATION, write_rig
+from simharness.planning.rig_value import RigValue, SightingOdds
 from simharness.planning.room import Room, make_room
 from simharness.planning.room_file import read_room
 from simharness.planning.room_keys import RoomKeys
-from simharness.planning.sighting_odds import SightingOdds
-from simharness.planning.usual_rigs import corner_rig, ring_rig
+from simharness.planning.search import Ledger
 from simharness.planning.value_fit import layer_of
 from simharness.scenario.load import load
 from simharness.world.rigs.layouts import build_rig
@@ -149,7 +147,7 @@ def test_nobody_visible() -> None:
         )
     ]  # fmt: skip
     with pytest.raises(ValueError, match="no camera at any place sees anybody"):
-        plan(small_room(obstacles=low + walls), 2, most=12, starts=1, simulate=0, curve=())
+        plan_rig(small_room(obstacles=low + walls), 2, most=12, starts=1, simulate=0, curve=())
 
 
 def test_command_line_reports_mistakes(tmp_path: Path) -> None:

@@ -12,11 +12,10 @@ import pytest
 
 from mvpose.arrays import Floats
 from simharness.planning.candidates import Candidate, candidates_in, far_enough
-from simharness.planning.ledger import Ledger
 from simharness.planning.limits import Limits
 from simharness.planning.room import Room, make_room
 from simharness.planning.room_keys import RoomKeys
-from simharness.planning.search import Found, exchange_search, refine
+from simharness.planning.search import CandidateSet, Ledger, exchange_search, refine
 
 SEEDS = range(6)
 
@@ -131,11 +130,11 @@ def test_refinement_never_loses_and_keeps_to_the_places() -> None:
     room, values = small_room(), Coverage()
     start = tuple(few(room, 3, 2))
     before = values.value([values.terms(each) for each in start])
-    after = refine(values, room, Found(start, before), seed=0, key="test")
+    after = refine(values, room, CandidateSet(start, before), seed=0, key="test")
     assert after.value > before
     assert after.value == pytest.approx(values.value([values.terms(each) for each in after.candidates]))
     assert all(room.may_hang(room.mounts[each.mount], np.array(each.place)) for each in after.candidates)
-    assert refine(values, room, Found(start, before), seed=0, key="test") == after
+    assert refine(values, room, CandidateSet(start, before), seed=0, key="test") == after
 
 
 class Interrupted(Coverage):

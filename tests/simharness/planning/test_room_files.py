@@ -10,7 +10,7 @@ import pytest
 
 from simharness.planning.candidates import candidates_in, moved, places_in
 from simharness.planning.limits import Limits
-from simharness.planning.plan import plan
+from simharness.planning.plan_rig import plan_rig
 from simharness.planning.polygons import contains, counter_clockwise, crossing_edges, signed_area
 from simharness.planning.room import Room, make_room
 from simharness.planning.room_file import read_room
@@ -151,12 +151,12 @@ def test_no_place_to_hang() -> None:
 @pytest.mark.parametrize("count", [0, 1])
 def test_fewer_than_two_cameras(count: int) -> None:
     with pytest.raises(ValueError, match=f"--cameras = {count}: one camera gives no positions in space"):
-        plan(room(), count)
+        plan_rig(room(), count)
 
 
 def test_no_number_of_cameras() -> None:
     with pytest.raises(ValueError, match="the number of cameras is missing"):
-        plan(room())
+        plan_rig(room())
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simharness.planning.scene_frame import SceneFrame
+from simharness.planning.rehearsal_scene import SceneFrame
 from simharness.world.rigs.published_rigs import preset_rig
 
 

@@ -10,11 +10,10 @@ from typing import TypeVar
 import numpy as np
 
 from mvpose import Camera, Rig
-from simharness.planning.coverage import coverage, covered_rectangle
 from simharness.planning.extra_camera import candidate_cameras
-from simharness.planning.layer import CameraTerms, FastLayer
-from simharness.planning.prediction import Prediction
-from simharness.planning.rehearsal import (
+from simharness.planning.fast_layer import CameraTerms, FastLayer, Prediction
+from simharness.planning.floor_coverage import coverage, covered_rectangle
+from simharness.planning.rehearsal_result import (
     HEIGHTS,
     CameraWorth,
     Crowd,
@@ -47,7 +46,7 @@ _UNKNOWN = Interval(np.nan, np.nan, np.nan, 0)
 
 
 @dataclass(frozen=True)
-class Effort:
+class RehearsalEffort:
     """How much is simulated.
 
     Attributes:
@@ -98,7 +97,7 @@ class Question:
     seed: int = 0
 
 
-def rehearse(
+def rehearse_rig(
     rig: Rig,
     *,
     detector: DetectorSection,
@@ -110,7 +109,7 @@ def rehearse(
     target: Target | None = None,
     subsets: bool = False,
     seed: int = 0,
-    effort: Effort | None = None,
+    effort: RehearsalEffort | None = None,
     name: str = "rig",
     reporter: Reporter | None = None,
 ) -> Rehearsal:
@@ -120,7 +119,7 @@ def rehearse(
         rig: two or more cameras, metres, floor at z = 0.
         detector: profile of the detector (:func:`simharness.scenario.presets.read_profile`).
         volume: where people are; by default the largest rectangle that three cameras see
-            (:func:`simharness.planning.coverage.covered_rectangle`).
+            (:func:`simharness.planning.floor_coverage.covered_rectangle`).
         people: number of people in it.
         room: floor and height of the room; None where it is unknown.
         obstacles: boxes that hide people.
@@ -154,7 +153,7 @@ def rehearse(
         subsets,
         seed,
     )
-    return _Rehearsing(question, effort or Effort(), reporter or Silence()).run()
+    return _Rehearsing(question, effort or RehearsalEffort(), reporter or Silence()).run()
 
 
 @dataclass(frozen=True)
@@ -171,7 +170,7 @@ class _Rehearsing:
     """Steps of a rehearsal."""
 
     question: Question
-    effort: Effort
+    effort: RehearsalEffort
     reporter: Reporter
 
     def run(self) -> Rehearsal:

@@ -10,13 +10,13 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from mvpose.arrays import Bools, Floats, Integers
-from simharness.planning.tolerance import CLIFF, Tolerance
+from simharness.planning.tolerance import CLIFF, FaultTolerance
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.statistics.intervals import Interval
 
 if TYPE_CHECKING:
-    from simharness.planning.prediction import Prediction
+    from simharness.planning.fast_layer import Prediction
     from simharness.planning.scene_results import SceneResult
 
 HEIGHTS = (0.1, 0.9, 1.7, 2.2)
@@ -172,7 +172,7 @@ class Rehearsal:
     subsets: Mapping[tuple[str, ...], Estimated]
     extra: ExtraCamera | None
     crowds: tuple[Crowd, ...]
-    tolerances: tuple[Tolerance, ...]
+    tolerances: tuple[FaultTolerance, ...]
     scenes: tuple[SceneResult, ...]
     mixed: Interval
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -263,7 +263,7 @@ def _extra(extra: ExtraCamera) -> dict[str, Any]:
     }
 
 
-def _tolerance(each: Tolerance) -> dict[str, Any]:
+def _tolerance(each: FaultTolerance) -> dict[str, Any]:
     return {
         "unit": each.fault.unit,
         "cliff": _plain(each.cliff) if each.cliff is not None else None,

@@ -1,6 +1,6 @@
 """Coverage of the floor by the pictures alone: how many cameras have a point, or a standing person, in the picture.
 
-Geometry without people, obstacles or a detector: what :class:`~simharness.planning.layer.FastLayer` begins with.
+Geometry without people, obstacles or a detector: what :class:`~simharness.planning.fast_layer.FastLayer` begins with.
 """
 
 from __future__ import annotations

@@ -24,19 +24,15 @@ import numpy as np
 from mvpose import Rig
 from mvpose.arrays import Floats
 from simharness.planning.candidates import Candidate, alike, around, candidates_in
-from simharness.planning.figures import Figures
-from simharness.planning.layer import FastLayer
-from simharness.planning.ledger import Ledger
+from simharness.planning.fast_layer import FastLayer, Prediction
 from simharness.planning.limits import Limits
-from simharness.planning.plan_result import Alternative, CurvePoint, Plan, PlannedCamera
-from simharness.planning.prediction import Prediction
-from simharness.planning.rig_comparison import rig_of, simulate_rigs
+from simharness.planning.plan_result import Alternative, CurvePoint, Figures, PlannedCamera, RigPlan
+from simharness.planning.rig_comparison import corner_rig, rig_of, ring_rig, simulate_rigs
 from simharness.planning.rig_value import RigValue
 from simharness.planning.room import Room
 from simharness.planning.room_file import read_room
 from simharness.planning.scene_results import interval_of
-from simharness.planning.search import Found, exchange_search, refine
-from simharness.planning.usual_rigs import corner_rig, ring_rig
+from simharness.planning.search import CandidateSet, Ledger, exchange_search, refine
 from simharness.planning.value_fit import VARIANT, fit_value, layer_of
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.version import code_version
@@ -52,7 +48,7 @@ _NEAR_BEST = 1.0  # points of the objective within which a set is as good as the
 _PREVIEW_SHARE = 1e-3  # of seen joints: less is nothing
 
 
-def plan(
+def plan_rig(
     room: Room | Path | str,
     cameras: int | None = None,
     *,
@@ -65,7 +61,7 @@ def plan(
     workers: int = 1,
     folder: Path | None = None,
     reporter: Reporter | None = None,
-) -> Plan:
+) -> RigPlan:
     """Plan where cameras should hang.
 
     Args:
@@ -139,7 +135,7 @@ class _Work:
         self.seconds: dict[str, float] = {}
         self._terms: list[Floats] = []
 
-    def plan(self) -> Plan:
+    def plan(self) -> RigPlan:
         """Return the plan."""
         with self._timed("search"):
             sets = self._search(self.limits, self.starts, "search")
@@ -154,7 +150,7 @@ class _Work:
             alternatives, best = self._confirmed(judged, usual)
         names = [camera.name for camera in alternatives[0].rig]
         prediction, worth = self._worth(best)
-        return Plan(
+        return RigPlan(
             room=self.room,
             rig=alternatives[0].rig,
             cameras=self._cameras(names, best, near, worth),
@@ -205,7 +201,7 @@ class _Work:
                 )
         return self._terms
 
-    def _search(self, limits: Limits, starts: int, title: str) -> list[Found]:
+    def _search(self, limits: Limits, starts: int, title: str) -> list[CandidateSet]:
         names = [f"start {limits.count} {k}" for k in range(starts)]
         terms = self.terms if any(name not in self.ledger for name in names) else []
         with self.reporter.stage(title, starts) as advance:
@@ -224,27 +220,27 @@ class _Work:
                 f"{self.room.file or self.room.name}: only {len(found[0][0])} of {wanted} cameras find a place "
                 f"{self.room.keys.cameras.spacing:g} m from each other: lower cameras.spacing, or give more places"
             )
-        return [Found(tuple(self.candidates[k] for k in chosen), value) for chosen, value in found]
+        return [CandidateSet(tuple(self.candidates[k] for k in chosen), value) for chosen, value in found]
 
-    def _refined(self, sets: Sequence[Found]) -> list[Found]:
+    def _refined(self, sets: Sequence[CandidateSet]) -> list[CandidateSet]:
         best = sets[:_REFINED]
         results = []
         with self.reporter.stage("refine", len(best)) as advance:
             for k, each in enumerate(best):
                 key = f"refined {self.count} {self.starts} {k}"
 
-                def work(each: Found = each, key: str = key) -> Any:
+                def work(each: CandidateSet = each, key: str = key) -> Any:
                     fixed = self.fixed_terms
                     found = refine(self.value, self.room, each, seed=self.seed, key=key, fixed=fixed)
                     return [[dataclasses.astuple(camera) for camera in found.candidates], found.value]
 
                 cameras, value = self.ledger.result(key, work)
                 chosen = tuple(Candidate(c[0], c[1], (c[2][0], c[2][1], c[2][2]), c[3], c[4]) for c in cameras)
-                results.append(Found(around(self.room, chosen), value))
+                results.append(CandidateSet(around(self.room, chosen), value))
                 advance(1)
         return results
 
-    def _curve(self, best: Found) -> tuple[CurvePoint, ...]:
+    def _curve(self, best: CandidateSet) -> tuple[CurvePoint, ...]:
         fixed, now = len(self.room.fixed), len(best.candidates)
         points = []
         for offset in sorted(set(self.offsets)):
@@ -266,7 +262,7 @@ class _Work:
             points.append(CurvePoint(free + fixed, Figures.of_row(figures), cost))
         return tuple(points)
 
-    def _curve_point(self, found: Found) -> tuple[Any, float]:
+    def _curve_point(self, found: CandidateSet) -> tuple[Any, float]:
         cost = sum(self.room.lenses[each.lens].cost for each in found.candidates)
         return self._figures_of(self._rig(found.candidates)), cost
 
@@ -280,7 +276,7 @@ class _Work:
         prediction = self.layer.predict([self.layer.terms(camera) for camera in rig], variant=VARIANT)
         return Figures.of(prediction, self.room.keys.target).to_row()
 
-    def _judged(self, refined: Sequence[Found]) -> list[tuple[Found, Figures]]:
+    def _judged(self, refined: Sequence[CandidateSet]) -> list[tuple[CandidateSet, Figures]]:
         """Return the refined sets with their figures by the fast layer, best first."""
         results = []
         for k, each in enumerate(refined):
@@ -310,8 +306,8 @@ class _Work:
         return results
 
     def _confirmed(
-        self, judged: Sequence[tuple[Found, Figures]], usual: Sequence[tuple[str, Rig, Figures]]
-    ) -> tuple[tuple[Alternative, ...], Found]:
+        self, judged: Sequence[tuple[CandidateSet, Figures]], usual: Sequence[tuple[str, Rig, Figures]]
+    ) -> tuple[tuple[Alternative, ...], CandidateSet]:
         """Return the compared rigs, the plan first, and the set of the plan."""
         titles = ("plan", "second", "third", *(f"{k}th" for k in range(4, 4 + len(judged))))
         rigs = [self._rig(found.candidates) for found, _ in judged] + [rig for _, rig, _ in usual]
@@ -344,7 +340,7 @@ class _Work:
         found = self.ledger.result(f"simulated {self.scenes} {key}", work)
         return [Figures(tuple(pcp), tuple(error)) for pcp, error in found]
 
-    def _worth(self, best: Found) -> tuple[Prediction, list[float]]:
+    def _worth(self, best: CandidateSet) -> tuple[Prediction, list[float]]:
         """Return the maps of the plan, and the loss of PCP without each of its cameras."""
         terms = [self.layer.terms(camera) for camera in self._rig(best.candidates)]
         whole = self.layer.predict(terms, variant=VARIANT)
@@ -357,7 +353,7 @@ class _Work:
         ]
 
     def _cameras(
-        self, names: Sequence[str], best: Found, near: Sequence[Found], worth: Sequence[float]
+        self, names: Sequence[str], best: CandidateSet, near: Sequence[CandidateSet], worth: Sequence[float]
     ) -> tuple[PlannedCamera, ...]:
         fixed = len(self.room.fixed)
         cameras = [

@@ -1,4 +1,7 @@
-"""Maps of the floor: a coloured cell with its number for each place, the cameras, the volume and the room."""
+"""Plots of a rehearsal: maps of the floor, and curves over people, cameras, and errors of calibration and clocks.
+
+A map has a coloured cell with its number for each place, the cameras, the volume and the room.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +17,12 @@ from matplotlib.patches import Ellipse, Polygon, Rectangle
 from mvpose import Camera
 from mvpose.arrays import Bools, Floats
 from mvpose.report.rig_plots import camera_from_above, fit_view, name_cameras
-from mvpose.report.svg_plots import FAINT, INK, svg_plot
-from simharness.planning.rehearsal import Rehearsal
+from mvpose.report.svg_plots import FAINT, INK, legend_above, svg_plot
+from simharness.planning.rehearsal_result import Rehearsal
 from simharness.planning.sentences import grid_spacing
+from simharness.planning.tolerance import CLIFF, FaultTolerance
 from simharness.planning.visibility import Obstacle
+from simharness.statistics.intervals import Interval
 
 GOOD = "#1f8a5b"
 """Colour of the line around places that meet the target."""
@@ -35,10 +40,19 @@ _DARK = 0.5  # luminance under which numbers are white
 _BETTER = LinearSegmentedColormap.from_list("better", ["#f3efe6", "#b9d3e8", "#5f9bd0", "#1f5f9f"])
 _WORSE = LinearSegmentedColormap.from_list("worse", ["#f3f1ee", "#f3cfae", "#dd8452", "#a3341f"])
 _NICE = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # factors by which ellipses are drawn larger
+LAYER = "#8a63c9"
+"""Colour of the fast layer."""
+
+SIMULATION = "#3b82c4"
+"""Colour of the simulation."""
+
+_WIDE = (4.9, 2.9)
+_SMALL = (3.5, 2.6)
+_FLOOR = 5.0  # PCP: axes begin at a multiple of this
 
 
 @dataclass(frozen=True)
-class Scale:
+class MapColors:
     """Colours and numbers of a map.
 
     Attributes:
@@ -65,7 +79,7 @@ class Scale:
 def floor_map(
     rehearsal: Rehearsal,
     values: Floats,
-    scale: Scale,
+    scale: MapColors,
     *,
     name: str,
     outlined: bool = True,
@@ -128,6 +142,26 @@ def ellipse_map(rehearsal: Rehearsal, *, name: str) -> tuple[str, str]:
     return written[0], f"{factor:g}"
 
 
+def simulated_map(rehearsal: Rehearsal, values: Sequence[Floats], *, least: int = 4) -> Floats:
+    """Return the mean of values of simulated people at each place, (P,); NaN where fewer than ``least`` were.
+
+    Args:
+        rehearsal: the rehearsal, with its scenes.
+        values: a value of each person of each frame, (F, P) for each scene; NaN: none.
+        least: least number of values.
+    """
+    places = rehearsal.prediction.places
+    spacing = grid_spacing(places)
+    where = np.concatenate([each.places.reshape(-1, 2) for each in rehearsal.scenes])
+    flat = np.concatenate([each.ravel() for each in values])
+    away = np.abs(where[:, None] - places[None]).max(axis=2)
+    cell = np.where(away.min(axis=1) <= spacing / 2 + 1e-9, away.argmin(axis=1), -1)
+    known = np.isfinite(flat) & (cell >= 0)
+    count = np.bincount(cell[known], minlength=len(places))
+    total = np.bincount(cell[known], flat[known], minlength=len(places))
+    return np.where(count >= least, total / np.maximum(count, 1), np.nan)
+
+
 def outline_of(places: Floats, chosen: Bools) -> list[Floats]:
     """Return the sides of the cells of a square grid (P, 2) that part chosen cells from others, each (2, 2), metres."""
     if not chosen.any():
@@ -156,24 +190,82 @@ def corners_of(obstacle: Obstacle) -> Floats:
     return np.concatenate([np.column_stack([floor, np.full(4, z)]) for z in (low, high)])
 
 
-def simulated_map(rehearsal: Rehearsal, values: Sequence[Floats], *, least: int = 4) -> Floats:
-    """Return the mean of values of simulated people at each place, (P,); NaN where fewer than ``least`` were.
+def crowd_curve(rehearsal: Rehearsal, *, name: str) -> str:
+    """Plot PCP against the number of people: the fast layer as a line, simulation as points with intervals."""
+    crowds = rehearsal.crowds
+    with svg_plot(name, size=_WIDE) as (axes, written):
+        axes.plot(
+            [each.people for each in crowds],
+            [each.layer_pcp for each in crowds],
+            "--",
+            color=LAYER,
+            lw=1.5,
+            label="fast layer",
+        )
+        known = [(each.people, each.pcp) for each in crowds if each.pcp is not None]
+        _points(axes, [number for number, _ in known], [pcp for _, pcp in known], "simulation")
+        axes.axhline(rehearsal.target.pcp, color=FAINT, lw=0.9, ls=":")
+        values = [each.layer_pcp for each in crowds] + [_low(pcp) for _, pcp in known]
+        axes.set(xlabel="people in the volume", ylabel="PCP, %", ylim=(_bottom(values), 101))
+        axes.set_xticks([each.people for each in crowds])
+        axes.grid(axis="y")
+        legend_above(axes, columns=2)
+    return written[0]
 
-    Args:
-        rehearsal: the rehearsal, with its scenes.
-        values: a value of each person of each frame, (F, P) for each scene; NaN: none.
-        least: least number of values.
-    """
-    places = rehearsal.prediction.places
-    spacing = grid_spacing(places)
-    where = np.concatenate([each.places.reshape(-1, 2) for each in rehearsal.scenes])
-    flat = np.concatenate([each.ravel() for each in values])
-    away = np.abs(where[:, None] - places[None]).max(axis=2)
-    cell = np.where(away.min(axis=1) <= spacing / 2 + 1e-9, away.argmin(axis=1), -1)
-    known = np.isfinite(flat) & (cell >= 0)
-    count = np.bincount(cell[known], minlength=len(places))
-    total = np.bincount(cell[known], flat[known], minlength=len(places))
-    return np.where(count >= least, total / np.maximum(count, 1), np.nan)
+
+def matching_curve(rehearsal: Rehearsal, *, name: str) -> str:
+    """Plot the simulated percentage of matches that take two people for one, against the number of people."""
+    known = [(each.people, each.mixed) for each in rehearsal.crowds if each.mixed is not None]
+    with svg_plot(name, size=_WIDE) as (axes, written):
+        _points(axes, [number for number, _ in known], [mixed for _, mixed in known], "simulation")
+        top = max([5.0, *(each.high for _, each in known if np.isfinite(each.high))])
+        axes.set(xlabel="people in the volume", ylabel="matches of two people, %", ylim=(0, 1.05 * top))
+        axes.set_xticks([each.people for each in rehearsal.crowds])
+        axes.grid(axis="y")
+    return written[0]
+
+
+def tolerance_curve(tolerance: FaultTolerance, base: Interval, *, name: str, bottom: float) -> str:
+    """Plot PCP against the size of one kind of error, with the level at which it has lost five points."""
+    with svg_plot(name, size=_SMALL) as (axes, written):
+        _points(axes, [0.0, *tolerance.fault.levels], [base, *tolerance.pcp], "", line=True)
+        axes.axhline(base.mean - CLIFF, color=FAINT, lw=0.9, ls=":")
+        if tolerance.cliff is not None:
+            axes.axvline(tolerance.cliff, color="#d9643a", lw=1.3)
+        unit = tolerance.fault.unit
+        axes.set(xlabel=f"standard deviation, {unit}", ylabel="PCP, %", ylim=(bottom, 101))
+        axes.grid(axis="y")
+    return written[0]
+
+
+def tolerance_bottom(rehearsal: Rehearsal) -> float:
+    """Return the lower end of the axes of all tolerances, which they share so that they can be compared."""
+    return _bottom([_low(pcp) for each in rehearsal.tolerances for pcp in each.pcp])
+
+
+def subset_curve(rehearsal: Rehearsal, *, name: str) -> str:
+    """Plot the simulated PCP of all sets of cameras against their number, with the best of each number as a line."""
+    sets = {names: each for names, each in rehearsal.subsets.items() if np.isfinite(each.pcp.mean)}
+    counts = sorted({len(names) for names in sets})
+    with svg_plot(name, size=_WIDE) as (axes, written):
+        axes.plot(
+            [len(names) for names in sets],
+            [each.pcp.mean for each in sets.values()],
+            "o",
+            color=SIMULATION,
+            ms=4.5,
+            alpha=0.45,
+            mew=0,
+            label="a set of cameras",
+        )
+        best = [max(each.pcp.mean for names, each in sets.items() if len(names) == count) for count in counts]
+        axes.plot(counts, best, "-", color=SIMULATION, lw=1.5, label="the best of its size")
+        axes.axhline(rehearsal.target.pcp, color=FAINT, lw=0.9, ls=":")
+        axes.set(xlabel="cameras", ylabel="PCP, %", ylim=(_bottom([each.pcp.mean for each in sets.values()]), 101))
+        axes.set_xticks(counts)
+        axes.grid(axis="y")
+        legend_above(axes, columns=2)
+    return written[0]
 
 
 def _surroundings(axes: Axes, rehearsal: Rehearsal, *, names: bool = True) -> float:
@@ -208,3 +300,22 @@ def _extra(axes: Axes, camera: Camera) -> None:
 
 def _luminance(color: tuple[float, ...]) -> float:
     return 0.299 * color[0] + 0.587 * color[1] + 0.114 * color[2]
+
+
+def _points(axes: Axes, at: Sequence[float], values: Sequence[Interval], label: str, *, line: bool = False) -> None:
+    """Draw means with their intervals."""
+    means = np.array([each.mean for each in values])
+    ends = np.array([[each.low, each.high] for each in values]).reshape(-1, 2)
+    ends = np.where(np.isfinite(ends), ends, means[:, None])
+    for x, (low, high) in zip(at, ends, strict=True):
+        axes.plot([x, x], [low, high], color=SIMULATION, lw=1.2, alpha=0.7)
+    axes.plot(at, means, "o-" if line else "o", color=SIMULATION, lw=1.4, ms=4.6, mew=0, label=label or None)
+
+
+def _low(value: Interval) -> float:
+    return value.low if np.isfinite(value.low) else value.mean
+
+
+def _bottom(values: list[float]) -> float:
+    known = [each for each in values if np.isfinite(each)]
+    return max(0.0, _FLOOR * (np.floor(min(known, default=95.0) / _FLOOR) - 0.2))
