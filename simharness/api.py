@@ -20,7 +20,7 @@ A scenario file as an assertion, for test suites::
     def test_the_method_is_robust():
         simharness.assert_robust("scenarios/ci.toml", seeds=4, pcp=90, recall=95, ghosts=0.3)
 
-Studies have a module of their own: :mod:`simharness.study.runner`.
+Studies have a module of their own: :mod:`simharness.study.study_run`.
 """
 
 from __future__ import annotations
@@ -137,8 +137,8 @@ def _run_unstored(study: Study, workers: int) -> Mapping[TrialKey, Mapping[str, 
 
 def _run_stored(study: Study, folder: Path, workers: int) -> dict[TrialKey, Mapping[str, float | None]]:
     """Run the unfinished trials of a study in a folder, and return the scores of all trials."""
-    from simharness.study.plan import plan
-    from simharness.study.runner import run_study
+    from simharness.study.study_plan import plan
+    from simharness.study.study_run import run_study
 
     planned = plan(study)
     results = run_study(study, out=folder, workers=workers)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from simharness.study import runner
+from simharness.study import study_run
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 
@@ -27,8 +27,8 @@ def test_an_example_runs(example, tmp_path, monkeypatch, capfd):
     def run_study_here(*given, **options):
         return run_study(*given, **{**options, "workers": 1})
 
-    run_study = runner.run_study
-    monkeypatch.setattr(runner, "run_study", run_study_here)
+    run_study = study_run.run_study
+    monkeypatch.setattr(study_run, "run_study", run_study_here)
     monkeypatch.setattr(sys, "argv", [str(example)])
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(example), run_name="__main__")

@@ -18,7 +18,7 @@ from mvpose import Rig
 from simharness.planning import Volume
 from simharness.planning.rehearsal_scene import ACTIVITIES, SceneSettings
 from simharness.planning.scene_results import Condition, interval_of
-from simharness.planning.simulation import SceneBatch, simulate_scenes
+from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
 from simharness.reality.recording_file import read_recording
 from simharness.reality.validation.subsets import FILLED, camera_subsets
 from simharness.runtime.progress import reporter

@@ -26,7 +26,7 @@ from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.bias import world_offsets
 from simharness.planning import FastLayer, Volume
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.annotation import AnnotationModel
+from simharness.reality.annotation_errors import AnnotationModel
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, track_people
 from simharness.reality.recording_file import read_recording

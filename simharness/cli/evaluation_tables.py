@@ -16,7 +16,7 @@ from simharness.reality.evaluation import Evaluation
 from simharness.reality.published_scores import ABLATION, PublishedPcp
 from simharness.reality.twin_comparison import TOLERANCE
 from simharness.scoring.pcp import GROUPS
-from simharness.scoring.summary import STAGES
+from simharness.scoring.score_summary import STAGES
 from simharness.scoring.tracking.columns import DISTANCE
 
 if TYPE_CHECKING:

@@ -37,8 +37,8 @@ def fit_detector(
     """Measure the errors of the detector of a recording, and write a detector profile with them."""
     with exit_on_error():
         from simharness.reality.detector_fit.fit import fit, write_profile
-        from simharness.reality.detector_fit.plot import plot_comparison
-        from simharness.reality.detector_fit.table import print_agreement, print_annotation, print_measurement
+        from simharness.reality.detector_fit.fit_plot import plot_comparison
+        from simharness.reality.detector_fit.fit_table import print_agreement, print_annotation, print_measurement
         from simharness.reality.recording_file import read_recording
         from simharness.reality.twin import TwinModel, simulate_twins
         from simharness.runtime.progress import reporter

@@ -13,7 +13,7 @@ from simharness.cli.options import BlameSeeds
 
 if TYPE_CHECKING:
     from simharness.outputs.study.worst_frames import WorstFrame
-    from simharness.study.result_folder import Results
+    from simharness.study.study_folder import Results
 
 
 def add_to(app: typer.Typer) -> None:
@@ -74,7 +74,7 @@ def report(
         if blame and (rerun is not None or digest is not None):
             raise ValueError("--blame: is part of the report, which --rerun and --digest replace; give one of them")
         thresholds = _thresholds(threshold or [])
-        from simharness.study.result_folder import read_study
+        from simharness.study.study_folder import read_study
         from simharness.trial.run_folder import is_run
 
         if is_run(study):

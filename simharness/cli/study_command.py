@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from simharness.cli.score_tables import ScoreTable
     from simharness.outputs.study.losses import Loss
-    from simharness.study.result_folder import Results
+    from simharness.study.study_folder import Results
 
 INTERRUPTED = 130
 _LISTED = 10  # failed trials that are listed
@@ -88,7 +88,7 @@ def study(
         loaded = load_study(file, overrides=overrides or (), seeds=seeds, variants=variant or None, limit=limits)
         part = _part(shard)
         from simharness.runtime.progress import reporter
-        from simharness.study.runner import run_shard, run_study
+        from simharness.study.study_run import run_shard, run_study
 
         if part is not None:
             kept_in = store or out / "store"

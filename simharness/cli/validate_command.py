@@ -75,10 +75,10 @@ def validate(
         place = out or Path("results/validation") / recorded.name
         make_folder(place)
         from simharness.outputs.validation.page import render_validation
-        from simharness.reality.validation.prediction import predict_halves, simulate_predictions
-        from simharness.reality.validation.summary import summarize_halves, summarize_validation
+        from simharness.reality.validation.unseen_prediction import predict_halves, simulate_predictions
         from simharness.reality.validation.validation import QUICK, Plan
         from simharness.reality.validation.validation import validate as compare
+        from simharness.reality.validation.validation_summary import summarize_halves, summarize_validation
         from simharness.trial.provenance import provenance
 
         plan = replace(QUICK if quick else Plan(), workers=workers or os.cpu_count() or 1)

@@ -20,8 +20,8 @@ from simharness.runtime.version import code_version
 from simharness.scenario.sections.method_section import MethodSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study
-from simharness.study.measure import StoredTrial, TrialOutput
 from simharness.study.scheduler import TrialSuccess, Unit, run_units
+from simharness.study.stored_trial import StoredTrial, TrialOutput
 from simharness.trial.identity import trial_identity
 from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.estimators import estimators_of

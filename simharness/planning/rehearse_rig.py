@@ -26,7 +26,7 @@ from simharness.planning.rehearsal_scene import SceneSettings
 from simharness.planning.rig_checks import check_rig
 from simharness.planning.scene_results import Condition, SceneResult, interval_of, loss_of
 from simharness.planning.sentences import sentences
-from simharness.planning.simulation import SceneBatch, simulate_scenes
+from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
 from simharness.planning.tolerance import fault_conditions, tolerances
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume

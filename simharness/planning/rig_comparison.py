@@ -13,7 +13,7 @@ from simharness.planning.candidates import Candidate, candidate, places_in
 from simharness.planning.rehearsal_scene import SceneSettings
 from simharness.planning.room import Room
 from simharness.planning.scene_results import Condition, SceneResult
-from simharness.planning.simulation import SceneBatch, simulate_scenes
+from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
 from simharness.planning.value_fit import VARIANT, obstacles_of
 from simharness.planning.volume import Volume
 from simharness.runtime.progress import Reporter, Silence

@@ -14,7 +14,7 @@ from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.scoring.frame import score_frame
 from simharness.scoring.matching import count_violations
-from simharness.scoring.summary import VariantScores, summarize
+from simharness.scoring.score_summary import VariantScores, summarize
 from simharness.scoring.tracking.summary import tracking_of_some
 from simharness.trial.stages.tracking import track_frames
 

@@ -12,15 +12,15 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.annotation import annotate_simulation
+from simharness.reality.annotation_errors import annotate_simulation
 from simharness.reality.evaluation import Evaluation, score_estimates
 from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.pcp import Part
-from simharness.scoring.summary import VariantScores
-from simharness.statistics.bootstrap import block_weights, blocks, interval, resampled
+from simharness.scoring.score_summary import VariantScores
 from simharness.statistics.intervals import mean_interval
 from simharness.statistics.jackknife import pseudo_values
+from simharness.statistics.resampling import block_weights, blocks, interval, resampled
 from simharness.trial.run_trial import TrialResult, run_trial
 
 _ATTEMPTS = 3  # seeds tried for each one requested, because randomly drawn people may not fit beside clutter

@@ -14,7 +14,7 @@ import numpy as np
 from mvpose import COCO17
 from simharness.detector.bias import world_offsets
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.annotation import AnnotationModel
+from simharness.reality.annotation_errors import AnnotationModel
 from simharness.reality.detector_fit.fit import Fit
 from simharness.reality.people_tracks import TrackedPeople
 from simharness.reality.reenactment import Film, cut_takes, film

@@ -15,7 +15,7 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.evaluation import evaluate
 from simharness.reality.seed_evaluation import PcpInterval, pcp_interval
 from simharness.runtime.progress import Reporter, Silence
-from simharness.scoring.summary import VariantScores
+from simharness.scoring.score_summary import VariantScores
 
 VARIANTS = ("full", "fast", "no-3dps", "no-matching")
 """Presets that are compared."""

@@ -14,16 +14,16 @@ from mvpose import COCO17, Estimate
 from mvpose.arrays import Floats
 from simharness.scoring.average_precision import average_precision, nearest_people
 from simharness.scoring.catalogue import AP_MM, PCK_MM
+from simharness.scoring.feet_and_hands import WholeBodyInput, whole_body_scores
 from simharness.scoring.frame import score_frame
 from simharness.scoring.joint_errors import joint_errors
 from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, count_pairs, count_violations
 from simharness.scoring.pairing import Pairing
 from simharness.scoring.pck import pck, pck_area
 from simharness.scoring.pcp import Part
-from simharness.scoring.registry import ScoreInput, compute_scores
 from simharness.scoring.reprojection import reprojection_errors
-from simharness.scoring.summary import STAGES, VariantScores
-from simharness.scoring.whole_body import WholeBodyInput, whole_body_scores
+from simharness.scoring.score_registry import ScoreInput, compute_scores
+from simharness.scoring.score_summary import STAGES, VariantScores
 from simharness.types.recording import Recording
 from simharness.types.views import Visibility
 

@@ -9,9 +9,9 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
 from mvpose import COCO17
+from simharness.scoring.feet_and_hands import WHOLE_BODY_MM
 from simharness.scoring.pcp import GROUPS
-from simharness.scoring.registry import ScoreInfo, registered_scores
-from simharness.scoring.whole_body import WHOLE_BODY_MM
+from simharness.scoring.score_registry import ScoreInfo, registered_scores
 
 __all__ = ["AP_MM", "HEADLINE", "PCK_MM", "SCORES", "ScoreInfo"]
 

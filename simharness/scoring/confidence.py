@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from simharness.scoring.joint_errors import joint_errors
-from simharness.scoring.registry import ScoreInfo, ScoreInput, finite_mean, score
+from simharness.scoring.score_registry import ScoreInfo, ScoreInput, finite_mean, score
 
 SHARE = 0.9
 """Share of joints that the ellipsoids of ``coverage_90`` should hold."""

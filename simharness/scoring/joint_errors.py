@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from mvpose import COCO17, Skeleton
 from mvpose.arrays import Floats
-from simharness.scoring.registry import ScoreInfo, ScoreInput, finite_mean, score
+from simharness.scoring.score_registry import ScoreInfo, ScoreInput, finite_mean, score
 
 
 def joint_errors(truth: ArrayLike, estimate: ArrayLike) -> Floats:

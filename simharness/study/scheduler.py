@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from simharness.runtime.errors import RunError
 from simharness.runtime.worker_processes import worker_context
 from simharness.scenario.sections.scenario import Scenario
-from simharness.study.measure import StoredTrial, TrialOutput
+from simharness.study.stored_trial import StoredTrial, TrialOutput
 from simharness.trial.archive import TrialArchive
 from simharness.trial.identity import code
 
@@ -34,7 +34,7 @@ _PATIENCE = 30.0  # seconds to wait for a scheduler
 _FIRST_WORKER = 30.0  # seconds to wait for the first worker of a scheduler without workers
 
 Measure = Callable[[Scenario, Sequence[str], StoredTrial], TrialOutput]
-"""Function that measures a trial in any process, by default :func:`simharness.study.measure.measure`. It must be
+"""Function that measures a trial in any process, by default :func:`simharness.study.stored_trial.measure`. It must be
 picklable and raise a ValueError for an error of the scenario."""
 
 

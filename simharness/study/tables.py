@@ -10,8 +10,8 @@ import polars as pl
 
 from simharness.scenario.study_definition import Value
 from simharness.scoring.catalogue import SCORES
-from simharness.study.plan import PlannedTrial
-from simharness.study.result_folder import Tables
+from simharness.study.study_folder import Tables
+from simharness.study.study_plan import PlannedTrial
 from simharness.study.trial_store import Entry
 
 _FIRST = ("trial", "case", "varied", "seed", "variant")

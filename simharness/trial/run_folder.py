@@ -29,7 +29,7 @@ A result folder holds, for T frames, V cameras, P people, J joints and n detecti
     estimated people in the order of `estimates.npz`, ``NAME/joints`` (k, J, 3) m, ``NAME/scores`` (k, J) and
     ``NAME/covariance`` (k, J, 3, 3) m² where the variant has it.
 `scores.parquet`
-    a row for each frame and variant: :mod:`simharness.scoring.summary`.
+    a row for each frame and variant: :mod:`simharness.scoring.score_summary`.
 `timings.parquet`
     ``variant``, ``frame``, ``stage``, ``seconds``: a separate file, because all files above are the same bytes in two
     runs.

@@ -25,9 +25,9 @@ from simharness.runtime.stages import Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import Assessment, assess
 from simharness.scoring.catalogue import SCORES
-from simharness.scoring.failures.failure_classes import find_failures
-from simharness.scoring.failures.stage_blame import blame_frames, failure_scores, failure_table
-from simharness.scoring.whole_body import WholeBodyInput
+from simharness.scoring.failure_classes import find_failures
+from simharness.scoring.feet_and_hands import WholeBodyInput
+from simharness.scoring.stage_blame import blame_frames, failure_scores, failure_table
 from simharness.trial.audit import audit
 from simharness.trial.kernel_compilation import Compilation
 from simharness.trial.needs import require_memory

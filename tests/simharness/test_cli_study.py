@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.study.result_folder import read_study
+from simharness.study.study_folder import read_study
 
 QUICKSTART = str(Path(__file__).parents[2] / "scenarios" / "quickstart.toml")
 TINY = [

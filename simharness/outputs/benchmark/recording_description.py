@@ -7,7 +7,7 @@ from typing import Any
 from mvpose import SHELF14, Rig
 from simharness.formats.npz_joints import write_tracks
 from simharness.outputs.benchmark.layout import Layout
-from simharness.reality.annotation import annotate_simulation
+from simharness.reality.annotation_errors import annotate_simulation
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_files import dumps_keys
 from simharness.types.sequence import Sequence

@@ -8,7 +8,7 @@ from typing import Any
 
 from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import SCORES
-from simharness.scoring.whole_body import WHOLE_BODY_SCORES
+from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES
 
 NOTHING = "–"
 """Text of a score that does not apply."""

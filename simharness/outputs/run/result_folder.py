@@ -17,10 +17,10 @@ from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.load import fingerprint
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scoring.summary import VariantScores, summarize
+from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES
+from simharness.scoring.score_summary import VariantScores, summarize
 from simharness.scoring.tracking.summary import tracking_summary
 from simharness.scoring.tracking.tracked_frames import ids_of
-from simharness.scoring.whole_body import WHOLE_BODY_SCORES
 from simharness.study.causes.blame_file import write_blame
 from simharness.study.causes.cause_shares import blame
 from simharness.trial.arrays import Arrays, estimate_arrays, whole_arrays

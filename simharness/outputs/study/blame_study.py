@@ -6,7 +6,7 @@ import polars as pl
 
 from simharness.runtime.progress import Reporter
 from simharness.study.causes.cause_shares import Blame, blame
-from simharness.study.result_folder import Results
+from simharness.study.study_folder import Results
 
 
 def blame_study(results: Results, *, seeds: int, workers: int = 1, reporter: Reporter | None = None) -> Blame:

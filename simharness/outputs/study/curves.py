@@ -13,7 +13,7 @@ from mvpose.arrays import Floats
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.breaking_points import BreakingPoint, breaking_point
 from simharness.statistics.intervals import Interval, mean_interval
-from simharness.study.result_folder import Results
+from simharness.study.study_folder import Results
 
 
 @dataclass(frozen=True)

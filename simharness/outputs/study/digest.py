@@ -23,7 +23,7 @@ from simharness.outputs.study.failure_rates import failure_rates
 from simharness.outputs.study.page import THRESHOLDS
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval, mean_interval
-from simharness.study.result_folder import Results
+from simharness.study.study_folder import Results
 from simharness.trial.provenance import PROVENANCE
 
 SCORED = tuple(dict.fromkeys(HEADS + PRINTED))

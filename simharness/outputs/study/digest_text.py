@@ -12,8 +12,8 @@ from simharness.outputs.study.tables import OVER_TIME
 from simharness.runtime.number_text import fixed
 from simharness.runtime.progress import duration
 from simharness.scoring.catalogue import AP_MM, SCORES, ScoreInfo
-from simharness.scoring.failures.failure_classes import FailureKind
-from simharness.scoring.failures.stage_blame import Stage
+from simharness.scoring.failure_classes import FailureKind
+from simharness.scoring.stage_blame import Stage
 
 HEADS = ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts")
 """Scores of the first table of a digest."""

@@ -10,7 +10,7 @@ import polars as pl
 from mvpose.arrays import Floats
 from simharness.statistics.intervals import mean_interval
 from simharness.statistics.jackknife import pseudo_values
-from simharness.study.result_folder import Results
+from simharness.study.study_folder import Results
 
 NOT_BLAMED = "not determined"
 """Stage of a failure whose stage to blame was not determined."""

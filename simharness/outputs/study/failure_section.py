@@ -8,8 +8,8 @@ from typing import Any
 import polars as pl
 
 from simharness.outputs.study import tables
-from simharness.scoring.failures.failure_classes import DISPLACED, FailureKind
-from simharness.study.result_folder import Results
+from simharness.scoring.failure_classes import DISPLACED, FailureKind
+from simharness.study.study_folder import Results
 
 MEANING: Mapping[FailureKind, str] = {
     FailureKind.MISSED: "no estimate within 500 mm",

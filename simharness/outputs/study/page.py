@@ -31,7 +31,7 @@ from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scoring.catalogue import SCORES
 from simharness.study.causes.blame_file import read_blame
 from simharness.study.causes.cause_shares import Blame
-from simharness.study.result_folder import Results
+from simharness.study.study_folder import Results
 
 THRESHOLDS: Mapping[str, float] = {"pcp": 90.0, "precision": 90.0}
 """Default thresholds of the breaking points. Ghosts do not lower PCP; they lower precision."""

@@ -18,9 +18,9 @@ from simharness.scenario.named_files import relative_files
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study, load_study
 from simharness.scenario.toml_files import toml
-from simharness.scoring.failures.failure_classes import FailureKind
+from simharness.scoring.failure_classes import FailureKind
 from simharness.scoring.pairing import LIMIT
-from simharness.study.result_folder import Results
+from simharness.study.study_folder import Results
 from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback
 

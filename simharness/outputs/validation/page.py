@@ -11,8 +11,8 @@ from markupsafe import Markup
 from mvpose import SHELF14
 from simharness.outputs.documents import fill_template, provenance_sentence
 from simharness.outputs.validation import plots, tables
+from simharness.reality.validation.detection_figures import AFFINITY_EDGES, AMBIGUOUS
 from simharness.reality.validation.evidence import Compared
-from simharness.reality.validation.measurements import AFFINITY_EDGES, AMBIGUOUS
 from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.validation import Validation
 from simharness.reality.validation.verdicts import BOUNDS, State

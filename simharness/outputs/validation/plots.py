@@ -13,9 +13,9 @@ from mvpose.arrays import Floats
 from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
 from simharness.reality.validation.dose import Response
 from simharness.reality.validation.evidence import Compared
-from simharness.reality.validation.scores import JointDifficulty
 from simharness.reality.validation.subsets import SubsetComparison
 from simharness.reality.validation.treatments import KINDS
+from simharness.reality.validation.variant_comparison import JointDifficulty
 from simharness.reality.validation.verdicts import BOUNDS
 
 REAL_COLOR: Color = "#8b93a1"

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from simharness.reality.detector_fit.measure import point_estimates
+from simharness.reality.detector_fit.detector_measurement import point_estimates
 from simharness.reality.detector_fit.sample import Sample
 
 ROUNDS = 3

@@ -10,11 +10,11 @@ import numpy as np
 
 from mvpose.files.atomic_files import write_atomic
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.annotation import AnnotationFit, fit_annotation
+from simharness.reality.annotation_errors import AnnotationFit, fit_annotation
 from simharness.reality.detector_fit.calibration import calibrate
+from simharness.reality.detector_fit.detector_measurement import RESAMPLES, MeasuredDetector, measure
 from simharness.reality.detector_fit.face_bias import face_bias
 from simharness.reality.detector_fit.joint_labels import label_joints
-from simharness.reality.detector_fit.measure import RESAMPLES, MeasuredDetector, measure
 from simharness.reality.detector_fit.profile import as_toml, settings
 from simharness.reality.detector_fit.sample import Sample, sample_of
 from simharness.reality.people_tracks import TrackedPeople, track_people
@@ -59,7 +59,7 @@ def fit(
         seed: seed of the resamples, and of the bodies of the re-enactment.
 
     Raises:
-        ValueError: nobody to re-enact; see also :func:`~simharness.reality.detector_fit.measure.measure`.
+        ValueError: nobody to re-enact; see also :func:`~simharness.reality.detector_fit.detector_measurement.measure`.
     """
     people = track_people(recording)
     filmed = film(recording, people, seed=seed)

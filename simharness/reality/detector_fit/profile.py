@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.reality.detector_fit.measure import MeasuredDetector, MeasuredValue
+from simharness.reality.detector_fit.detector_measurement import MeasuredDetector, MeasuredValue
 from simharness.scenario.sections.detector_section import KINDS, LARGEST_MULTIPLE, DetectorSection
 
 _FACE_DROPS = ("keypoints.drop.visible", "keypoints.drop.self_occluded")

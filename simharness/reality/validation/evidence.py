@@ -12,8 +12,8 @@ from mvpose.arrays import Floats
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.validation.passes import Change, Tallies
 from simharness.reality.validation.tally import Tally
-from simharness.statistics.bootstrap import block_weights, interval
 from simharness.statistics.intervals import Interval, mean_interval
+from simharness.statistics.resampling import block_weights, interval
 
 RESAMPLES = 500
 """Number of bootstrap resamples of a recording's frames."""

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from simharness.reality.annotated_recording import DetectorKind
+from simharness.reality.validation.detection_figures import BONES, TREE
 from simharness.reality.validation.dose import Response
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.frame_scores import HeadRule
-from simharness.reality.validation.measurements import BONES, TREE
 from simharness.reality.validation.subsets import SubsetComparison
 from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.verdicts import Bounds, Verdict, at_least, average, near, ratio, same_sign

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from mvpose.arrays import Floats
+from simharness.reality.validation.detection_figures import Measurements, Ratio, bone_variation
 from simharness.reality.validation.evidence import Compared, compared
-from simharness.reality.validation.measurements import Measurements, Ratio, bone_variation
-from simharness.statistics.bootstrap import resampled
+from simharness.statistics.resampling import resampled
 
 
 def compare_measurements(real: Measurements, twins: Sequence[Measurements], weights: Floats) -> dict[str, Compared]:

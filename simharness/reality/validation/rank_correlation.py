@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 from scipy.stats import rankdata
 
 from mvpose.arrays import Floats
-from simharness.statistics.bootstrap import interval
 from simharness.statistics.intervals import Interval
+from simharness.statistics.resampling import interval
 
 
 def rank_correlation(real: ArrayLike, twin: ArrayLike, *, resamples: Floats | None = None) -> Interval:

@@ -10,7 +10,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.reality.validation.frame_scores import RULES, FrameScores, HeadRule
 from simharness.scoring.pcp import Part
-from simharness.statistics.bootstrap import resampled
+from simharness.statistics.resampling import resampled
 
 DEFAULT_RULE = RULES[0]
 
@@ -65,7 +65,7 @@ class Tally:
         return Tally(*(getattr(self, field.name).sum(axis=0) for field in fields(self)))
 
     def resampled(self, weights: Floats) -> Tally:
-        """Return the sums of R resamples of F frames, from :func:`~simharness.statistics.bootstrap.block_weights`."""
+        """Return the sums of R resamples of F frames, from :func:`~simharness.statistics.resampling.block_weights`."""
         return Tally(*(resampled(getattr(self, field.name), weights) for field in fields(self)))
 
     def pcp(self, rule: HeadRule = DEFAULT_RULE) -> Floats:

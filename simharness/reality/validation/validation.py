@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from simharness.reality.annotated_recording import AnnotatedRecording
+from simharness.reality.validation.detection_figures import Measurements, measure
 from simharness.reality.validation.dose import Response, compare_responses
 from simharness.reality.validation.evidence import Compared, Evidence, compared, frame_weights
 from simharness.reality.validation.frame_scores import RULES, FrameScores, HeadRule
 from simharness.reality.validation.judge import judge_measurements, judge_responses, judge_scores, judge_subsets
 from simharness.reality.validation.measured import compare_measurements
-from simharness.reality.validation.measurements import Measurements, measure
 from simharness.reality.validation.passes import (
     VARIANTS,
     Change,
@@ -23,7 +23,10 @@ from simharness.reality.validation.passes import (
     run_passes,
     score_recordings,
 )
-from simharness.reality.validation.scores import (
+from simharness.reality.validation.subsets import Cameras, SubsetComparison, camera_subsets, compare_subsets
+from simharness.reality.validation.tally import Tally
+from simharness.reality.validation.treatments import treatments
+from simharness.reality.validation.variant_comparison import (
     JointDifficulty,
     compare_contrasts,
     compare_joints,
@@ -31,9 +34,6 @@ from simharness.reality.validation.scores import (
     median_error,
     pcp_of_parts,
 )
-from simharness.reality.validation.subsets import Cameras, SubsetComparison, camera_subsets, compare_subsets
-from simharness.reality.validation.tally import Tally
-from simharness.reality.validation.treatments import treatments
 from simharness.reality.validation.verdicts import BOUNDS, Bounds, State, Verdict
 from simharness.runtime.progress import Reporter, Silence
 

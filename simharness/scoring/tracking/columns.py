@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from mvpose import COCO17
-from simharness.scoring.registry import ScoreInfo, ScoreInput, score, scores
+from simharness.scoring.score_registry import ScoreInfo, ScoreInput, score, scores
 from simharness.scoring.tracking.figures import SHARES, identity_figures
 from simharness.scoring.tracking.motion_scores import jerk_ratio, velocity_error
 from simharness.scoring.tracking.tracked_frames import ids_of, tracked_frames

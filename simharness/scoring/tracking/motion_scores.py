@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
-from simharness.scoring.registry import finite_mean
+from simharness.scoring.score_registry import finite_mean
 
 
 def velocity(positions: ArrayLike, time: ArrayLike) -> Floats:

@@ -19,7 +19,7 @@ from simharness.runtime.progress import Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import assess
-from simharness.scoring.failures.substitution import true_labels, with_labels
+from simharness.scoring.substitution import true_labels, with_labels
 from simharness.study.causes.cause_catalogue import Cause, causes_by_name
 from simharness.study.causes.extra_camera import with_one_more_camera
 from simharness.trial.audit import audit

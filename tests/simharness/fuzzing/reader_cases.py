@@ -37,7 +37,7 @@ from simharness.scenario.load import load
 from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import load_study
-from simharness.study.result_folder import Tables, read_study, write_study
+from simharness.study.study_folder import Tables, read_study, write_study
 from simharness.study.trial_store import Entry, Store
 from simharness.trial.run_folder import read_run, write_run
 from simharness.world.motion.mocap.asf import read_amc, read_asf

@@ -25,7 +25,7 @@ def ran(tmp_path_factory):
     """Results of two settings at two seeds with two variants."""
     from simharness.scenario.shipped import shipped_folder
     from simharness.scenario.study_definition import load_study
-    from simharness.study.runner import run_study
+    from simharness.study.study_run import run_study
 
     folder = tmp_path_factory.mktemp("ran")
     file = folder / "tiny.toml"

@@ -15,8 +15,8 @@ from mvpose.report.svg_plots import plot_sheet
 from simharness.cli import app
 from simharness.outputs.study.digest import PRINTED, curves, digest, markdown, write_digest
 from simharness.scoring.catalogue import SCORES
-from simharness.scoring.failures.failure_classes import FailureKind
-from simharness.scoring.failures.stage_blame import Stage
+from simharness.scoring.failure_classes import FailureKind
+from simharness.scoring.stage_blame import Stage
 from simharness.trial.provenance import PROVENANCE
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -12,7 +12,7 @@ from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import score_variant
-from simharness.scoring.summary import summarize
+from simharness.scoring.score_summary import summarize
 from simharness.trial.run_folder import Record
 from simharness.types.recording import Recording
 from simharness.types.truth import Truth

@@ -11,7 +11,7 @@ from mvpose import Rig
 from simharness.planning.rehearsal_scene import SceneSettings
 from simharness.planning.rig_file import read_rig
 from simharness.planning.scene_results import Condition, loss_of
-from simharness.planning.simulation import SceneBatch, simulate_scenes
+from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.scenario.presets import read_profile

@@ -7,7 +7,7 @@ import pytest
 
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.bias import SIDE, body_axes
-from simharness.reality.annotation import AnnotationModel, fit_annotation
+from simharness.reality.annotation_errors import AnnotationModel, fit_annotation
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.sample import sample_of

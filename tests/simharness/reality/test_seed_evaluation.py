@@ -6,7 +6,7 @@ import pytest
 from simharness.reality.seed_evaluation import annotate, evaluate_seeds, pcp_interval
 from simharness.scenario.load import load
 from simharness.scoring.frame import score_frame
-from simharness.scoring.summary import VariantScores
+from simharness.scoring.score_summary import VariantScores
 from simharness.trial.run_trial import run_trial
 
 SHORT = ["duration=0.4", 'method.variants=["fast", "no-3dps"]']

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from simharness.detector.part_tree import PARENT
-from simharness.reality.annotation import fit_annotation
+from simharness.reality.annotation_errors import fit_annotation
+from simharness.reality.detector_fit.detector_measurement import point_estimates
 from simharness.reality.detector_fit.joint_labels import label_joints
-from simharness.reality.detector_fit.measure import point_estimates
 from simharness.reality.detector_fit.sample import sample_of
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, track_people
 from simharness.reality.recording_file import read_recording

@@ -7,9 +7,9 @@ import pytest
 from turning_people import walkers
 
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.reality.annotation import AnnotationModel
+from simharness.reality.annotation_errors import AnnotationModel
+from simharness.reality.detector_fit.detector_measurement import agreement
 from simharness.reality.detector_fit.fit import fit
-from simharness.reality.detector_fit.measure import agreement
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS
 from simharness.reality.seed_evaluation import PcpInterval
 from simharness.reality.twin import TwinModel, detected_twin, simulate_twins

@@ -1,5 +1,5 @@
 from simharness.scoring.catalogue import AP_MM, HEADLINE, PCK_MM, SCORES
-from simharness.scoring.failures.failure_classes import FailureKind
+from simharness.scoring.failure_classes import FailureKind
 
 
 def test_every_score_is_described():

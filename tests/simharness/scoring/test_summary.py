@@ -7,7 +7,7 @@ from simharness.scoring.frame import FrameScore
 from simharness.scoring.matching import PairCounts
 from simharness.scoring.pairing import Pairing
 from simharness.scoring.pcp import GROUPS
-from simharness.scoring.summary import STAGES, VariantScores, summarize
+from simharness.scoring.score_summary import STAGES, VariantScores, summarize
 
 KEYS = {
     "pcp",

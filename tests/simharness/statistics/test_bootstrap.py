@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from simharness.statistics.bootstrap import block_weights, blocks, interval, resampled
+from simharness.statistics.resampling import block_weights, blocks, interval, resampled
 
 TIME = np.arange(300) / 25
 

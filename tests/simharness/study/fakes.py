@@ -20,7 +20,7 @@ import polars as pl
 
 from simharness.scenario.study_definition import Study, load_study
 from simharness.scoring.catalogue import SCORES
-from simharness.study.measure import TrialOutput
+from simharness.study.stored_trial import TrialOutput
 from simharness.trial.variant_result import VariantResult
 
 ALWAYS = 99
@@ -119,7 +119,7 @@ def run_program(folder: Path, **options) -> subprocess.CompletedProcess:
 def main():
     """Run ``simharness study`` with made-up trials."""
     from simharness.cli import study_command
-    from simharness.study import runner
+    from simharness.study import study_run
 
     options = json.loads(sys.argv[1])
     folder = Path(options["folder"])
@@ -128,8 +128,8 @@ def main():
         folder / "calls", harm, **{key: options[key] for key in ("seconds", "large", "stuck") if key in options}
     )
     study_of(folder, cameras=(3, 4), seeds=3)
-    run_study = runner.run_study
-    runner.run_study = lambda *args, **given: run_study(*args, measure=fake, **given)
+    run_study = study_run.run_study
+    study_run.run_study = lambda *args, **given: run_study(*args, measure=fake, **given)
     study_command._report = lambda results: None
     if limit := options.get("file_size"):
         import resource

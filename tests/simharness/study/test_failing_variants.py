@@ -12,10 +12,10 @@ from trials import Recorder
 
 from simharness.gate import suite
 from simharness.runtime.errors import RunError
-from simharness.study.measure import TrialOutput
-from simharness.study.plan import plan
-from simharness.study.runner import run_study
 from simharness.study.scheduler import ATTEMPTS, TrialFailure, TrialSuccess, Unit, run_units
+from simharness.study.stored_trial import TrialOutput
+from simharness.study.study_plan import plan
+from simharness.study.study_run import run_study
 from simharness.study.trial_store import Store
 from simharness.trial.identity import entry_identity
 

@@ -6,7 +6,7 @@ import pytest
 from fakes import Fake, called, study_of
 
 from simharness.study.merge import merge
-from simharness.study.runner import run_shard, run_study
+from simharness.study.study_run import run_shard, run_study
 from simharness.study.trial_store import Store
 
 

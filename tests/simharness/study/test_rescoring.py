@@ -14,9 +14,9 @@ from mvpose import Estimate
 from simharness.scenario.load import load
 from simharness.scenario.study_definition import load_study
 from simharness.scoring import assessment
-from simharness.study.measure import StoredTrial, measure
-from simharness.study.plan import plan
-from simharness.study.runner import run_study
+from simharness.study.stored_trial import StoredTrial, measure
+from simharness.study.study_plan import plan
+from simharness.study.study_run import run_study
 from simharness.study.trial_store import EntryState, Store
 from simharness.trial import identity, run_trial
 from simharness.trial.archive import pack_detected, pack_estimates, unpack_detected, unpack_estimates
@@ -61,7 +61,7 @@ def code(monkeypatch):
 
     def change(**digests):
         changed = replace(current, **digests)
-        for module in (identity, "simharness.study.trial_store", "simharness.study.runner"):
+        for module in (identity, "simharness.study.trial_store", "simharness.study.study_run"):
             target = f"{module}.code" if isinstance(module, str) else "simharness.trial.identity.code"
             monkeypatch.setattr(target, lambda: changed)
 

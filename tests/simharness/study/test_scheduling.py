@@ -6,8 +6,8 @@ import pytest
 from fakes import ALWAYS, Fake, called, made_up, study_of, times
 
 from simharness.study import scheduler as scheduling
-from simharness.study.plan import plan
 from simharness.study.scheduler import TrialFailure, TrialSuccess, Unit, run_units
+from simharness.study.study_plan import plan
 
 
 def units_of(folder, seeds):

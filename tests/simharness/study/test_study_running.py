@@ -10,8 +10,8 @@ from trials import Recorder
 
 from simharness.scenario.study_definition import load_study
 from simharness.scoring.catalogue import SCORES
-from simharness.study.result_folder import TABLES, read_study
-from simharness.study.runner import FailedTrial, Interrupted, run_shard, run_study
+from simharness.study.study_folder import TABLES, read_study
+from simharness.study.study_run import FailedTrial, Interrupted, run_shard, run_study
 from simharness.study.trial_store import Store
 from simharness.trial.identity import entry_identity, trial_identity
 

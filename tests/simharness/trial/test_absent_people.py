@@ -10,7 +10,7 @@ import pytest
 from mvpose.skeleton import SHELF14
 from simharness import load_scenario
 from simharness.capture.ray_casting import RayCaster
-from simharness.reality.annotation import annotate_simulation
+from simharness.reality.annotation_errors import annotate_simulation
 from simharness.runtime.progress import Silence
 from simharness.runtime.stages import Stages
 from simharness.trial.archive import pack_detected, unpack_detected

@@ -11,7 +11,7 @@ from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import RenderingSection, Scenario
 from simharness.scenario.study_definition import load_study
-from simharness.study.runner import run_study
+from simharness.study.study_run import run_study
 from simharness.trial.audit import AuditError, audit, check_calibration, check_clocks, sampled_pictures
 from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.build_trial import build_trial

@@ -28,7 +28,7 @@ from simharness.runtime.frame_pool import map_frames
 from simharness.scenario.load import load
 from simharness.scenario.sections.method_section import EstimatorsSection, MethodSection
 from simharness.scenario.study_definition import load_study
-from simharness.study.runner import run_study
+from simharness.study.study_run import run_study
 from simharness.trial.run_folder import read_run
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.estimation import EstimateFrames

@@ -8,7 +8,7 @@ import pytest
 from mvpose.wholebody import skeleton_by_name
 from simharness.outputs.run.result_folder import _record
 from simharness.scenario.load import load
-from simharness.scoring.whole_body import WHOLE_BODY_SCORES, WholeBodyInput, whole_body_scores
+from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES, WholeBodyInput, whole_body_scores
 from simharness.trial.archive import pack_detected, unpack_detected
 from simharness.trial.run_folder import read_run, write_run
 from simharness.trial.run_trial import Known, run_trial

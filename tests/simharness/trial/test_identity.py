@@ -14,7 +14,7 @@ from simharness.runtime.code_digest import files_of
 from simharness.scenario.load import load
 from simharness.scenario.sections.section import Section
 from simharness.scenario.study_definition import load_study
-from simharness.study.plan import plan
+from simharness.study.study_plan import plan
 from simharness.trial import identity
 from simharness.trial.identity import entry_identity, estimator_code, trial_identity
 
@@ -198,7 +198,7 @@ class TestCode:
             ("simharness/types/truth.py", {"simulation", "scores", "failures"}),
             ("simharness/scoring/pcp.py", {"scores"}),
             ("simharness/scoring/pairing.py", {"scores", "failures"}),
-            ("simharness/scoring/failures/stage_blame.py", {"failures"}),
+            ("simharness/scoring/stage_blame.py", {"failures"}),
             ("mvpose/matching/admm.py", {"method"}),
             ("mvpose/networks/data/reid.onnx", {"method"}),
             ("mvpose/formats/calibration/opencv.py", {"simulation"}),
@@ -229,7 +229,7 @@ class TestCode:
         for file in (
             "simharness/world/scene/build.py",
             "simharness/scoring/pcp.py",
-            "simharness/scoring/failures/stage_blame.py",
+            "simharness/scoring/stage_blame.py",
             "mvpose/matching/admm.py",
         ):
             path = folder / file

@@ -5,7 +5,7 @@ from trials import measured
 
 from simharness.scenario.load import load
 from simharness.scenario.study_definition import load_study
-from simharness.study.plan import plan
+from simharness.study.study_plan import plan
 from simharness.trial.stages.estimators import estimators_of
 
 WALK = (

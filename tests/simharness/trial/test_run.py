@@ -20,7 +20,7 @@ from simharness.scenario.sections.method_section import MethodSection
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import RenderingSection, Scenario
-from simharness.scoring.summary import VariantScores
+from simharness.scoring.score_summary import VariantScores
 from simharness.trial import run_trial
 from simharness.trial.run_folder import read_run
 from simharness.trial.stages import build_trial as trial

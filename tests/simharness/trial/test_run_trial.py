@@ -9,9 +9,9 @@ from trials import measured as measure
 from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
 from simharness.scenario.study_definition import load_study
+from simharness.scoring import stage_blame
 from simharness.scoring.catalogue import SCORES
-from simharness.scoring.failures import stage_blame
-from simharness.study.runner import run_study
+from simharness.study.study_run import run_study
 from simharness.trial import run_trial as module
 from simharness.trial.variant_result import VariantResult
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simharness.reality.detector_fit.calibration import FACTORS, SHARES, calibrate
-from simharness.reality.detector_fit.measure import measure
+from simharness.reality.detector_fit.detector_measurement import measure
 from simharness.reality.detector_fit.profile import settings
 from simharness.scenario.sections.detector_section import KINDS
 

@@ -10,9 +10,9 @@ from filmed_people import narrowed
 from mvpose import Detections
 from simharness.detector.part_tree import PARENT
 from simharness.detector.view_geometry import head_bearings
+from simharness.reality.detector_fit.detector_measurement import MeasuredValue, agreement, measure, point_estimates
 from simharness.reality.detector_fit.frame_sums import frame_sums
 from simharness.reality.detector_fit.joint_labels import label_joints
-from simharness.reality.detector_fit.measure import MeasuredValue, agreement, measure, point_estimates
 from simharness.reality.detector_fit.profile import as_toml, settings
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
 

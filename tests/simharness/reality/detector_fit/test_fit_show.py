@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from simharness.reality.annotation import AnnotationFit, AnnotationModel
-from simharness.reality.detector_fit.measure import MeasuredValue, measure
-from simharness.reality.detector_fit.plot import plot_comparison
-from simharness.reality.detector_fit.table import print_agreement, print_annotation, print_measurement
+from simharness.reality.annotation_errors import AnnotationFit, AnnotationModel
+from simharness.reality.detector_fit.detector_measurement import MeasuredValue, measure
+from simharness.reality.detector_fit.fit_plot import plot_comparison
+from simharness.reality.detector_fit.fit_table import print_agreement, print_annotation, print_measurement
 from simharness.scenario.sections.detector_section import KINDS
 
 

@@ -9,8 +9,8 @@ from simharness.reality.validation.frame_scores import RULES, score_frames
 from simharness.reality.validation.head_joints import fill_face
 from simharness.reality.validation.tally import Tally
 from simharness.scoring.frame import score_frame
-from simharness.scoring.summary import VariantScores
-from simharness.statistics.bootstrap import block_weights
+from simharness.scoring.score_summary import VariantScores
+from simharness.statistics.resampling import block_weights
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from moments import crowd, estimate_of, moment, recorded, ring
 
 from mvpose import COCO17, Detections
-from simharness.scoring.failures.failure_classes import FailureKind, failures_of_frame, find_failures
+from simharness.scoring.failure_classes import FailureKind, failures_of_frame, find_failures
 from simharness.scoring.pairing import pair
 from simharness.types.views import Visibility
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Bools, Floats
 from mvpose.skeleton import Skeleton
 from simharness.scoring.joint_errors import joint_errors
-from simharness.scoring.registry import finite_mean
+from simharness.scoring.score_registry import finite_mean
 
 LIMBS = {"feet": ("big_toe", "small_toe", "heel"), "hands": ("hand_",)}
 """Beginnings of the names, without the side, of the joints of each limb."""

@@ -13,12 +13,12 @@ from mvpose.files.atomic_files import atomic_folder
 from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study, Value
-from simharness.study.measure import StoredTrial
-from simharness.study.measure import measure as measure_trial
-from simharness.study.plan import PlannedTrial, plan
-from simharness.study.result_folder import Results, read_study, write_study
 from simharness.study.scheduler import Measure, TrialFailure, TrialSuccess, Unit, error_text, run_units
+from simharness.study.stored_trial import StoredTrial
+from simharness.study.stored_trial import measure as measure_trial
 from simharness.study.study_file import document
+from simharness.study.study_folder import Results, read_study, write_study
+from simharness.study.study_plan import PlannedTrial, plan
 from simharness.study.tables import tables
 from simharness.study.trial_store import Entry, EntryState, Store, StoreError
 from simharness.trial.archive import TrialArchive
@@ -102,7 +102,7 @@ def run_study(
         measure: function that measures a trial.
 
     Returns:
-        The results, as :func:`simharness.study.result_folder.read_study` reads them;
+        The results, as :func:`simharness.study.study_folder.read_study` reads them;
         ``info["failed"]`` lists what is missing.
 
     Raises:

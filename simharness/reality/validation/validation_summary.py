@@ -6,18 +6,18 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mvpose import SHELF14
+from simharness.reality.validation.detection_figures import AFFINITY_EDGES
 from simharness.reality.validation.dose import Response
 from simharness.reality.validation.evidence import Compared, number
 from simharness.reality.validation.frame_scores import RULES, HeadRule
-from simharness.reality.validation.measurements import AFFINITY_EDGES
-from simharness.reality.validation.scores import SCORES
 from simharness.reality.validation.subsets import SubsetComparison
 from simharness.reality.validation.validation import Validation
+from simharness.reality.validation.variant_comparison import SCORES
 from simharness.reality.validation.verdicts import State, Verdict
 from simharness.statistics.intervals import Interval
 
 if TYPE_CHECKING:
-    from simharness.reality.validation.prediction import HalfPrediction
+    from simharness.reality.validation.unseen_prediction import HalfPrediction
 
 _SIDES = ("real", "twin")
 

@@ -26,7 +26,7 @@ class VariantScores:
         frames: scores of the frames, all with the same P people in the same order.
         timings: ``Estimate.timings`` of every timed frame, seconds by stage.
         tracking: scores over time, where people are tracked: :mod:`simharness.scoring.tracking.summary`.
-        whole_body: scores of feet and hands, where the detector reports them: :mod:`simharness.scoring.whole_body`.
+        whole_body: scores of feet and hands, where the detector reports them: :mod:`simharness.scoring.feet_and_hands`.
 
     Raises:
         ValueError: frames with different numbers of people.

@@ -27,9 +27,9 @@ from scipy.optimize import linear_sum_assignment
 from mvpose import COCO17, Detections, Estimate, Rig
 from mvpose.estimators import Estimator
 from simharness.runtime.errors import naming_frame
-from simharness.scoring.failures.failure_classes import Failure, FailureKind, failures_of_frame
-from simharness.scoring.failures.substitution import perfect_detections, true_labels, with_labels
+from simharness.scoring.failure_classes import Failure, FailureKind, failures_of_frame
 from simharness.scoring.pairing import mean_distances
+from simharness.scoring.substitution import perfect_detections, true_labels, with_labels
 from simharness.types.recording import Recording
 from simharness.types.truth import Truth
 
@@ -87,7 +87,7 @@ def blame(
         estimator: the method. Only pipelines of mvpose take true labels; for others, failures that perfect detections
             do not remove are blamed on the method.
         estimates: estimates of the method, T.
-        failures: :func:`simharness.scoring.failures.failure_classes.find_failures` of these estimates.
+        failures: :func:`simharness.scoring.failure_classes.find_failures` of these estimates.
 
     Returns:
         Failures with stages, in the same order.

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from simharness.reality.detector_fit.measure import MeasuredDetector
+from simharness.reality.detector_fit.detector_measurement import MeasuredDetector
 from simharness.scenario.sections.detector_section import BEARINGS, KINDS
 
 _COLORS = ("#3b82c4", "#d9643a")

@@ -14,7 +14,7 @@ from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints
 from simharness.reality.detector_fit.parameters import estimate_parameters
 from simharness.reality.detector_fit.sample import Sample
 from simharness.scenario.sections.detector_section import KINDS
-from simharness.statistics.bootstrap import block_weights, blocks, interval, resampled
+from simharness.statistics.resampling import block_weights, blocks, interval, resampled
 
 RESAMPLES = 500
 
@@ -130,7 +130,7 @@ def measure(
 ) -> MeasuredDetector:
     """Measure a detector.
 
-    Intervals come from a block bootstrap over time (:mod:`simharness.statistics.bootstrap`). They cover other
+    Intervals come from a block bootstrap over time (:mod:`simharness.statistics.resampling`). They cover other
     recordings of the same people at the same work, at the measured bias; not recordings of other people.
 
     Args:

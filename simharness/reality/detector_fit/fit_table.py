@@ -9,9 +9,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from simharness.reality.annotation import AnnotationFit
+from simharness.reality.annotation_errors import AnnotationFit
+from simharness.reality.detector_fit.detector_measurement import MeasuredDetector, MeasuredValue, agreement
 from simharness.reality.detector_fit.frame_sums import TERCILES
-from simharness.reality.detector_fit.measure import MeasuredDetector, MeasuredValue, agreement
 from simharness.scenario.sections.detector_section import BEARINGS, KINDS
 
 _WIDE = 130  # columns of a terminal that has room for all intervals

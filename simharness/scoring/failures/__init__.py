@@ -1,1 +1,0 @@
-"""Failures of estimates: their classes, and the stage of the method to blame for each."""
