@@ -9,8 +9,7 @@ import numpy as np
 from benchmarks.coverage.populations import CHANGES, CURVES, EVENTS, MEANS
 from simharness.statistics.breaking_points import BreakingPoint, breaking_point
 from simharness.statistics.intervals import mean_interval
-from simharness.statistics.paired_counts import paired_counts
-from simharness.statistics.paired_tests import paired
+from simharness.statistics.paired_tests import paired, paired_counts
 
 SCENES = (5, 12, 20, 40)
 """Numbers of scenes of a sample."""

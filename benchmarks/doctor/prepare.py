@@ -13,8 +13,7 @@ from mvpose import Rig
 from mvpose.arrays import Floats
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.reality.recording_file import read_recording
-from simharness.runtime.progress import Silence
-from simharness.runtime.stages import Stages
+from simharness.runtime.progress import Silence, Stages
 from simharness.scenario.load import load
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import capture_trial, detect_trial

@@ -31,7 +31,7 @@ from simharness.reality.detector_fit.fit import fit
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, track_people
 from simharness.reality.recording_file import read_recording
 from simharness.reality.validation.head_joints import fill_face
-from simharness.reality.validation.passes import Cameras, annotated, run_passes
+from simharness.reality.validation.passes import CameraSubset, annotated, run_passes
 from simharness.reality.validation.subsets import FILLED, camera_subsets
 from simharness.scenario.presets import read_profile
 from simharness.scoring.pcp import Part, part_states
@@ -90,11 +90,11 @@ class SubsetFigures:
 def real_pcp(recording: AnnotatedRecording, *, variant: str = "full") -> dict[Subset, float]:
     """Return the PCP of a variant on the real detections of every subset of two cameras and more."""
     subsets = camera_subsets(len(recording.rig))
-    (passes,) = run_passes([annotated(recording)], [Cameras(each) for each in subsets], variants=(variant,))
+    (passes,) = run_passes([annotated(recording)], [CameraSubset(each) for each in subsets], variants=(variant,))
     return {
         change.views: float(of_variant[variant].total().pcp(FILLED))
         for change, of_variant in passes.items()
-        if isinstance(change, Cameras)
+        if isinstance(change, CameraSubset)
     }
 
 

@@ -17,7 +17,7 @@ from simharness.reality.published_scores import ABLATION, PublishedPcp
 from simharness.reality.twin_comparison import TOLERANCE
 from simharness.scoring.pcp import GROUPS
 from simharness.scoring.score_summary import STAGES
-from simharness.scoring.tracking.columns import DISTANCE
+from simharness.scoring.tracking.identity_figures import DISTANCE
 
 if TYPE_CHECKING:
     from simharness.reality.seed_evaluation import SeedEvaluation

@@ -120,7 +120,7 @@ def merge(
 ) -> None:
     """Merge the stores of a study that ran in parts (study --shard) on several machines."""
     with exit_on_error(), _stopping():
-        from simharness.study.merge import merge as merge_stores
+        from simharness.study.trial_store import merge as merge_stores
 
         merged = merge_stores(stores, into)
         _write(f"{merged.copied} entries copied into {into}, {merged.present} were already there")

@@ -18,7 +18,7 @@ from simharness.cli.result_files import make_folder, write_page
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from simharness.reality.validation.verdicts import Verdict
+    from simharness.reality.validation.verdicts import BoundVerdict
 
 _TWINS, _QUICK_TWINS = 10, 4
 
@@ -76,12 +76,12 @@ def validate(
         make_folder(place)
         from simharness.outputs.validation.page import render_validation
         from simharness.reality.validation.unseen_prediction import predict_halves, simulate_predictions
-        from simharness.reality.validation.validation import QUICK, Plan
+        from simharness.reality.validation.validation import QUICK, ValidationPlan
         from simharness.reality.validation.validation import validate as compare
         from simharness.reality.validation.validation_summary import summarize_halves, summarize_validation
         from simharness.trial.provenance import provenance
 
-        plan = replace(QUICK if quick else Plan(), workers=workers or os.cpu_count() or 1)
+        plan = replace(QUICK if quick else ValidationPlan(), workers=workers or os.cpu_count() or 1)
         count = twins or (_QUICK_TWINS if quick else _TWINS)
         with reporter() as bars:
             simulated = simulate_predictions(recorded, count=count, fitted_on=other, reporter=bars)
@@ -112,7 +112,7 @@ def validate(
         raise typer.Exit(REGRESSION)
 
 
-def _print_verdicts(verdicts: Sequence[Verdict], name: str, console: Console) -> None:
+def _print_verdicts(verdicts: Sequence[BoundVerdict], name: str, console: Console) -> None:
     """Print a row for each group of verdicts, with the figure that is worst."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from mvpose import Detections, Rig
     from mvpose.arrays import Floats
     from mvpose.estimators import Estimator
-    from simharness.trial.stages.detected_sequence import DetectedSequence
+    from simharness.trial.stages.simulation import DetectedSequence
 
 REPETITIONS = 3
 """Estimates of a frame of which the quickest counts."""

@@ -15,8 +15,7 @@ from simharness.gate.pairs import Pairs
 from simharness.gate.required_seeds import least_two_sided_p
 from simharness.gate.trial_command import TrialKey
 from simharness.scoring.catalogue import SCORES
-from simharness.statistics.paired_counts import paired_counts
-from simharness.statistics.paired_tests import paired
+from simharness.statistics.paired_tests import paired, paired_counts
 from simharness.statistics.resampling import block_weights, interval
 
 PER_FRAME = "per frame"

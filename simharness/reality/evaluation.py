@@ -15,8 +15,8 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.scoring.frame import score_frame
 from simharness.scoring.matching import count_violations
 from simharness.scoring.score_summary import VariantScores, summarize
-from simharness.scoring.tracking.summary import tracking_of_some
-from simharness.trial.stages.tracking import track_frames
+from simharness.scoring.tracking.identity_figures import tracking_of_some
+from simharness.trial.stages.estimation import track_frames
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Evaluation:
         """Return the summary, ready for JSON, with the keys of a run's ``summary.json``.
 
         Further keys: ``head``, ``frames_annotated``, and of every variant ``same_view_violations``, and ``tracking``
-        where it has identities (:func:`simharness.scoring.tracking.summary.tracking_of_some`).
+        where it has identities (:func:`simharness.scoring.tracking.identity_figures.tracking_of_some`).
         """
         summary = summarize(
             self.name,

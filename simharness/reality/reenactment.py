@@ -21,8 +21,7 @@ from mvpose.formats.calibration.opencv import write_calibration
 from simharness.detector.detect import detect
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.people_tracks import TrackedPeople
-from simharness.runtime.progress import Silence
-from simharness.runtime.stages import Stages
+from simharness.runtime.progress import Silence, Stages
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.build_trial import build_trial

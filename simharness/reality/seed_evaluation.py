@@ -19,8 +19,7 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.pcp import Part
 from simharness.scoring.score_summary import VariantScores
 from simharness.statistics.intervals import mean_interval
-from simharness.statistics.jackknife import pseudo_values
-from simharness.statistics.resampling import block_weights, blocks, interval, resampled
+from simharness.statistics.resampling import block_weights, blocks, interval, pseudo_values, resampled
 from simharness.trial.run_trial import TrialResult, run_trial
 
 _ATTEMPTS = 3  # seeds tried for each one requested, because randomly drawn people may not fit beside clutter

@@ -15,7 +15,7 @@ from mvpose import COCO17
 from simharness.detector.bias import world_offsets
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationModel
-from simharness.reality.detector_fit.fit import Fit
+from simharness.reality.detector_fit.fit import DetectorFit
 from simharness.reality.people_tracks import TrackedPeople
 from simharness.reality.reenactment import Film, cut_takes, film
 from simharness.runtime.progress import Reporter, Silence
@@ -45,7 +45,7 @@ class TwinModel:
     films: tuple[Film, ...] = ()
 
     @classmethod
-    def of(cls, recording: AnnotatedRecording, fitted: Fit) -> Self:
+    def of(cls, recording: AnnotatedRecording, fitted: DetectorFit) -> Self:
         """Return the model of twins of a recording, with its own fit."""
         return cls(recording, fitted.people, fitted.profile, fitted.annotation.of_detected, (fitted.film,))
 

@@ -2,26 +2,34 @@
 
 :func:`map_frames` cuts frames into chunks that any process may take in any order; :func:`map_jobs` takes the ranges of
 frames from its caller, for work that needs its frames in one process.
+
+A new Python process imports for two seconds what a trial needs, and a run with two workers starts two processes in each
+of its stages. On Linux workers are therefore forked from a server process that has imported most of it and has done
+nothing else. They are never forked from this process, which may hold threads or a GL context.
 """
 
 from __future__ import annotations
 
+import multiprocessing
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import forkserver
+from multiprocessing.context import BaseContext
 from typing import Any, Protocol, TypeVar
 
 import threadpoolctl
 
 from simharness.runtime.errors import RunError
-from simharness.runtime.worker_processes import worker_context
 
 Result_co = TypeVar("Result_co", covariant=True)
 Result = TypeVar("Result")
-
 _Job = tuple[range, *tuple[Any, ...]]  # arguments of a call; the first are its frames
-
 _CHUNKS_PER_WORKER = 8  # many, so that a slow chunk delays little; few, so that sending them costs little
+
+IMPORTED = ("simharness.trial.stages.build_trial", "simharness.trial.stages.simulation", "distributed")
+"""Modules that the server imports. With them come neither Polars nor ONNX Runtime, which start threads on import."""
 
 
 class FrameFunction(Protocol[Result_co]):
@@ -50,8 +58,8 @@ def map_frames(
     Args:
         function: see :class:`FrameFunction`.
         frames: consecutive frame indices.
-        workers: number of processes; with 1 the work is done in this process. Others start as
-            :mod:`simharness.runtime.worker_processes` says. Their linear algebra uses one thread.
+        workers: number of processes; with 1 the work is done in this process. Their linear algebra uses one
+            thread.
         progress: called with the number of frames of each finished chunk.
 
     Raises:
@@ -93,6 +101,19 @@ def chunks_of(frames: range, workers: int) -> list[range]:
     """Return the frames in consecutive chunks, a few for each worker."""
     length = max(1, -(-len(frames) // (workers * _CHUNKS_PER_WORKER)))
     return [frames[start : start + length] for start in range(0, len(frames), length)]
+
+
+def worker_context() -> BaseContext:
+    """Return the multiprocessing context of workers: "forkserver" on Linux, "spawn" where system libraries cannot fork.
+
+    The server keeps the environment variables and the output streams that this process had at the first call.
+    """
+    if sys.platform != "linux":
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(list(IMPORTED))
+    forkserver.ensure_running()
+    return context
 
 
 def _map_in_process(

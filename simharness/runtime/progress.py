@@ -1,4 +1,6 @@
-"""Progress of long commands on stderr: one protocol for the stages of a run and the trials of a study."""
+"""Progress of long commands on stderr: one protocol for the stages of a run, which are timed and named in errors, and
+for the trials of a study.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +11,8 @@ from typing import Protocol
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from simharness.runtime.errors import RunError
 
 _LINE_SECONDS = 10.0  # seconds between two lines where stderr is not a terminal
 _UNSETTLED = 2  # first steps include compilation: a rate that counts them gives many times the remaining time
@@ -40,8 +44,42 @@ class Silence:
         yield _ignore
 
 
-def _ignore(steps: int, /, *, failed: int = 0) -> None:
-    """Drop a progress report."""
+class Stages:
+    """Timer and reporter of stages. An error in a stage becomes a RunError with the name of the stage in front.
+
+    Attributes:
+        seconds: duration of each finished stage, by name.
+    """
+
+    def __init__(self, reporter: Reporter, seconds: dict[str, float] | None = None) -> None:
+        self._reporter = reporter
+        self.seconds: dict[str, float] = {} if seconds is None else seconds
+
+    @contextlib.contextmanager
+    def stage(self, name: str, total: int, *, input_errors: bool = False) -> Iterator[Advance]:
+        """Run one stage.
+
+        Args:
+            name: name of the stage.
+            total: number of steps of the stage.
+            input_errors: let a ValueError pass unchanged, because the scenario is wrong.
+
+        Raises:
+            RunError: an error in the stage, with the name of the stage in front.
+        """
+        start = time.perf_counter()
+        try:
+            with self._reporter.stage(name, total) as advance:
+                yield advance
+        except ValueError as error:
+            if input_errors:
+                raise
+            raise RunError(f"{name}: {type(error).__name__}: {error}") from error
+        except RunError as error:
+            raise type(error)(f"{name}: {error}") from error
+        except Exception as error:
+            raise RunError(f"{name}: {type(error).__name__}: {error}") from error
+        self.seconds[name] = time.perf_counter() - start
 
 
 class Pace:
@@ -164,3 +202,7 @@ def duration(seconds: float) -> str:
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+
+
+def _ignore(steps: int, /, *, failed: int = 0) -> None:
+    """Drop a progress report."""

@@ -16,10 +16,9 @@ from simharness.scoring.average_precision import average_precision, nearest_peop
 from simharness.scoring.catalogue import AP_MM, PCK_MM
 from simharness.scoring.feet_and_hands import WholeBodyInput, whole_body_scores
 from simharness.scoring.frame import score_frame
-from simharness.scoring.joint_errors import joint_errors
+from simharness.scoring.joint_errors import joint_errors, pck, pck_area
 from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, count_pairs, count_violations
 from simharness.scoring.pairing import Pairing
-from simharness.scoring.pck import pck, pck_area
 from simharness.scoring.pcp import Part
 from simharness.scoring.reprojection import reprojection_errors
 from simharness.scoring.score_registry import ScoreInput, compute_scores
@@ -51,7 +50,7 @@ class Assessment:
             error, and that error, ``worst_mm``; ``visible_views``, the number of views in which at least half of the
             joints are visible or self-occluded. Errors are null where the person is missed.
         errors: errors of all joints of all true people, (T, P, 17), metres: infinite where the estimate is missing, NaN
-            where the truth is. Input of :func:`simharness.scoring.pck.pck`.
+            where the truth is. Input of :func:`simharness.scoring.joint_errors.pck`.
         variant_scores: scores of every frame, for summaries.
     """
 

@@ -1,8 +1,11 @@
-"""Errors of estimated joints: distance, bone length and jitter.
+"""Errors of estimated joints: distance, bone length, jitter, and the percentage of correct keypoints (PCK).
 
 Jitter: with the error e(t) = estimate - truth of a joint, its jitter at t is ``|e(t - 1) - 2 e(t) + e(t + 1)|``. The
 motion of people, a constant offset and a uniform drift of the estimate cause no jitter. Independent noise of standard
 deviation s along each axis makes each component s sqrt(6), and the mean norm s sqrt(6) x sqrt(8 / pi), about 3.9 s.
+
+PCK in 3D is a function of the error limit (Mehta et al., 3DV 2017). Every joint of every true person counts. A joint
+without an estimate, or of a missed person, is wrong at any limit.
 """
 
 from __future__ import annotations
@@ -55,6 +58,29 @@ def jitter(truth: ArrayLike, estimate: ArrayLike) -> Floats:
     return np.linalg.norm(np.diff(error, n=2, axis=0), axis=-1)
 
 
+def pck(errors: ArrayLike, limits: ArrayLike) -> Floats:
+    """Return the share of joints within each limit, percent (n,): the PCK curve; NaN where no joint counts.
+
+    Args:
+        errors: :func:`simharness.scoring.joint_errors.joint_errors`, any shape. NaN is ignored, infinite is wrong.
+        limits: limits of the error, (n,), in the unit of the errors. An error equal to the limit is within it.
+    """
+    counted = _counted(errors)
+    if not len(counted):
+        return np.full(np.shape(limits), np.nan)
+    within = np.searchsorted(np.sort(counted), np.asarray(limits, float), side="right")
+    return 100.0 * within / len(counted)
+
+
+def pck_area(errors: ArrayLike, limit: float) -> float:
+    """Return the area under the PCK curve from 0 to ``limit`` divided by ``limit``: the mean of :func:`pck`, percent.
+
+    It is exact, while benchmarks average PCK at a few limits. NaN where no joint counts.
+    """
+    counted = _counted(errors)
+    return 100.0 * float(np.clip(1.0 - counted / limit, 0.0, 1.0).mean()) if len(counted) else float("nan")
+
+
 @score(
     ScoreInfo("bone_mm", "Bone length", "mm", "mean absolute error of the bone lengths of the people found", "lower", 1)
 )
@@ -75,3 +101,8 @@ def jitter_score(given: ScoreInput) -> float | None:
 def _bone_lengths(joints: Floats, skeleton: Skeleton) -> Floats:
     parents, children = np.array(skeleton.edges).T
     return np.linalg.norm(joints[..., children, :] - joints[..., parents, :], axis=-1)
+
+
+def _counted(errors: ArrayLike) -> Floats:
+    errors = np.asarray(errors, float)
+    return errors[~np.isnan(errors)]

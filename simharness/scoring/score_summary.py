@@ -25,7 +25,7 @@ class VariantScores:
     Attributes:
         frames: scores of the frames, all with the same P people in the same order.
         timings: ``Estimate.timings`` of every timed frame, seconds by stage.
-        tracking: scores over time, where people are tracked: :mod:`simharness.scoring.tracking.summary`.
+        tracking: scores over time, where people are tracked: :mod:`simharness.scoring.tracking.identity_figures`.
         whole_body: scores of feet and hands, where the detector reports them: :mod:`simharness.scoring.feet_and_hands`.
 
     Raises:

@@ -18,7 +18,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from simharness.runtime.errors import RunError
-from simharness.runtime.worker_processes import worker_context
+from simharness.runtime.frame_pool import worker_context
 from simharness.scenario.sections.scenario import Scenario
 from simharness.study.stored_trial import StoredTrial, TrialOutput
 from simharness.trial.archive import TrialArchive
@@ -34,8 +34,9 @@ _PATIENCE = 30.0  # seconds to wait for a scheduler
 _FIRST_WORKER = 30.0  # seconds to wait for the first worker of a scheduler without workers
 
 Measure = Callable[[Scenario, Sequence[str], StoredTrial], TrialOutput]
-"""Function that measures a trial in any process, by default :func:`simharness.study.stored_trial.measure`. It must be
-picklable and raise a ValueError for an error of the scenario."""
+"""Function that measures a trial in any process, by default
+:func:`simharness.study.stored_trial.run_stored_trial`. It must be picklable and raise a ValueError for an error of
+the scenario."""
 
 
 @dataclass(frozen=True)

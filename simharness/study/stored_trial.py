@@ -39,7 +39,7 @@ class TrialOutput:
     archive: TrialArchive = field(default_factory=TrialArchive)
 
 
-def measure(scenario: Scenario, variants: Sequence[str], stored: StoredTrial | None = None) -> TrialOutput:
+def run_stored_trial(scenario: Scenario, variants: Sequence[str], stored: StoredTrial | None = None) -> TrialOutput:
     """Measure variants of the method in one trial, all on the same detections, in this process.
 
     Args:

@@ -34,6 +34,8 @@ from mvpose.files.input_files import read_bytes, read_json_object
 from mvpose.files.message_text import one_line
 from simharness.runtime.parquet_tables import table_of
 from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.study_definition import Study
+from simharness.scenario.toml_files import dumps_keys
 from simharness.study.trial_store import parquet
 
 _LARGEST = 2**32  # bytes of a table
@@ -122,6 +124,19 @@ def read_study(folder: Path | str) -> Results:
     except ValueError as error:
         raise ValueError(f"{folder}: cannot be read: {error}; run the study again to write the folder again") from None
     return Results(info, folder=folder, **tables)
+
+
+def document(study: Study) -> str:
+    """Return a scenario file of the same study, for :func:`simharness.scenario.study_definition.load_study`.
+
+    The keys of all its bases are written out. Rigs and detector profiles are written by name; other files are relative
+    to the folder in which the study was started.
+    """
+    keys = {key: value for key, value in study.data.items() if key not in ("seed", "seeds", "method")}
+    head: dict[str, Any] = {"name": study.name, "seeds": list(study.seeds), "variants": list(study.variants)}
+    if estimators := study.base.method.estimators.places:
+        keys["method"] = {"estimators": estimators}
+    return dumps_keys({**head, **keys})
 
 
 def _read_table(file: Path) -> pl.DataFrame:

@@ -15,9 +15,8 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study, Value
 from simharness.study.scheduler import Measure, TrialFailure, TrialSuccess, Unit, error_text, run_units
 from simharness.study.stored_trial import StoredTrial
-from simharness.study.stored_trial import measure as measure_trial
-from simharness.study.study_file import document
-from simharness.study.study_folder import Results, read_study, write_study
+from simharness.study.stored_trial import run_stored_trial as measure_trial
+from simharness.study.study_folder import Results, document, read_study, write_study
 from simharness.study.study_plan import PlannedTrial, plan
 from simharness.study.tables import tables
 from simharness.study.trial_store import Entry, EntryState, Store, StoreError

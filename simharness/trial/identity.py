@@ -57,11 +57,11 @@ hands and faces, the command line, pages."""
 SCORES = ("types", "scoring")
 """Folders of ``simharness`` that score estimates, without :data:`FAILURES_ALONE`."""
 
-FAILURES = ("types", "scoring/failures", "scoring/pairing.py")
-"""Folders and modules of ``simharness`` that find failures and the stage of the method to blame."""
+FAILURES_ALONE = ("scoring/failure_classes.py", "scoring/stage_blame.py")
+"""Modules in :data:`SCORES` on which only failures depend."""
 
-FAILURES_ALONE = ("scoring/failures",)
-"""What of :data:`SCORES` only failures depend on."""
+FAILURES = ("types", "scoring/pairing.py", *FAILURES_ALONE)
+"""Folders and modules of ``simharness`` that find failures and the stage of the method to blame."""
 
 _SIZE = 16  # bytes of a digest, so that no two trials share one by chance
 

@@ -7,13 +7,14 @@ a factor of three on such a machine where kernels are compiled; it leaves out us
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 from mvpose.presets import without_repair
 from mvpose.skeleton import COCO17
 from mvpose.wholebody import skeleton_by_name
-from simharness.runtime.machine import memory
 from simharness.runtime.progress import duration
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.size import camera_count, oversized
@@ -25,11 +26,11 @@ _SIGHT = 2.5e3  # bytes for each sight of a person: truth and detection
 _OUTER, _OUTER_SECONDS = 120.0, 10e-6  # bytes and seconds for each joint of feet and hands in each sight of a person
 _PIXEL = 20.0  # bytes for each pixel of the one picture that is rendered at a time
 _MATCHING = frozenset({"full", "appearance", "geometry", "no-3dps"})  # variants that keep the relaxed matrix (m, m)
-
 _START = 4.0  # seconds: imports and the build of the scene
 _SIGHT_SECONDS = 0.27e-3  # visibility, detection and scores
 _PIXEL_SECONDS = 25e-9
 _STORED_FRAME, _STORED_SIGHT = 2e3, 1e3  # bytes on disk
+_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")  # of a container: versions 2, 1
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,17 @@ def describe(needs: Needs, *, trials: int = 1) -> list[str]:
             f"{_bytes(trials * needs.disk)} on disk."
         )
     return lines
+
+
+def memory() -> int:
+    """Return the memory of the machine, or of the container around this process where that is less, bytes."""
+    sizes = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
+    for file in _LIMITS:
+        try:
+            sizes.append(int(Path(file).read_text(encoding="ascii")))
+        except (OSError, ValueError):  # no such limit, or the word "max"
+            continue
+    return min(sizes)
 
 
 def _frame_seconds(variant: str, detections: float) -> float:

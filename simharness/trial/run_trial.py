@@ -20,8 +20,7 @@ from mvpose import Estimate
 from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.presets import PRESETS
 from mvpose.wholebody import complete
-from simharness.runtime.progress import Reporter, Silence
-from simharness.runtime.stages import Stages
+from simharness.runtime.progress import Reporter, Silence, Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import Assessment, assess
 from simharness.scoring.catalogue import SCORES
@@ -32,9 +31,8 @@ from simharness.trial.audit import audit
 from simharness.trial.kernel_compilation import Compilation
 from simharness.trial.needs import require_memory
 from simharness.trial.stages.build_trial import Trial, build_trial, build_variants
-from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.trial.stages.estimation import EstimateFrames, estimate_variants
-from simharness.trial.stages.simulation import Simulation, capture_trial, detect_trial
+from simharness.trial.stages.simulation import DetectedSequence, Simulation, capture_trial, detect_trial
 from simharness.trial.variant_result import VariantResult
 from simharness.types.recording import Recording
 

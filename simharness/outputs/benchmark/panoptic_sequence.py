@@ -22,8 +22,7 @@ from simharness.outputs.benchmark.cameras import hd_names, renamed, write_camera
 from simharness.outputs.benchmark.layout import Layout, check_place
 from simharness.outputs.benchmark.manifest import manifest
 from simharness.outputs.benchmark.recording_description import write_description
-from simharness.runtime.progress import Reporter, Silence
-from simharness.runtime.stages import Stages
+from simharness.runtime.progress import Reporter, Silence, Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_files import dumps
 from simharness.trial.run_trial import run_trial

@@ -13,7 +13,7 @@ from mvpose.arrays import Floats
 from mvpose.report.palette import UNMATCHED, css, identity_color
 from mvpose.report.svg_plots import Color
 from simharness.scoring.tracking.clear_mot import ClearMot, clear_mot
-from simharness.scoring.tracking.columns import DISTANCE
+from simharness.scoring.tracking.identity_figures import DISTANCE
 from simharness.scoring.tracking.identity_scores import identity_scores
 from simharness.scoring.tracking.tracked_frames import TrackedFrames, ids_of, roots, tracked_frames
 

@@ -13,13 +13,12 @@ import polars as pl
 from mvpose.files.atomic_files import atomic_folder
 from simharness.outputs.run.film import filmed_frames, make_film
 from simharness.outputs.run.pictures import draw_pictures, outlines
-from simharness.runtime.progress import Reporter, Silence
-from simharness.runtime.stages import Stages
+from simharness.runtime.progress import Reporter, Silence, Stages
 from simharness.scenario.load import fingerprint
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES
 from simharness.scoring.score_summary import VariantScores, summarize
-from simharness.scoring.tracking.summary import tracking_summary
+from simharness.scoring.tracking.identity_figures import tracking_summary
 from simharness.scoring.tracking.tracked_frames import ids_of
 from simharness.study.causes.blame_file import write_blame
 from simharness.study.causes.cause_shares import blame

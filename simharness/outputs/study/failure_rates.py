@@ -9,7 +9,7 @@ import polars as pl
 
 from mvpose.arrays import Floats
 from simharness.statistics.intervals import mean_interval
-from simharness.statistics.jackknife import pseudo_values
+from simharness.statistics.resampling import pseudo_values
 from simharness.study.study_folder import Results
 
 NOT_BLAMED = "not determined"

@@ -15,7 +15,7 @@ from simharness.reality.validation.detection_figures import AFFINITY_EDGES, AMBI
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.validation import Validation
-from simharness.reality.validation.verdicts import BOUNDS, State
+from simharness.reality.validation.verdicts import BOUNDS, VerdictState
 from simharness.runtime.number_text import fixed
 
 _HEADS = {"voxelpose": "VoxelPose", "2019": "2019"}
@@ -46,7 +46,7 @@ def render_validation(validation: Validation, *, provenance: Mapping[str, Any], 
         fitted_on=fitted_on,
         facts=_facts(validation),
         cards=_cards(validation),
-        passed=State.FAILS not in states,
+        passed=VerdictState.FAILS not in states,
         group_columns=tables.GROUP_COLUMNS,
         groups=tables.group_rows(validation.verdicts),
         verdicts=list(tables.verdict_rows(validation.verdicts)),
@@ -93,8 +93,8 @@ def _cards(validation: Validation) -> list[dict[str, str]]:
     return [
         {
             "title": "Verdicts",
-            "text": f"{states.count(State.HOLDS)} of {len(states)} hold",
-            "about": f"{states.count(State.UNCLEAR)} unclear, {states.count(State.FAILS)} fail",
+            "text": f"{states.count(VerdictState.HOLDS)} of {len(states)} hold",
+            "about": f"{states.count(VerdictState.UNCLEAR)} unclear, {states.count(VerdictState.FAILS)} fail",
         },
         {
             "title": "Variants, all cameras",

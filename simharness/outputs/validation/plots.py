@@ -11,7 +11,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from mvpose.arrays import Floats
 from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
-from simharness.reality.validation.dose import Response
+from simharness.reality.validation.dose import DoseResponse
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.subsets import SubsetComparison
 from simharness.reality.validation.treatments import KINDS
@@ -68,7 +68,7 @@ def agreement(
     return written[0]
 
 
-def losses(responses: Sequence[Response], variants: Mapping[str, Color], *, name: str) -> str:
+def losses(responses: Sequence[DoseResponse], variants: Mapping[str, Color], *, name: str) -> str:
     """Plot the predicted against the measured loss of PCP of every treatment, with the accepted range."""
     markers = dict(zip(KINDS, ("o", "s", "D", "^", "v", "P"), strict=True))
     with svg_plot(name, size=_SQUARE) as (axes, written):
@@ -121,7 +121,7 @@ def gains(subsets: SubsetComparison, *, name: str) -> str:
     return written[0]
 
 
-def response(responses: Sequence[Response], variants: Mapping[str, Color], *, name: str) -> str:
+def response(responses: Sequence[DoseResponse], variants: Mapping[str, Color], *, name: str) -> str:
     """Plot the loss of PCP against the level of one kind of treatment, for each variant."""
     kind = KINDS[responses[0].kind]
     with svg_plot(name, size=_SMALL) as (axes, written):

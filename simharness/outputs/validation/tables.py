@@ -10,10 +10,9 @@ import numpy as np
 
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.frame_scores import RULES, HeadRule
-from simharness.reality.validation.judge import GROUPS
 from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.validation import Validation
-from simharness.reality.validation.verdicts import State, Verdict
+from simharness.reality.validation.verdicts import GROUPS, BoundVerdict, VerdictState
 from simharness.runtime.number_text import fixed, signed
 from simharness.statistics.intervals import Interval
 
@@ -77,7 +76,7 @@ GROUP_COLUMNS = ("hold", "unclear", "fail", "real", "simulated", "difference", "
 """Titles of the cells of :func:`group_rows`."""
 
 
-def group_rows(verdicts: Sequence[Verdict]) -> list[Row]:
+def group_rows(verdicts: Sequence[BoundVerdict]) -> list[Row]:
     """Return a row for each group: number of figures by state, and the figure that is worst."""
     rows = []
     for key, title in GROUPS.items():
@@ -85,14 +84,14 @@ def group_rows(verdicts: Sequence[Verdict]) -> list[Row]:
         if not of:
             continue
         worst = max(of, key=_badness)
-        counts = [sum(each.state == state for each in of) for state in State]
+        counts = [sum(each.state == state for each in of) for state in VerdictState]
         cells = (*(str(count) for count in counts), *_numbers(worst))
         note = "" if len(of) == 1 else f"worst: {_label(worst)}"
         rows.append(Row(title, cells, worst.state.value, note, len(of)))
     return rows
 
 
-def verdict_rows(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, list[Row]]]:
+def verdict_rows(verdicts: Sequence[BoundVerdict]) -> Iterator[tuple[str, list[Row]]]:
     """Yield the title of each group, and the rows of all of its figures."""
     for key, title in GROUPS.items():
         of = [each for each in verdicts if each.group == key]
@@ -100,19 +99,19 @@ def verdict_rows(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, list[Row]]]
             yield title, [Row(_label(each), _numbers(each), each.state.value) for each in of]
 
 
-def _badness(verdict: Verdict) -> tuple[int, float]:
+def _badness(verdict: BoundVerdict) -> tuple[int, float]:
     apart = abs(verdict.difference) if np.isfinite(verdict.difference) else -verdict.twin
-    return list(State).index(verdict.state), apart
+    return list(VerdictState).index(verdict.state), apart
 
 
-def _label(verdict: Verdict) -> str:
+def _label(verdict: BoundVerdict) -> str:
     """Return the name of a figure within its group."""
     _, _, rest = verdict.name.partition(".")
     text = re.sub(r"\.(?!\d)|(?<!\d)\.(?=\d)|(?<=\d)\.(?=\D)", ", ", rest)
     return text.replace("tree.", "") or verdict.name
 
 
-def _numbers(verdict: Verdict) -> tuple[str, str, str, str]:
+def _numbers(verdict: BoundVerdict) -> tuple[str, str, str, str]:
     """Return the cells real, simulated, difference and bound."""
     digits, factor, unit = _FORMATS.get(verdict.group, (1, 1.0, ""))
     after = f" {unit}" if unit else ""

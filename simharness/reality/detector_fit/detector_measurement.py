@@ -125,7 +125,7 @@ class MeasuredDetector:
         }
 
 
-def measure(
+def measure_detector(
     sample: Sample, *, labels: LabelledJoints | None = None, resamples: int = RESAMPLES, seed: int = 0
 ) -> MeasuredDetector:
     """Measure a detector.

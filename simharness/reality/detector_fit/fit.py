@@ -1,32 +1,66 @@
-"""Fit of a detector profile, and of the annotation, to a recording."""
+"""Fit of a detector profile, and of the annotation, to a recording; it is calibrated by simulation.
+
+Calibration: the consensus of the other views is not the true place of a joint: it has noise, and errors of other views
+in it, so that measured scatter and rates of errors are larger than the parameters behind them. Indirect inference
+(Gourieroux, Monfort & Renault, Journal of Applied Econometrics 1993) removes this without a formula for each value:
+twins are simulated with the current parameters and measured in the same way as the recording, and each parameter moves
+by the difference of the two measurements.
+
+Face: data sets do not annotate it. The bodies that re-enact a recording have faces, turned as the detected ones; what
+is left between the two, on average, is how the detector's joints of the face differ from the landmarks of the bodies.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from mvpose.arrays import Floats
 from mvpose.files.atomic_files import write_atomic
+from simharness.detector.bias import SIDE, body_axes
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationFit, fit_annotation
-from simharness.reality.detector_fit.calibration import calibrate
-from simharness.reality.detector_fit.detector_measurement import RESAMPLES, MeasuredDetector, measure
-from simharness.reality.detector_fit.face_bias import face_bias
+from simharness.reality.detector_fit.detector_measurement import (
+    RESAMPLES,
+    MeasuredDetector,
+    measure_detector,
+    point_estimates,
+)
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.profile import as_toml, settings
 from simharness.reality.detector_fit.sample import Sample, sample_of
-from simharness.reality.people_tracks import TrackedPeople, track_people
+from simharness.reality.people_tracks import LIMB_JOINTS, TrackedPeople, track_people
 from simharness.reality.reenactment import Film, film
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
 
 _TWINS = 2  # simulated in each round of the calibration
 _FEWEST = 100  # joints behind a value that is calibrated: Shelf has 130 reported shoulders that others hide
+ROUNDS = 3
+
+SHARES = (
+    "keypoints.jitter",
+    "keypoints.miss",
+    "keypoints.face",
+    "keypoints.guess.self_occluded",
+    "keypoints.guess.occluded",
+    "correlation.scatter_near",
+)
+"""Calibrated shares, by the beginning of their keys."""
+
+FACTORS = ("keypoints.scatter", "keypoints.self_occluded", "keypoints.occluded", "correlation.scatter_life")
+"""Calibrated amounts, by the beginning of their keys."""
+
+_LEAST = 2e-4  # of a share; counts of a recording say nothing below it
+_STEP = 1.0  # largest change of a logit or a logarithm in a round
+_FARTHEST = 1.6  # largest change of a logit or a logarithm in all: what is measured is near the parameter
 
 
 @dataclass(frozen=True)
-class Fit:
+class DetectorFit:
     """Fitted detector and annotation of a recording.
 
     Attributes:
@@ -48,7 +82,7 @@ class Fit:
 
 def fit(
     recording: AnnotatedRecording, *, name: str = "", command: str = "", resamples: int = RESAMPLES, seed: int = 0
-) -> Fit:
+) -> DetectorFit:
     """Measure the detector of a recording against the consensus of its views, and the truth against the same.
 
     Args:
@@ -59,13 +93,13 @@ def fit(
         seed: seed of the resamples, and of the bodies of the re-enactment.
 
     Raises:
-        ValueError: nobody to re-enact; see also :func:`~simharness.reality.detector_fit.detector_measurement.measure`.
+        ValueError: nobody to re-enact; see also :func:`.measure_detector`.
     """
     people = track_people(recording)
     filmed = film(recording, people, seed=seed)
     sample = sample_of(recording, people, filmed)
     labels = label_joints(sample)
-    real = measure(sample, labels=labels, resamples=resamples, seed=seed)
+    real = measure_detector(sample, labels=labels, resamples=resamples, seed=seed)
     scatter = np.array([real[f"keypoints.scatter.{KINDS[kind]}"].value for kind in KIND_OF_JOINT])
     annotation = fit_annotation(
         recording.truth,
@@ -90,10 +124,10 @@ def fit(
     calibrated = real.with_values({**calibrate(counted, lambda values: simulate({**values, **rare})), **rare})
     profile = DetectorSection.model_validate(settings(calibrated, name=name, bias=bias))
     text = as_toml(calibrated, name=name, bias=bias, command=command)
-    return Fit(real, annotation, people, filmed, profile, text)
+    return DetectorFit(real, annotation, people, filmed, profile, text)
 
 
-def write_profile(fitted: Fit, path: str | Path) -> None:
+def write_profile(fitted: DetectorFit, path: str | Path) -> None:
     """Write the profile; the file is complete or unchanged.
 
     Raises:
@@ -103,3 +137,67 @@ def write_profile(fitted: Fit, path: str | Path) -> None:
         write_atomic(Path(path), fitted.text.encode())
     except OSError as error:
         raise ValueError(f"--out {path}: cannot be written: {error.strerror}") from None
+
+
+def calibrate(
+    real: Mapping[str, float], simulate: Callable[[Mapping[str, float]], Sequence[Sample]], *, rounds: int = ROUNDS
+) -> dict[str, float]:
+    """Return the parameters at which simulated samples measure as the real one.
+
+    Args:
+        real: measured values by key; those that are no parameters of SHARES and FACTORS, or are NaN, stay.
+        simulate: function from parameters to samples of twins.
+        rounds: number of rounds.
+    """
+    moved = {
+        key: 0.0
+        for key, value in real.items()
+        if (key.startswith(SHARES) and value > _LEAST) or (key.startswith(FACTORS) and value > 0)
+    }
+    for _ in range(rounds):
+        measured = [point_estimates(sample) for sample in simulate(_at(real, moved))]
+        for key, before in moved.items():
+            twins = np.array([each.get(key, np.nan) for each in measured])
+            if np.isfinite(twins).any():
+                scale = _logit if key.startswith(SHARES) else _log
+                step = np.clip(scale(real[key]) - scale(float(np.nanmean(twins))), -_STEP, _STEP)
+                moved[key] = float(np.clip(before + step, -_FARTHEST, _FARTHEST))
+    return _at(real, moved)
+
+
+def face_bias(tracked: Floats, staged: Floats) -> Floats:
+    """Return the offset of the tracked joints of the face from the staged ones, (3, 3) metres: forward, outward, up.
+
+    One row for nose, eyes and ears; 0 where nothing is known.
+
+    Args:
+        tracked: joints of people as detected, (F, P, 17, 3) metres; NaN where unknown.
+        staged: joints of the bodies that re-enact them, (F, P, 17, 3) metres; NaN where absent.
+    """
+    face = slice(0, LIMB_JOINTS[0])
+    offset = np.einsum("fpjc,fpkc->fpjk", (tracked - staged)[:, :, face], body_axes(staged))
+    offset[..., 1] *= SIDE[face]
+    kinds = np.array(KIND_OF_JOINT[face])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # people who are always absent
+        # Each person counts alike: one with more frames says no more about the next one.
+        of_person = np.nanmedian(offset, axis=0)
+        return np.nan_to_num(np.stack([np.nanmean(of_person[:, kinds == kind], axis=(0, 1)) for kind in range(3)]))
+
+
+def _at(real: Mapping[str, float], moved: Mapping[str, float]) -> dict[str, float]:
+    """Return the values, moved on the scale of each: logit for shares, logarithm for amounts."""
+    result = dict(real)
+    for key, change in moved.items():
+        share = key.startswith(SHARES)
+        result[key] = float(1 / (1 + np.exp(-_logit(real[key]) - change)) if share else real[key] * np.exp(change))
+    return result
+
+
+def _logit(share: float) -> float:
+    share = min(max(share, _LEAST), 1 - _LEAST)
+    return float(np.log(share / (1 - share)))
+
+
+def _log(amount: float) -> float:
+    return float(np.log(max(amount, 1e-3)))

@@ -19,10 +19,9 @@ from simharness.detector.error_classes import MIRROR, classify, distinguishable,
 from simharness.detector.part_tree import PARENT
 from simharness.detector.view_geometry import head_bearings, image_axes
 from simharness.reality.annotated_recording import DetectorKind
-from simharness.reality.detector_fit import sizes
 from simharness.reality.detector_fit.association import Association, associate
 from simharness.reality.detector_fit.consensus import Consensus, find_consensus
-from simharness.reality.detector_fit.occlusion import complete_face, occlusion_classes
+from simharness.reality.detector_fit.occlusion import complete_face, in_picture, occlusion_classes, person_boxes
 from simharness.reality.detector_fit.sample import Sample
 from simharness.reality.people_tracks import LIMB_JOINTS
 from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOINT, KINDS
@@ -89,7 +88,7 @@ class LabelledJoints:
 def label_joints(sample: Sample) -> LabelledJoints:
     """Label the joints of all known people of a sample."""
     rig = sample.rig
-    boxes = sizes.boxes(sample.reference, rig)
+    boxes = person_boxes(sample.reference, rig)
     unit = oks_units(boxes)
     association = associate(sample, _project(sample.reference, rig), boxes)
     consensus = find_consensus(rig, association.keypoints, unit)
@@ -104,7 +103,7 @@ def label_joints(sample: Sample) -> LabelledJoints:
     if staged is None or occlusion is None:
         staged, normals = complete_face(sample.reference, consensus.joints)
         occlusion = occlusion_classes(staged, normals, association.unannotated, rig)
-        inside = sizes.in_picture(sample.reference, rig)
+        inside = in_picture(sample.reference, rig)
     else:
         inside = occlusion != OUTSIDE
     expected = sample.known[:, None] & (inside[..., LIMB_JOINTS].sum(axis=-1) >= _HALF)
@@ -197,7 +196,7 @@ def _neighbours(boxes: Floats, target: Floats, unannotated: Floats, rig: Rig) ->
     """Return the joints of the person whose box overlaps most, (T, V, P, 17, 2); NaN where no box overlaps."""
     people = boxes.shape[2]
     everyone = np.concatenate([target, _project(unannotated, rig)], axis=2)
-    overlap = overlaps(np.concatenate([boxes, sizes.boxes(unannotated, rig)], axis=2))[..., :people, :]
+    overlap = overlaps(np.concatenate([boxes, person_boxes(unannotated, rig)], axis=2))[..., :people, :]
     if not overlap.shape[-1]:
         return np.full(target.shape, np.nan)
     nearest = overlap.argmax(axis=-1)[..., None, None]

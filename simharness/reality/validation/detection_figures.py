@@ -1,11 +1,12 @@
-"""Measurements of a recording that need no estimates of the method: what a sceptic compares between two recordings.
+"""Figures of the detections of a recording, beside those of its twins: what a sceptic compares between two recordings.
 
-Each is a ratio of sums over frames, so that its interval comes from a bootstrap, or the variation of bone lengths.
+They need no estimates of the method. Each is a ratio of sums over frames, so that its interval comes from a bootstrap,
+or the variation of bone lengths.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -17,8 +18,10 @@ from mvpose.arrays import Bools, Floats
 from mvpose.rays import viewing_rays
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.sample import LIMB_JOINTS
+from simharness.reality.validation.evidence import Compared, compared
 from simharness.reality.validation.shown_people import ShownPeople, people_detections, shown_people
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS
+from simharness.statistics.resampling import resampled
 
 TREE = {
     "wrist|elbow": ((9, 7), (10, 8)),
@@ -60,10 +63,15 @@ class Ratio(NamedTuple):
         total = self.denominator.sum()
         return float(self.numerator.sum() / total) if total else float("nan")
 
+    def resampled(self, weights: Floats) -> Floats:
+        """Return the ratio in R resamples of the frames, (R,), from their weights (R, F)."""
+        numerator, denominator = resampled(self.numerator, weights), resampled(self.denominator, weights)
+        return np.where(denominator > 0, numerator / np.where(denominator > 0, denominator, 1.0), np.nan)
+
 
 @dataclass(frozen=True)
-class Measurements:
-    """Measurements of a recording of F frames.
+class DetectionFigures:
+    """Figures of the detections of a recording of F frames.
 
     Attributes:
         ratios: ratios by key: ``affinity.different`` (share of pairs of detections of different people, in different
@@ -96,20 +104,42 @@ class Measurements:
         return result | {f"score.q{100 * q:.0f}": each for q, each in zip(_SCORE_QUANTILES, self.scores, strict=True)}
 
 
-def measure(recording: AnnotatedRecording) -> Measurements:
-    """Measure a recording; see :class:`Measurements`."""
+def measure_detections(recording: AnnotatedRecording) -> DetectionFigures:
+    """Measure the detections of a recording; see :class:`DetectionFigures`."""
     shown = shown_people(recording)
     affinities = _affinities(shown)
     counts = {key: np.histogram(np.concatenate(each), AFFINITY_EDGES)[0] for key, each in affinities.items()}
     reported = shown.association.scores[..., LIMB_JOINTS]
     reported = reported[reported > 0]
-    return Measurements(
+    return DetectionFigures(
         ratios={**_ambiguity(affinities), **_hidden(shown), **_missing(shown), **_people(shown)},
         bones=_bone_lengths(np.where(shown.annotated[..., None, None], shown.triangulated, np.nan)),
         true_bones=_bone_lengths(shown.reference),
         affinities={key: each / max(1, each.sum()) for key, each in counts.items()},
         scores=tuple(float(np.quantile(reported, q)) if reported.size else float("nan") for q in _SCORE_QUANTILES),
     )
+
+
+def compare_detections(
+    real: DetectionFigures, twins: Sequence[DetectionFigures], weights: Floats
+) -> dict[str, Compared]:
+    """Return all measurements of a recording beside those of its twins, by the keys of ``DetectionFigures.values``.
+
+    Args:
+        real: measurements of the recording of F frames.
+        twins: measurements of the twins.
+        weights: bootstrap weights of the recording's frames, (R, F).
+    """
+    resamples: dict[str, Floats] = {key: ratio.resampled(weights) for key, ratio in real.ratios.items()}
+    for name, lengths in (("bones", real.bones), ("true_bones", real.true_bones)):
+        drawn = np.stack([bone_variation(np.repeat(lengths, row.astype(int), axis=0)) for row in weights], axis=-1)
+        keys = [key for key in real.values() if key.startswith(f"{name}.")]
+        resamples |= dict(zip(keys, drawn, strict=True))
+    values, of_twins = real.values(), [each.values() for each in twins]
+    return {
+        key: compared(value, resamples.get(key, np.array([np.nan])), [twin[key] for twin in of_twins])
+        for key, value in values.items()
+    }
 
 
 def bone_variation(lengths: Floats) -> Floats:

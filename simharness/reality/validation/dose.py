@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.reality.validation.evidence import Compared, Evidence, Figure
+from simharness.reality.validation.evidence import Compared, Evidence, Figure, rank_correlation
 from simharness.reality.validation.frame_scores import RULES, HeadRule
 from simharness.reality.validation.passes import Unchanged
-from simharness.reality.validation.rank_correlation import rank_correlation
 from simharness.reality.validation.tally import DEFAULT_RULE, Tally
 from simharness.reality.validation.treatments import KINDS, Treatment
 from simharness.statistics.intervals import Interval
@@ -21,7 +20,7 @@ _UNCHANGED = Unchanged()
 
 
 @dataclass(frozen=True)
-class Response:
+class DoseResponse:
     """What one treatment costs one variant; means over draws.
 
     Attributes:
@@ -54,7 +53,7 @@ class Response:
         return rank_correlation(*self.draws, resamples=self.resamples)
 
 
-def compare_responses(evidence: Evidence, variants: Sequence[str]) -> list[Response]:
+def compare_responses(evidence: Evidence, variants: Sequence[str]) -> list[DoseResponse]:
     """Compare reality and twins on all treatments of which the evidence has passes, and on no treatment."""
     given: dict[tuple[str, float], list[Treatment]] = {}
     for change in evidence.real:
@@ -68,7 +67,7 @@ def compare_responses(evidence: Evidence, variants: Sequence[str]) -> list[Respo
     ]
 
 
-def _response(evidence: Evidence, treatments: Sequence[Treatment], variant: str) -> Response:
+def _response(evidence: Evidence, treatments: Sequence[Treatment], variant: str) -> DoseResponse:
     first = treatments[0]
 
     def change(score: Callable[[Tally, HeadRule], Floats], sign: float, rule: HeadRule = DEFAULT_RULE) -> Compared:
@@ -76,7 +75,7 @@ def _response(evidence: Evidence, treatments: Sequence[Treatment], variant: str)
 
     losses = [_change(each, variant, Tally.pcp, -1.0, DEFAULT_RULE) for each in treatments]
     twins = [[float(loss(twin)) for twin in evidence.twins] for loss in losses]
-    return Response(
+    return DoseResponse(
         kind=first.kind,
         level=first.level,
         variant=variant,

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import rankdata
 
 from mvpose.arrays import Floats
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.validation.passes import Change, Tallies
+from simharness.reality.validation.passes import RecordingChange, Tallies
 from simharness.reality.validation.tally import Tally
 from simharness.statistics.intervals import Interval, mean_interval
 from simharness.statistics.resampling import block_weights, interval
@@ -18,7 +20,7 @@ from simharness.statistics.resampling import block_weights, interval
 RESAMPLES = 500
 """Number of bootstrap resamples of a recording's frames."""
 
-Sums = Mapping[Change, Mapping[str, Tally]]
+Sums = Mapping[RecordingChange, Mapping[str, Tally]]
 """Tallies summed over frames, by change and variant: scalars, or one value for each of R resamples."""
 
 Figure = Callable[[Sums], "Floats | float"]
@@ -86,7 +88,10 @@ class Evidence:
 
     @classmethod
     def of(
-        cls, recording: AnnotatedRecording, real: Mapping[Change, Tallies], twins: Sequence[Mapping[Change, Tallies]]
+        cls,
+        recording: AnnotatedRecording,
+        real: Mapping[RecordingChange, Tallies],
+        twins: Sequence[Mapping[RecordingChange, Tallies]],
     ) -> Evidence:
         """Return the evidence from tallies of frames.
 
@@ -119,12 +124,39 @@ def frame_weights(recording: AnnotatedRecording) -> Floats:
     return block_weights(np.arange(len(recording)) * step / recording.rate, resamples=RESAMPLES)
 
 
+def rank_correlation(real: ArrayLike, twin: ArrayLike, *, resamples: Floats | None = None) -> Interval:
+    """Return Spearman's correlation of two lists of n numbers; NaN with fewer than three, or where one is constant.
+
+    Args:
+        real: numbers of the recording, (n,).
+        twin: numbers of the twins, (n,). Places with a NaN in either are left out.
+        resamples: numbers of R bootstrap resamples of the recording, (R, n), for the interval; None: no interval.
+    """
+    value = _spearman(np.asarray(real, float), np.asarray(twin, float))
+    if resamples is None or not np.isfinite(value):
+        return Interval(value, np.nan, np.nan, 1)
+    low, high = interval([_spearman(each, np.asarray(twin, float)) for each in resamples])
+    return Interval(value, float(low), float(high), 1)
+
+
 def number(value: float) -> float | None:
     """Return the value for JSON, None where it is not finite."""
     return float(value) if np.isfinite(value) else None
 
 
-def _each(tallies: Mapping[Change, Tallies], function: Callable[[Tally], Tally]) -> dict[Change, dict[str, Tally]]:
+def _spearman(one: Floats, other: Floats) -> float:
+    known = np.isfinite(one) & np.isfinite(other)
+    if known.sum() < 3:
+        return float("nan")
+    ranks = rankdata(one[known]), rankdata(other[known])
+    if any(np.ptp(each) == 0 for each in ranks):
+        return float("nan")
+    return float(np.corrcoef(*ranks)[0, 1])
+
+
+def _each(
+    tallies: Mapping[RecordingChange, Tallies], function: Callable[[Tally], Tally]
+) -> dict[RecordingChange, dict[str, Tally]]:
     return {change: {name: function(each) for name, each in of.items()} for change, of in tallies.items()}
 
 

@@ -22,7 +22,7 @@ VARIANTS = ("full", "fast", "no-3dps", "no-matching")
 """Presets of :class:`mvpose.Pipeline` that a validation compares."""
 
 
-class Change(Protocol):
+class RecordingChange(Protocol):
     """Change of a recording: frozen, so that it can be sent to other processes and be the key of a result."""
 
     def __call__(self, recording: AnnotatedRecording) -> AnnotatedRecording:
@@ -40,7 +40,7 @@ class Unchanged:
 
 
 @dataclass(frozen=True)
-class Cameras:
+class CameraSubset:
     """Restriction of a recording to some cameras.
 
     Attributes:
@@ -101,12 +101,12 @@ Tallies = Mapping[str, Tally]
 
 def run_passes(
     recordings: Sequence[AnnotatedRecording],
-    changes: Sequence[Change],
+    changes: Sequence[RecordingChange],
     *,
     variants: Sequence[str] = VARIANTS,
     workers: int = 1,
     progress: Callable[[int], None] = lambda passes: None,
-) -> list[dict[Change, Tallies]]:
+) -> list[dict[RecordingChange, Tallies]]:
     """Return, for each recording, the tallies by change.
 
     Args:
@@ -140,7 +140,7 @@ class _Passes:
     """Passes by index: all recordings with the first change, then with the second."""
 
     recordings: tuple[AnnotatedRecording, ...]
-    changes: tuple[Change, ...]
+    changes: tuple[RecordingChange, ...]
     variants: tuple[str, ...]
 
     def __len__(self) -> int:

@@ -12,9 +12,8 @@ from mvpose.arrays import Bools, Floats
 from simharness.detector.conditions import OCCLUDED, OUTSIDE
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.association import Association, associate
-from simharness.reality.detector_fit.occlusion import complete_face, occlusion_classes
+from simharness.reality.detector_fit.occlusion import complete_face, in_picture, occlusion_classes, person_boxes
 from simharness.reality.detector_fit.sample import LIMB_JOINTS, Sample
-from simharness.reality.detector_fit.sizes import boxes, in_picture
 
 _OF_SHELF14 = [SHELF14.index(COCO17.joints[joint]) for joint in LIMB_JOINTS]
 
@@ -57,7 +56,7 @@ def shown_people(recording: AnnotatedRecording) -> ShownPeople:
     rig = recording.rig
     pixels = np.stack([camera.project(reference) for camera in rig], axis=1)
     sample = Sample(recording.name, rig, np.arange(len(recording)) / recording.rate, reference, recording.detections)
-    association = associate(sample, pixels, boxes(reference, rig))
+    association = associate(sample, pixels, person_boxes(reference, rig))
     triangulated = _triangulate(recording, association)
     joints, normals = complete_face(reference, association.consensus)
     classes = occlusion_classes(joints, normals, association.unannotated, rig)

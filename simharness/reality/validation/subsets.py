@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.reality.validation.evidence import Compared, Evidence, Figure, Sums
+from simharness.reality.validation.evidence import Compared, Evidence, Figure, Sums, rank_correlation
 from simharness.reality.validation.frame_scores import RULES, HeadRule
-from simharness.reality.validation.passes import Cameras
-from simharness.reality.validation.rank_correlation import rank_correlation
+from simharness.reality.validation.passes import CameraSubset
 from simharness.statistics.intervals import Interval
 from simharness.types.random_streams import stream
 
@@ -50,7 +49,7 @@ def subset_scores(sums: Sums, variant: str, *, rule: HeadRule = FILLED) -> dict[
     return {
         change.views: of_variant[variant].pcp(rule)
         for change, of_variant in sums.items()
-        if isinstance(change, Cameras)
+        if isinstance(change, CameraSubset)
     }
 
 
@@ -91,12 +90,12 @@ def compare_subsets(
     """Compare reality and twins on all subsets of the cameras of which the evidence has passes.
 
     Args:
-        evidence: sums by change, with those of :class:`~simharness.reality.validation.passes.Cameras`.
+        evidence: sums by change, with those of :class:`~simharness.reality.validation.passes.CameraSubset`.
         cameras: number of cameras of the rig.
         variants: names of the variants.
         rule: rule for the head.
     """
-    tried = Counter(len(change.views) for change in evidence.real if isinstance(change, Cameras))
+    tried = Counter(len(change.views) for change in evidence.real if isinstance(change, CameraSubset))
     curves = {
         count: {name: evidence.compare(_point(name, count, rule)) for name in variants} for count in sorted(tried)
     }

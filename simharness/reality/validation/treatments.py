@@ -26,7 +26,7 @@ _MOST_PHANTOMS = 16  # of a view and frame; a rate of 2 exceeds it once in 10^10
 
 @dataclass(frozen=True)
 class Treatment:
-    """Errors of one kind and level, as a change of a recording (:class:`~simharness.reality.validation.passes.Change`).
+    """Errors of one kind and level, as a change of a recording (:class:`.RecordingChange`).
 
     Attributes:
         kind: key of :data:`KINDS`.
@@ -50,7 +50,7 @@ class Treatment:
 
 
 @dataclass(frozen=True)
-class Kind:
+class TreatmentKind:
     """Kind of treatments.
 
     Attributes:
@@ -142,13 +142,13 @@ def _shift(recording: AnnotatedRecording, treatment: Treatment) -> AnnotatedReco
     return _each_camera(recording, treatment, move)
 
 
-KINDS: Mapping[str, Kind] = {
-    "noise": Kind("keypoint noise", "px at 1032 px width", (6.0, 12.0, 24.0), _noise),
-    "drop": Kind("keypoints dropped", "share", (0.1, 0.2, 0.4), _drop),
-    "miss": Kind("people missed", "share", (0.1, 0.2, 0.4), _miss),
-    "phantoms": Kind("phantoms", "per view and frame", (0.5, 1.0, 2.0), _phantoms),
-    "rotation": Kind("cameras turned", "° about each axis", (0.25, 0.5, 1.0), _rotate, calibration=True),
-    "translation": Kind("cameras moved", "cm along each axis", (2.5, 5.0, 10.0), _shift, calibration=True),
+KINDS: Mapping[str, TreatmentKind] = {
+    "noise": TreatmentKind("keypoint noise", "px at 1032 px width", (6.0, 12.0, 24.0), _noise),
+    "drop": TreatmentKind("keypoints dropped", "share", (0.1, 0.2, 0.4), _drop),
+    "miss": TreatmentKind("people missed", "share", (0.1, 0.2, 0.4), _miss),
+    "phantoms": TreatmentKind("phantoms", "per view and frame", (0.5, 1.0, 2.0), _phantoms),
+    "rotation": TreatmentKind("cameras turned", "° about each axis", (0.25, 0.5, 1.0), _rotate, calibration=True),
+    "translation": TreatmentKind("cameras moved", "cm along each axis", (2.5, 5.0, 10.0), _shift, calibration=True),
 }
 """Kinds of treatments by key."""
 

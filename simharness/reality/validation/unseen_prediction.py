@@ -10,8 +10,8 @@ import numpy as np
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.twin import TwinModel, simulate_twins
-from simharness.reality.validation.validation import Plan, Validation, validate
-from simharness.reality.validation.verdicts import PREDICTION_BOUNDS, Verdict
+from simharness.reality.validation.validation import Validation, ValidationPlan, validate
+from simharness.reality.validation.verdicts import PREDICTION_BOUNDS, BoundVerdict
 from simharness.runtime.progress import Reporter
 
 _HALVES = ("first half", "second half")
@@ -31,7 +31,7 @@ class HalfPrediction:
     validation: Validation
 
     @property
-    def verdicts(self) -> list[Verdict]:
+    def verdicts(self) -> list[BoundVerdict]:
         """Verdicts on what the fit predicts: PCP of each variant, and with subsets of the cameras."""
         return [
             replace(each, group="split_half", name=f"split_half.{self.half.split()[0]}.{each.name}")
@@ -78,7 +78,7 @@ def halves(recording: AnnotatedRecording) -> tuple[AnnotatedRecording, Annotated
 
 
 def predict_halves(
-    recording: AnnotatedRecording, *, count: int, plan: Plan, reporter: Reporter | None = None
+    recording: AnnotatedRecording, *, count: int, plan: ValidationPlan, reporter: Reporter | None = None
 ) -> list[HalfPrediction]:
     """Predict each half of a recording from a fit to the other.
 

@@ -8,15 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.validation.detection_figures import Measurements, measure
-from simharness.reality.validation.dose import Response, compare_responses
+from simharness.reality.validation.detection_figures import DetectionFigures, compare_detections, measure_detections
+from simharness.reality.validation.dose import DoseResponse, compare_responses
 from simharness.reality.validation.evidence import Compared, Evidence, compared, frame_weights
 from simharness.reality.validation.frame_scores import RULES, FrameScores, HeadRule
-from simharness.reality.validation.judge import judge_measurements, judge_responses, judge_scores, judge_subsets
-from simharness.reality.validation.measured import compare_measurements
 from simharness.reality.validation.passes import (
     VARIANTS,
-    Change,
+    RecordingChange,
     Tallies,
     Unchanged,
     annotated,
@@ -34,12 +32,21 @@ from simharness.reality.validation.variant_comparison import (
     median_error,
     pcp_of_parts,
 )
-from simharness.reality.validation.verdicts import BOUNDS, Bounds, State, Verdict
+from simharness.reality.validation.verdicts import (
+    BOUNDS,
+    Bounds,
+    BoundVerdict,
+    VerdictState,
+    judge_measurements,
+    judge_responses,
+    judge_scores,
+    judge_subsets,
+)
 from simharness.runtime.progress import Reporter, Silence
 
 
 @dataclass(frozen=True)
-class Plan:
+class ValidationPlan:
     """Extent of a validation.
 
     Attributes:
@@ -62,7 +69,7 @@ class Plan:
     workers: int = 1
 
 
-QUICK = Plan(every=3, twin_every=6, draws=4, detection_draws=2)
+QUICK = ValidationPlan(every=3, twin_every=6, draws=4, detection_draws=2)
 """Plan for a first look: a third of the frames."""
 
 
@@ -92,31 +99,31 @@ class Validation:
     recording: AnnotatedRecording
     twins: int
     twin_frames: float
-    plan: Plan
+    plan: ValidationPlan
     variants: Mapping[str, Mapping[str, Mapping[HeadRule, Compared]]]
     medians: Mapping[str, Compared]
     parts: Mapping[str, Mapping[str, Compared]]
     contrasts: Mapping[tuple[str, str], Mapping[HeadRule, Compared]]
     subsets: SubsetComparison
     subsets_as_is: SubsetComparison
-    responses: Sequence[Response]
+    responses: Sequence[DoseResponse]
     bases: Mapping[str, tuple[float, float]]
     joints: JointDifficulty
     measured: Mapping[str, Compared]
     affinities: Mapping[str, tuple[np.ndarray, np.ndarray]]
-    verdicts: Sequence[Verdict] = field(default=())
+    verdicts: Sequence[BoundVerdict] = field(default=())
 
     @property
-    def failed(self) -> list[Verdict]:
+    def failed(self) -> list[BoundVerdict]:
         """Verdicts that fail."""
-        return [verdict for verdict in self.verdicts if verdict.state == State.FAILS]
+        return [verdict for verdict in self.verdicts if verdict.state == VerdictState.FAILS]
 
 
 def validate(
     recording: AnnotatedRecording,
     twins: Sequence[AnnotatedRecording],
     *,
-    plan: Plan | None = None,
+    plan: ValidationPlan | None = None,
     bounds: Bounds = BOUNDS,
     reporter: Reporter | None = None,
 ) -> Validation:
@@ -132,7 +139,7 @@ def validate(
     Raises:
         ValueError: no twins, a twin with another number of cameras, or nobody annotated.
     """
-    plan, reporter = plan or Plan(), reporter or Silence()
+    plan, reporter = plan or ValidationPlan(), reporter or Silence()
     _check(recording, twins)
     real = annotated(recording, every=plan.every)
     whole = [annotated(twin, every=plan.every) for twin in twins]
@@ -143,9 +150,9 @@ def validate(
     with reporter.stage("measurements", 1 + len(whole)) as advance:
         measurements = []
         for each in (real, *whole):
-            measurements.append(measure(each))
+            measurements.append(measure_detections(each))
             advance(1)
-    changes: list[Change] = [Unchanged(), *map(Cameras, camera_subsets(len(real.rig)))]
+    changes: list[RecordingChange] = [Unchanged(), *map(Cameras, camera_subsets(len(real.rig)))]
     changes += treatments(draws=plan.draws, detection_draws=plan.detection_draws) if plan.treated else ()
     with reporter.stage("subsets and treatments", len(changes) * (1 + len(thinned))) as advance:
         passes = run_passes([real, *thinned], changes, variants=plan.variants, workers=plan.workers, progress=advance)
@@ -168,15 +175,15 @@ def _check(recording: AnnotatedRecording, twins: Sequence[AnnotatedRecording]) -
 def _compare(
     real: AnnotatedRecording,
     twins: Sequence[AnnotatedRecording],
-    plan: Plan,
+    plan: ValidationPlan,
     bounds: Bounds,
     scores: Sequence[Mapping[str, FrameScores]],
-    measurements: Sequence[Measurements],
+    measurements: Sequence[DetectionFigures],
     evidence: Evidence,
 ) -> Validation:
     """Return the comparison, from the scores, the measurements and the passes of all recordings."""
     everyone = (real, *twins)
-    tallies: list[dict[Change, Tallies]] = [
+    tallies: list[dict[RecordingChange, Tallies]] = [
         {Unchanged(): {name: Tally.of(of, each.scored) for name, of in variants.items()}}
         for each, variants in zip(everyone, scores, strict=True)
     ]
@@ -186,7 +193,7 @@ def _compare(
     cameras = len(real.rig)
     subsets = compare_subsets(evidence, cameras, plan.variants)
     responses = compare_responses(evidence, plan.variants)
-    measured = compare_measurements(measurements[0], measurements[1:], frame_weights(real))
+    measured = compare_detections(measurements[0], measurements[1:], frame_weights(real))
     verdicts = [
         *judge_scores(variants, contrasts, bounds),
         *judge_subsets(subsets, bounds),

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from mvpose import SHELF14
 from simharness.reality.validation.detection_figures import AFFINITY_EDGES
-from simharness.reality.validation.dose import Response
+from simharness.reality.validation.dose import DoseResponse
 from simharness.reality.validation.evidence import Compared, number
 from simharness.reality.validation.frame_scores import RULES, HeadRule
 from simharness.reality.validation.subsets import SubsetComparison
 from simharness.reality.validation.validation import Validation
 from simharness.reality.validation.variant_comparison import SCORES
-from simharness.reality.validation.verdicts import State, Verdict
+from simharness.reality.validation.verdicts import BoundVerdict, VerdictState
 from simharness.statistics.intervals import Interval
 
 if TYPE_CHECKING:
@@ -44,8 +44,8 @@ def summarize_validation(validation: Validation) -> dict[str, Any]:
             "draws": validation.plan.draws,
             "detection_draws": validation.plan.detection_draws,
         },
-        "passed": State.FAILS not in states,
-        "counts": {state.value: states.count(state) for state in State},
+        "passed": VerdictState.FAILS not in states,
+        "counts": {state.value: states.count(state) for state in VerdictState},
         "verdicts": [_verdict(each) for each in validation.verdicts],
         "variants": {name: _variant(validation, name) for name in validation.variants},
         "contrasts": {
@@ -91,7 +91,7 @@ def summarize_halves(predictions: Sequence[HalfPrediction]) -> dict[str, Any]:
     return result
 
 
-def _verdict(verdict: Verdict) -> dict[str, Any]:
+def _verdict(verdict: BoundVerdict) -> dict[str, Any]:
     return {
         "group": verdict.group,
         "name": verdict.name,
@@ -143,7 +143,7 @@ def _dose(validation: Validation) -> dict[str, Any]:
     return result
 
 
-def _response(response: Response) -> dict[str, Any]:
+def _response(response: DoseResponse) -> dict[str, Any]:
     return {
         **response.loss.summary(),
         "filled": response.loss_filled.summary(),

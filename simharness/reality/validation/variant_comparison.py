@@ -9,12 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.reality.validation.evidence import Compared, Evidence, Figure
+from simharness.reality.validation.evidence import Compared, Evidence, Figure, rank_correlation
 from simharness.reality.validation.frame_scores import RULES, FrameScores, HeadRule
 from simharness.reality.validation.passes import Unchanged
-from simharness.reality.validation.rank_correlation import rank_correlation
 from simharness.reality.validation.tally import Tally
-from simharness.scoring.pck import pck
+from simharness.scoring.joint_errors import pck
 from simharness.scoring.pcp import GROUPS, Part
 
 SCORES: Mapping[str, Callable[[Tally, HeadRule], Floats]] = {

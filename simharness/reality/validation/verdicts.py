@@ -7,16 +7,43 @@ of recording and twins.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
+from simharness.reality.annotated_recording import DetectorKind
+from simharness.reality.validation.detection_figures import BONES, TREE
+from simharness.reality.validation.dose import DoseResponse
 from simharness.reality.validation.evidence import Compared
+from simharness.reality.validation.frame_scores import HeadRule
+from simharness.reality.validation.subsets import SubsetComparison
+from simharness.reality.validation.treatments import KINDS
 from simharness.statistics.intervals import Interval
 
 _ROUNDING = 1e-9  # correlations of few ranks are round numbers, such as 0.8
+_CURVES = ("full", "fast", "no-matching")  # variants whose subsets have bounds
+_LEAST_DRAWS = 8  # fewer, as in a quick validation, give a rank correlation that says nothing
+
+GROUPS: Mapping[str, str] = {
+    "pcp": "PCP of every variant, both head rules",
+    "mpjpe": "MPJPE of every variant",
+    "no_3dps": "full minus no-3dps",
+    "order": "order of variants where reality is clear",
+    "subsets": "PCP with fewer cameras",
+    "gains": "full minus fast with fewer cameras",
+    "subset_rank": "rank of the pairs of cameras",
+    "dose": "loss of PCP by treatment",
+    "draw_rank": "rank of the draws of calibration errors",
+    "bones": "variation of triangulated bones",
+    "tree": "children of missing joints are missing",
+    "ears": "ears seen by fewer than two views",
+    "behind": "joints hidden by others",
+    "ambiguous": "ambiguous pairs of detections",
+    "split_half": "PCP of one half from a fit to the other",
+}
+"""Titles of the groups of verdicts, in the order of tables."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +98,7 @@ PREDICTION_BOUNDS = Bounds(pcp=2.5)
 """Bounds where the twins were fitted to other frames than those that they predict."""
 
 
-class State(StrEnum):
+class VerdictState(StrEnum):
     """State of a verdict."""
 
     HOLDS = "holds"
@@ -80,7 +107,7 @@ class State(StrEnum):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class BoundVerdict:
     """Verdict on one figure.
 
     Attributes:
@@ -97,7 +124,7 @@ class Verdict:
     real: float
     twin: float
     bound: str
-    state: State
+    state: VerdictState
 
     @property
     def difference(self) -> float:
@@ -105,7 +132,74 @@ class Verdict:
         return self.twin - self.real
 
 
-def within(group: str, name: str, figure: Compared, low: float, high: float, *, bound: str = "") -> Verdict:
+def judge_scores(
+    variants: Mapping[str, Mapping[str, Mapping[HeadRule, Compared]]],
+    contrasts: Mapping[tuple[str, str], Mapping[HeadRule, Compared]],
+    bounds: Bounds,
+) -> Iterator[BoundVerdict]:
+    """Yield the verdicts on the variants with all cameras, by both head rules as published."""
+    for name, scores in variants.items():
+        for rule, figure in _published(scores["pcp"]):
+            yield near("pcp", f"pcp.{name}.{rule}", figure, bounds.pcp)
+        for rule, figure in _published(scores["mpjpe_mm"]):
+            limit = bounds.mpjpe * figure.real.mean
+            yield near("mpjpe", f"mpjpe.{name}.{rule}", figure, limit, text=f"± {100 * bounds.mpjpe:g} %")
+    for (one, other), figures in contrasts.items():
+        for rule, figure in _published(figures):
+            if {one, other} == {"full", "no-3dps"}:
+                yield near("no_3dps", f"no_3dps.{rule}", figure, bounds.no_3dps)
+            order = same_sign("order", f"order.{one}.{other}.{rule}", figure)
+            if order is not None:
+                yield order
+
+
+def judge_subsets(subsets: SubsetComparison, bounds: Bounds) -> Iterator[BoundVerdict]:
+    """Yield the verdicts on subsets of the cameras."""
+    names = [name for name in _CURVES if name in subsets.single]
+    for name in names:
+        curve = {count: each[name] for count, each in subsets.curves.items()}
+        yield average("subsets", f"subsets.{name}", curve, bounds.subsets)
+    for count, gain in subsets.gains.items():
+        yield near("gains", f"gains.{count}", gain, bounds.gain(count))
+    for name in names:
+        if np.isfinite(subsets.ranks[name].mean):
+            yield at_least("subset_rank", f"subset_rank.{name}", subsets.ranks[name], bounds.subset_rank)
+
+
+def judge_responses(responses: Sequence[DoseResponse], bounds: Bounds) -> Iterator[BoundVerdict]:
+    """Yield the verdicts on treatments: every loss, and the rank of draws at the highest level of the calibration.
+
+    At lower levels the losses of different draws differ by less than their intervals. Draws of detection errors are
+    not ranked: they average over frames, so that none is harder than another.
+    """
+    for each in responses:
+        name = f"{each.kind}.{each.level:g}.{each.variant}"
+        yield near("dose", f"dose.{name}", each.loss, bounds.loss_of(each.loss.real.mean))
+    for each in responses:
+        highest = max(other.level for other in responses if other.kind == each.kind)
+        enough = KINDS[each.kind].calibration and each.draws.shape[1] >= _LEAST_DRAWS
+        if enough and each.level == highest and np.isfinite(each.rank.mean):
+            yield at_least("draw_rank", f"draw_rank.{each.kind}.{each.variant}", each.rank, bounds.draw_rank)
+
+
+def judge_measurements(measured: Mapping[str, Compared], kind: DetectorKind, bounds: Bounds) -> Iterator[BoundVerdict]:
+    """Yield the verdicts on measurements of the detections; what a recording cannot show has none."""
+    known = {key: each for key, each in measured.items() if np.isfinite(each.real.mean)}
+    for bone in BONES:
+        if f"bones.{bone}" in known:
+            yield ratio("bones", f"bones.{bone}", known[f"bones.{bone}"], *bounds.bones)
+    for name in TREE:
+        if kind == "bottom-up" and f"tree.{name}" in known:
+            yield near("tree", f"tree.{name}", known[f"tree.{name}"], bounds.tree)
+    for key, limit in (("ears", bounds.ears), ("behind", bounds.behind)):
+        if key in known:
+            yield near(key, key, known[key], limit)
+    if "affinity.different" in known:
+        figure = known["affinity.different"]
+        yield near("ambiguous", "ambiguous", figure, bounds.ambiguous * figure.real.mean, text="± a third")
+
+
+def within(group: str, name: str, figure: Compared, low: float, high: float, *, bound: str = "") -> BoundVerdict:
     """Return the verdict on a difference that must lie between ``low`` and ``high``.
 
     Args:
@@ -117,50 +211,50 @@ def within(group: str, name: str, figure: Compared, low: float, high: float, *, 
         bound: text of the bound; by default the greatest accepted difference.
     """
     real, difference = figure.real, figure.difference
-    state = State.HOLDS
+    state = VerdictState.HOLDS
     if not low <= difference <= high:  # also where the difference is not a number
         down, up = figure.uncertainty
         allowed, width = (-low, real.mean - real.low) if difference < low else (high, real.high - real.mean)
         chance = difference - down <= 0 <= difference + up
-        state = State.UNCLEAR if chance and width > allowed else State.FAILS
-    return Verdict(group, name, real.mean, figure.twin.mean, bound or f"± {high:.3g}", state)
+        state = VerdictState.UNCLEAR if chance and width > allowed else VerdictState.FAILS
+    return BoundVerdict(group, name, real.mean, figure.twin.mean, bound or f"± {high:.3g}", state)
 
 
-def near(group: str, name: str, figure: Compared, bound: float, *, text: str = "") -> Verdict:
+def near(group: str, name: str, figure: Compared, bound: float, *, text: str = "") -> BoundVerdict:
     """Return the verdict on a difference of at most ``bound`` in either direction."""
     return within(group, name, figure, -bound, bound, bound=text)
 
 
-def ratio(group: str, name: str, figure: Compared, low: float, high: float) -> Verdict:
+def ratio(group: str, name: str, figure: Compared, low: float, high: float) -> BoundVerdict:
     """Return the verdict on the ratio of twins to recording, which must lie between ``low`` and ``high``."""
     real = figure.real.mean
     return within(group, name, figure, (low - 1) * real, (high - 1) * real, bound=f"{low:g}–{high:g} ×")
 
 
-def average(group: str, name: str, figures: Mapping[int, Compared], bound: float) -> Verdict:
+def average(group: str, name: str, figures: Mapping[int, Compared], bound: float) -> BoundVerdict:
     """Return the verdict on the mean absolute difference of several figures, at most ``bound``.
 
     It is unclear where it exceeds the bound by no more than the mean distance that the intervals explain, and the
     intervals of the recording are wider than the bound.
     """
     apart = float(np.mean([abs(each.difference) for each in figures.values()]))
-    state = State.HOLDS
+    state = VerdictState.HOLDS
     if not apart <= bound:
         chance = np.mean([max(each.uncertainty) for each in figures.values()])
         width = np.mean([(each.real.high - each.real.low) / 2 for each in figures.values()])
-        state = State.UNCLEAR if apart <= chance and width > bound else State.FAILS
+        state = VerdictState.UNCLEAR if apart <= chance and width > bound else VerdictState.FAILS
     real, twin = (float(np.mean([getattr(each, side).mean for each in figures.values()])) for side in ("real", "twin"))
-    return Verdict(group, name, real, twin, f"mean ± {bound:.3g}", state)
+    return BoundVerdict(group, name, real, twin, f"mean ± {bound:.3g}", state)
 
 
-def at_least(group: str, name: str, rank: Interval, bound: float) -> Verdict:
+def at_least(group: str, name: str, rank: Interval, bound: float) -> BoundVerdict:
     """Return the verdict on a correlation of at least ``bound``: unclear where its interval reaches the bound."""
     reached = [value >= bound - _ROUNDING for value in (rank.mean, rank.high)]
-    state = State.HOLDS if reached[0] else State.UNCLEAR if reached[1] else State.FAILS
-    return Verdict(group, name, float("nan"), rank.mean, f"≥ {bound:g}", state)
+    state = VerdictState.HOLDS if reached[0] else VerdictState.UNCLEAR if reached[1] else VerdictState.FAILS
+    return BoundVerdict(group, name, float("nan"), rank.mean, f"≥ {bound:g}", state)
 
 
-def same_sign(group: str, name: str, contrast: Compared) -> Verdict | None:
+def same_sign(group: str, name: str, contrast: Compared) -> BoundVerdict | None:
     """Return the verdict on the order of two variants, None where reality is not clear about it.
 
     Reality is clear where the interval of its contrast excludes 0; it is unclear whether twins have the same order
@@ -169,7 +263,11 @@ def same_sign(group: str, name: str, contrast: Compared) -> Verdict | None:
     real, twin = contrast.real, contrast.twin
     if not (real.low > 0 or real.high < 0):
         return None
-    state = State.HOLDS
+    state = VerdictState.HOLDS
     if np.sign(twin.mean) != np.sign(real.mean):
-        state = State.UNCLEAR if twin.low < 0 < twin.high else State.FAILS
-    return Verdict(group, name, real.mean, twin.mean, "same sign", state)
+        state = VerdictState.UNCLEAR if twin.low < 0 < twin.high else VerdictState.FAILS
+    return BoundVerdict(group, name, real.mean, twin.mean, "same sign", state)
+
+
+def _published(figures: Mapping[HeadRule, Compared]) -> Iterator[tuple[HeadRule, Compared]]:
+    return ((rule, figure) for rule, figure in figures.items() if not rule.filled)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
-from simharness.scoring.score_registry import finite_mean
+from simharness.scoring.score_registry import ScoreInfo, ScoreInput, finite_mean, score
 
 
 def velocity(positions: ArrayLike, time: ArrayLike) -> Floats:
@@ -73,6 +73,9 @@ def rms_jerk(truth: ArrayLike, estimate: ArrayLike, time: ArrayLike) -> tuple[fl
     return found, true
 
 
+_STILL = 1e-3  # m/s³, a thousandth of a slow walk's: positions of nobody who moves differ by rounding alone
+
+
 def jerk_ratio(truth: ArrayLike, estimate: ArrayLike, time: ArrayLike) -> float | None:
     """Return the RMS jerk of the estimate over that of the truth; None without four frames, or if nobody moves.
 
@@ -82,7 +85,23 @@ def jerk_ratio(truth: ArrayLike, estimate: ArrayLike, time: ArrayLike) -> float 
     return rms[0] / rms[1] if rms and rms[1] > _STILL else None
 
 
-_STILL = 1e-3  # m/s³, a thousandth of a slow walk's: positions of nobody who moves differ by rounding alone
+_VELOCITY = "mean error of the velocity of joints of people found, from frame to frame"
+
+
+@score(ScoreInfo("velocity_mm_s", "Velocity error", "mm/s", _VELOCITY, "lower", 0))
+def velocity_column(given: ScoreInput) -> float | None:
+    """Return the mean error of velocities, mm/s."""
+    error = velocity_error(given.truth, given.paired, given.recording.time)
+    return None if error is None else 1000.0 * error
+
+
+_JERK = "RMS jerk of joints of people found over that of the truth; 1 is as smooth as people are"
+
+
+@score(ScoreInfo("jerk_ratio", "Jerk", "", _JERK, "lower", 2, target=1.0))
+def jerk_column(given: ScoreInput) -> float | None:
+    """Return the ratio of the jerk of the estimates to that of the truth."""
+    return jerk_ratio(given.truth, given.paired, given.recording.time)
 
 
 def _slopes(values: Floats, time: Floats, apart: int) -> Floats:

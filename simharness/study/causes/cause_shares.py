@@ -26,8 +26,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.runtime.errors import RunError
 from simharness.runtime.frame_pool import map_jobs
-from simharness.runtime.progress import Reporter, Silence
-from simharness.runtime.stages import Stages
+from simharness.runtime.progress import Reporter, Silence, Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import SCALES, Interval, Scale, mean_interval

@@ -15,20 +15,18 @@ import numpy as np
 from mvpose import Estimate, Rig
 from mvpose.estimators import Estimator, SequenceEstimator
 from simharness.runtime.errors import naming_frame
-from simharness.runtime.progress import Silence
-from simharness.runtime.stages import Stages
+from simharness.runtime.progress import Silence, Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import assess
-from simharness.scoring.substitution import true_labels, with_labels
+from simharness.scoring.stage_blame import true_labels, with_labels
 from simharness.study.causes.cause_catalogue import Cause, causes_by_name
 from simharness.study.causes.extra_camera import with_one_more_camera
 from simharness.trial.audit import audit
 from simharness.trial.run_trial import with_variants
 from simharness.trial.stages.build_trial import Trial, build_trial, true_rig
 from simharness.trial.stages.capture import CaptureFrames
-from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.trial.stages.estimation import EstimateFrames
-from simharness.trial.stages.simulation import Simulation, detect_trial
+from simharness.trial.stages.simulation import DetectedSequence, Simulation, detect_trial
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views, Visibility
 from simharness.world.rigs.exposure_schedule import ExposureSchedule

@@ -43,7 +43,7 @@ from mvpose.estimators import Estimator
 from mvpose.skeleton import Skeleton
 from simharness.runtime.errors import RunError
 from simharness.scenario.sections.method_section import MethodSection, wrong_variants
-from simharness.trial.stages.tracking import track_frames
+from simharness.trial.stages.estimation import track_frames
 
 _PROTOCOL = "estimate(rig, detections) -> mvpose.Estimate"
 _METHODS = ("estimate", "track")

@@ -111,7 +111,7 @@ AROUND = {
     "simharness/planning/search.py": "text that was just written",
     "simharness/outputs/run/film.py": "a film that was just written",
     "simharness/runtime/code_digest.py": "code",
-    "simharness/runtime/machine.py": "what the kernel says of the machine",
+    "simharness/trial/needs.py": "what the kernel says of the machine",
     "simharness/trial/identity.py": "digests of regular files, read in blocks",
     "simharness/trial/stages/estimators.py": "code",
     "simharness/scenario/load.py": "digests of regular files",

@@ -12,7 +12,7 @@ import polars as pl
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.catalogue import SCORES
 from simharness.scoring.stage_blame import FAILURE_SCHEMA
-from simharness.scoring.tracking.columns import IDENTITY_SCORES
+from simharness.scoring.tracking.identity_figures import IDENTITY_SCORES
 from simharness.study.study_folder import Results
 from simharness.types.random_streams import stream
 

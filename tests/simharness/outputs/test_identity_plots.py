@@ -14,7 +14,7 @@ from mvpose.report.track_plots import runs_of
 from simharness.outputs.run.identities import identities_of
 from simharness.outputs.run.identity_plots import timeline, trajectories
 from simharness.outputs.run.page import render
-from simharness.scoring.tracking.summary import tracking_summary
+from simharness.scoring.tracking.identity_figures import tracking_summary
 
 BODY = np.random.default_rng(0).normal(0, 0.3, (17, 3))
 GREY = css(UNMATCHED)

@@ -12,8 +12,7 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.sample import Sample
 from simharness.reality.people_tracks import TrackedPeople
 from simharness.reality.reenactment import Film
-from simharness.runtime.progress import Silence
-from simharness.runtime.stages import Stages
+from simharness.runtime.progress import Silence, Stages
 from simharness.scenario.load import load
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.trial.stages.build_trial import build_trial

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from simharness.runtime.worker_processes import IMPORTED, worker_context
+from simharness.runtime.frame_pool import IMPORTED, worker_context
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="workers are spawned on this system")
 

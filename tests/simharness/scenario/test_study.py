@@ -12,7 +12,7 @@ from simharness.scenario.load import ScenarioError, load
 from simharness.scenario.resolution import read_plan
 from simharness.scenario.study_definition import StudyTooLarge, load_study
 from simharness.scenario.sweep import Sweep
-from simharness.study.study_file import document
+from simharness.study.study_folder import document
 
 SHIPPED = sorted((Path(__file__).parents[3] / "scenarios").glob("*.toml"))
 

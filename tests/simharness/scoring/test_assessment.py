@@ -12,7 +12,7 @@ from mvpose import COCO17, Estimate, Matching
 from simharness.scoring.assessment import assess, score_variant
 from simharness.scoring.catalogue import SCORES
 from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES
-from simharness.scoring.pck import pck
+from simharness.scoring.joint_errors import pck
 from simharness.types.recording import Recording
 from simharness.types.truth import Truth
 from simharness.types.views import Visibility

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scoring.pck import pck, pck_area
+from simharness.scoring.joint_errors import pck, pck_area
 
 errors = st.lists(st.one_of(st.floats(0, 0.3), st.just(np.inf), st.just(np.nan)), max_size=12)
 

@@ -10,7 +10,7 @@ from recordings import perfect_estimates, record, with_ghost
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.scoring.assessment import assess
 from simharness.scoring.catalogue import SCORES
-from simharness.scoring.tracking.summary import tracking_of_some, tracking_summary
+from simharness.scoring.tracking.identity_figures import tracking_of_some, tracking_summary
 
 OF_IDENTITIES = [
     *("hota", "deta", "assa", "loca", "idf1", "idp", "idr", "mota", "pcp_tracked", "mpjpe_tracked_mm"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from simharness.statistics.paired_counts import paired_counts
+from simharness.statistics.paired_tests import paired_counts
 
 
 def test_single_events_are_binomial():

@@ -5,9 +5,8 @@ import json
 import pytest
 from fakes import Fake, called, study_of
 
-from simharness.study.merge import merge
 from simharness.study.study_run import run_shard, run_study
-from simharness.study.trial_store import Store
+from simharness.study.trial_store import Store, merge
 
 
 @pytest.fixture

@@ -14,14 +14,14 @@ from mvpose import Estimate
 from simharness.scenario.load import load
 from simharness.scenario.study_definition import load_study
 from simharness.scoring import assessment
-from simharness.study.stored_trial import StoredTrial, measure
+from simharness.study.stored_trial import StoredTrial, run_stored_trial
 from simharness.study.study_plan import plan
 from simharness.study.study_run import run_study
 from simharness.study.trial_store import EntryState, Store
 from simharness.trial import identity, run_trial
 from simharness.trial.archive import pack_detected, pack_estimates, unpack_detected, unpack_estimates
 from simharness.trial.stages import estimation
-from simharness.trial.stages.detected_sequence import DetectedSequence
+from simharness.trial.stages.simulation import DetectedSequence
 
 QUICKSTART = Path(__file__).parents[3] / "scenarios" / "quickstart.toml"
 CHEAP = ("rendering.renderer=rays", "duration=0.6", "rate=5", "people.count=2", "cameras.count=3")
@@ -212,11 +212,11 @@ def test_estimates_without_labels_are_restored_as_they_were():
 
 def test_variants_that_were_not_stored_are_estimated_beside_those_that_were():
     scenario = load(QUICKSTART, overrides=CHEAP)
-    first = measure(scenario, ["full"])
-    both = measure(scenario, ["full", "fast"], StoredTrial(first.archive))
+    first = run_stored_trial(scenario, ["full"])
+    both = run_stored_trial(scenario, ["full", "fast"], StoredTrial(first.archive))
     assert both.archive.detected == b""
     assert both.archive.estimates["full"] == first.archive.estimates["full"]
-    fresh = measure(scenario, ["full", "fast"])
+    fresh = run_stored_trial(scenario, ["full", "fast"])
     for variant in VARIANTS:
         assert without_times(both.results[variant].people).equals(without_times(fresh.results[variant].people))
     assert isinstance(both.results["fast"].failures, pl.DataFrame)

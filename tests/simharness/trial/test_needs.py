@@ -9,10 +9,9 @@ from typer.testing import CliRunner
 
 from simharness.cli import app
 from simharness.outputs.run.result_folder import run
-from simharness.runtime.machine import memory
 from simharness.scenario.load import load
 from simharness.trial import needs
-from simharness.trial.needs import describe, needs_of, require_memory
+from simharness.trial.needs import describe, memory, needs_of, require_memory
 
 RAYS = 'rendering.renderer="rays"'
 FAST = 'variants=["fast"]'

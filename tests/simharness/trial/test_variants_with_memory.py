@@ -11,8 +11,8 @@ from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
 from simharness.trial.archive import pack_detected, pack_estimates, unpack_detected, unpack_estimates
 from simharness.trial.run_trial import run_trial
+from simharness.trial.stages.estimation import track_frames
 from simharness.trial.stages.estimators import UserEstimator, UserTracker, user_estimator
-from simharness.trial.stages.tracking import track_frames
 
 TRACKERS = """
 import os

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mvpose import Detections
-from simharness.reality.detector_fit import sizes
+from simharness.reality.detector_fit import occlusion
 from simharness.reality.detector_fit.association import associate
 from simharness.reality.detector_fit.sample import LIMB_JOINTS, Sample, sample_of
 from simharness.reality.people_tracks import track_people
@@ -20,7 +20,7 @@ def associated(sample, *, frames=20):
         measured=None if sample.measured is None else sample.measured[:frames],
     )
     pixels = np.stack([camera.project(part.reference) for camera in part.rig], axis=1)
-    return part, associate(part, pixels, sizes.boxes(part.reference, part.rig))
+    return part, associate(part, pixels, occlusion.person_boxes(part.reference, part.rig))
 
 
 def test_perfect_detections_are_associated_with_their_person(filmed):
@@ -61,7 +61,7 @@ def test_detections_with_too_few_joints_are_fragments(filmed):
     odd = Detections.from_keypoints([1], np.full((1, 17, 2), 50.0), scores)
     frames = tuple(odd for _ in sample.detections)
     pixels = np.stack([camera.project(sample.reference) for camera in filmed.rig], axis=1)
-    found = associate(replace(sample, detections=frames), pixels, sizes.boxes(sample.reference, filmed.rig))
+    found = associate(replace(sample, detections=frames), pixels, occlusion.person_boxes(sample.reference, filmed.rig))
     assert found.fragments.tolist() == [[0, 1, 0, 0, 0]] * 3
     assert found.false.sum() == 0
     assert not found.detected.any()

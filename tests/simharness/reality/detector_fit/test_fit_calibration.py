@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from simharness.reality.detector_fit.calibration import FACTORS, SHARES, calibrate
-from simharness.reality.detector_fit.detector_measurement import measure
+from simharness.reality.detector_fit.detector_measurement import measure_detector
+from simharness.reality.detector_fit.fit import FACTORS, SHARES, calibrate
 from simharness.reality.detector_fit.profile import settings
 from simharness.scenario.sections.detector_section import KINDS
 
@@ -19,7 +19,7 @@ def mean(values, key):
 def test_calibrated_parameters_are_nearer_to_the_true_ones(filmed):
     """Of a poor detector too few jitters and too many misses are measured, because other views err as well."""
     errors = {key.split(".")[1]: value for key, value in TRUE.items()}
-    measured = measure(filmed.sample(kind="bottom-up", keypoints=errors), resamples=10)
+    measured = measure_detector(filmed.sample(kind="bottom-up", keypoints=errors), resamples=10)
 
     def simulate(values):
         return [filmed.sample(seed=5, **settings(measured.with_values(values), name="fitted"))]
@@ -43,7 +43,7 @@ def test_calibrated_parameters_of_hidden_joints_are_nearer_to_the_true_ones(film
         "keypoints.jitter_mean": {"shoulders": 0.2, "hips": 0.2},
     }
     errors = {"scatter": 0.3, "jitter": 0.05, **{key.split(".")[1]: kinds for key, kinds in true.items()}}
-    measured = measure(filmed.sample(staged=True, kind="bottom-up", keypoints=errors), resamples=10)
+    measured = measure_detector(filmed.sample(staged=True, kind="bottom-up", keypoints=errors), resamples=10)
 
     def simulate(values):
         fitted = settings(measured.with_values(values), name="fitted")
@@ -61,7 +61,7 @@ def test_calibrated_parameters_of_hidden_joints_are_nearer_to_the_true_ones(film
 
 def test_a_simulation_that_measures_alike_changes_nothing(filmed):
     sample = filmed.sample(keypoints={"scatter": 0.3, "jitter": 0.05})
-    real = {key: each.value for key, each in measure(sample, resamples=10).values.items()}
+    real = {key: each.value for key, each in measure_detector(sample, resamples=10).values.items()}
     calibrated = calibrate(real, lambda values: [sample], rounds=1)
     for key, value in real.items():
         assert calibrated[key] == pytest.approx(value, rel=1e-6, nan_ok=True), key

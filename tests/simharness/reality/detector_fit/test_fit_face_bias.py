@@ -1,7 +1,7 @@
 import numpy as np
 
 from simharness.detector.bias import world_offsets
-from simharness.reality.detector_fit.face_bias import face_bias
+from simharness.reality.detector_fit.fit import face_bias
 from simharness.scenario.sections.detector_section import BiasSection
 
 BIAS = BiasSection(nose=(0.02, 0.0, -0.01), eyes=(0.01, 0.004, 0.0), ears=(-0.02, 0.01, 0.03), hips=(0.0, 0.0, 0.05))

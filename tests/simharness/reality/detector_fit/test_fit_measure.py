@@ -10,7 +10,12 @@ from filmed_people import narrowed
 from mvpose import Detections
 from simharness.detector.part_tree import PARENT
 from simharness.detector.view_geometry import head_bearings
-from simharness.reality.detector_fit.detector_measurement import MeasuredValue, agreement, measure, point_estimates
+from simharness.reality.detector_fit.detector_measurement import (
+    MeasuredValue,
+    agreement,
+    measure_detector,
+    point_estimates,
+)
 from simharness.reality.detector_fit.frame_sums import frame_sums
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.profile import as_toml, settings
@@ -74,17 +79,17 @@ LASTING = {
 
 @pytest.fixture(scope="module")
 def dropping(filmed):
-    return measure(filmed.sample(**DROPPING), resamples=100)
+    return measure_detector(filmed.sample(**DROPPING), resamples=100)
 
 
 @pytest.fixture(scope="module")
 def erring(filmed):
-    return measure(filmed.sample(**ERRING), resamples=100)
+    return measure_detector(filmed.sample(**ERRING), resamples=100)
 
 
 @pytest.fixture(scope="module")
 def lasting(filmed):
-    return measure(filmed.sample(**LASTING), resamples=100)
+    return measure_detector(filmed.sample(**LASTING), resamples=100)
 
 
 def mean(measurement, key, kinds=LIMB_KINDS):
@@ -266,7 +271,7 @@ class TestClasses:
         assert np.mean([found[f"share.miss.{kind}"] for kind in LIMB_KINDS]) == pytest.approx(0.2, abs=0.04)
 
     def test_a_perfect_detector_has_no_errors(self, filmed):
-        found = measure(part(filmed.sample(), 100), resamples=50)
+        found = measure_detector(part(filmed.sample(), 100), resamples=50)
         for kind in LIMB_KINDS:
             for key in ("swap", "inversion", "miss", "jitter"):
                 assert not found[f"share.{key}.{kind}"].value > 0  # NaN where sides are never distinguishable
@@ -363,7 +368,7 @@ def test_values_agree_within_the_interval_of_their_difference():
 
 
 def test_two_draws_of_one_detector_agree_and_two_detectors_do_not(filmed, dropping, erring):
-    again = measure(filmed.sample(seed=7, **DROPPING), resamples=100)
+    again = measure_detector(filmed.sample(seed=7, **DROPPING), resamples=100)
     different, compared = agreement(dropping, again)
     assert compared > 90
     # Of independent values 5 % would differ; many are correlated, so up to a seventh may.
@@ -413,7 +418,7 @@ def test_samples_without_people_or_detections_are_refused(filmed):
     sample = filmed.sample()
     unknown = replace(sample, reference=np.full(sample.reference.shape, np.nan))
     with pytest.raises(ValueError, match="expected people with known joints, got none in 200 frames"):
-        measure(unknown)
+        measure_detector(unknown)
     blind = replace(part(sample, 5), detections=tuple(Detections.empty() for _ in range(5)))
     with pytest.raises(ValueError, match="no detection is near any of the known people"):
-        measure(blind)
+        measure_detector(blind)

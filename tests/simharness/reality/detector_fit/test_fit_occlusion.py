@@ -1,11 +1,11 @@
 import numpy as np
 
 from simharness.detector.conditions import OUTSIDE, Conditions
-from simharness.reality.detector_fit import occlusion, sizes
+from simharness.reality.detector_fit import occlusion
 
 
 def test_boxes_match_those_of_silhouettes(filmed):
-    drawn, made = filmed.views.boxes, sizes.boxes(filmed.sequence.joints, filmed.rig)
+    drawn, made = filmed.views.boxes, occlusion.person_boxes(filmed.sequence.joints, filmed.rig)
     whole = (filmed.views.visibility != 4).all(axis=-1)
     assert whole.sum() > 2000
     ratio = np.sqrt(made[whole, 2:].prod(axis=-1) / drawn[whole, 2:].prod(axis=-1))
@@ -16,7 +16,7 @@ def test_boxes_match_those_of_silhouettes(filmed):
 def test_people_behind_the_camera_or_unknown_have_no_box(filmed):
     joints = filmed.sequence.joints[:2].copy()
     joints[0, 0] = np.nan
-    made = sizes.boxes(joints, filmed.rig)
+    made = occlusion.person_boxes(joints, filmed.rig)
     assert (made[0, :, 0] == 0).all()
     assert (made[1, :, 0, 2] > 0).any()
 

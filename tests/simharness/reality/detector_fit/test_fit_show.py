@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from simharness.reality.annotation_errors import AnnotationFit, AnnotationModel
-from simharness.reality.detector_fit.detector_measurement import MeasuredValue, measure
+from simharness.reality.detector_fit.detector_measurement import MeasuredValue, measure_detector
 from simharness.reality.detector_fit.fit_plot import plot_comparison
 from simharness.reality.detector_fit.fit_table import print_agreement, print_annotation, print_measurement
 from simharness.scenario.sections.detector_section import KINDS
@@ -16,7 +16,7 @@ from simharness.scenario.sections.detector_section import KINDS
 
 @pytest.fixture(scope="module")
 def measured(filmed):
-    return measure(filmed.sample(keypoints={"scatter": 0.3, "miss": 0.1}), resamples=50)
+    return measure_detector(filmed.sample(keypoints={"scatter": 0.3, "miss": 0.1}), resamples=50)
 
 
 def printed(show, *given):

@@ -9,7 +9,7 @@ from turning_people import joints_of, walkers
 from mvpose import Detections
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.reality.recording_file import read_recording
-from simharness.reality.validation.detection_figures import BONES, bone_variation, measure
+from simharness.reality.validation.detection_figures import BONES, bone_variation, measure_detections
 from simharness.reality.validation.passes import annotated
 from simharness.reality.validation.shown_people import shown_people
 
@@ -36,7 +36,7 @@ def test_exact_detections_triangulate_to_the_truth(exact):
 
 
 def test_exact_detections_have_nothing_missing(exact):
-    values = measure(exact).values()
+    values = measure_detections(exact).values()
     assert values["detected"] == 1.0
     assert values["phantoms"] == values["ears"] == values["affinity.same"] == 0.0
     assert all(values[key] == 0.0 for key in values if key.startswith("missing."))
@@ -52,7 +52,7 @@ def test_missing_children_of_missing_parents_are_counted(exact):
         scores[:, 14] = 0.0  # right knees, with their ankles
         scores[:, 16] = 0.0
 
-    values = measure(changed(exact, drop)).values()
+    values = measure_detections(changed(exact, drop)).values()
     assert values["tree.wrist|elbow"] == pytest.approx(1 / 4)
     assert values["tree.ankle|knee"] == 1.0
     assert values["missing.elbows"] == pytest.approx(1 / 2)
@@ -63,16 +63,16 @@ def test_ears_of_one_view_are_ears_in_fewer_than_two(exact):
     def hide(view, points, scores):
         scores[view > 0, 3] = 0.0  # left ears are reported by one view, right ears by all
 
-    assert measure(changed(exact, hide)).values()["ears"] == pytest.approx(1 / 2)
+    assert measure_detections(changed(exact, hide)).values()["ears"] == pytest.approx(1 / 2)
 
 
 def test_one_view_without_a_person_counts_as_not_detected(exact):
     frames = [replace(each, scores=np.where((each.view == 2)[:, None], 0.0, each.scores)) for each in exact.detections]
-    assert measure(replace(exact, detections=tuple(frames))).values()["detected"] == pytest.approx(3 / 4)
+    assert measure_detections(replace(exact, detections=tuple(frames))).values()["detected"] == pytest.approx(3 / 4)
 
 
 def test_people_at_one_place_are_ambiguous(exact):
-    apart = measure(exact).values()["affinity.different"]
+    apart = measure_detections(exact).values()["affinity.different"]
     joints = joints_of(10, 2)
     joints[:, 1] = joints[:, 0] + [0.05, 0.05, 0.0]
     frames = []
@@ -82,14 +82,14 @@ def test_people_at_one_place_are_ambiguous(exact):
         frames.append(Detections.from_keypoints(view, pixels[view, person], np.full((len(view), 17), 0.9)))
     near = replace(exact, truth=coco17_to_shelf14(joints), detections=tuple(frames))
     assert apart < 0.05
-    assert measure(near).values()["affinity.different"] == 1.0
+    assert measure_detections(near).values()["affinity.different"] == 1.0
 
 
 def test_only_another_person_hides_joints():
     shown = shown_people(walkers(frames=4, people=2, cameras=4))
     assert shown.behind.any()
     assert not (shown.behind & ~shown.inside).any()
-    assert measure(walkers(frames=4, people=1, cameras=4)).values()["behind"] == 0.0
+    assert measure_detections(walkers(frames=4, people=1, cameras=4)).values()["behind"] == 0.0
 
 
 class TestBones:
@@ -115,7 +115,7 @@ class TestBones:
 
 def test_shelf_has_the_measured_facts(shared_data):
     """Shelf's detections: bottom-up tree, ears, bones and ambiguity, as measured independently."""
-    values = measure(annotated(read_recording("shelf", shared_data / "shelf"))).values()
+    values = measure_detections(annotated(read_recording("shelf", shared_data / "shelf"))).values()
     assert all(values[key] == 1.0 for key in values if key.startswith("tree."))
     bones = [values[f"bones.{bone}"] for bone in BONES]
     assert bones == pytest.approx([17, 14, 24, 9], abs=0.6)

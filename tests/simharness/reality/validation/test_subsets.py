@@ -10,7 +10,7 @@ from turning_people import walkers
 
 from simharness.reality.validation.evidence import Evidence
 from simharness.reality.validation.frame_scores import RULES
-from simharness.reality.validation.passes import Cameras, Unchanged, annotated, run_passes
+from simharness.reality.validation.passes import CameraSubset, Unchanged, annotated, run_passes
 from simharness.reality.validation.subsets import camera_subsets, compare_subsets, subset_curve
 
 
@@ -31,7 +31,7 @@ def test_subsets_of_many_cameras_are_sampled():
 
 @pytest.fixture(scope="module")
 def passes():
-    changes = [Unchanged(), *map(Cameras, camera_subsets(4))]
+    changes = [Unchanged(), *map(CameraSubset, camera_subsets(4))]
     recordings = [walkers(frames=4), walkers(frames=4, noise=25.0, seed=1), walkers(frames=4, noise=25.0, seed=2)]
     return recordings, run_passes(recordings, changes, variants=("full", "fast"))
 
@@ -48,13 +48,15 @@ def test_the_curve_is_the_mean_over_subsets(passes):
     sums = {change: {name: each.total() for name, each in of.items()} for change, of in passes[1][1].items()}
     curve = subset_curve(sums, "fast", rule=RULES[1])
     for count in (2, 3, 4):
-        expected = [sums[Cameras(views)]["fast"].pcp(RULES[1]) for views in itertools.combinations(range(4), count)]
+        expected = [
+            sums[CameraSubset(views)]["fast"].pcp(RULES[1]) for views in itertools.combinations(range(4), count)
+        ]
         assert curve[count] == pytest.approx(np.mean(expected))
     assert curve[2] < 100.0
 
 
 def test_the_result_does_not_depend_on_the_workers():
-    recordings, changes = [walkers(frames=3, noise=4.0)], [Unchanged(), *map(Cameras, camera_subsets(3))]
+    recordings, changes = [walkers(frames=3, noise=4.0)], [Unchanged(), *map(CameraSubset, camera_subsets(3))]
     alone, shared = (run_passes(recordings, changes, variants=("fast",), workers=workers)[0] for workers in (1, 2))
     assert list(alone) == list(shared)
     for change in alone:

@@ -17,13 +17,13 @@ from simharness.reality.validation import unseen_prediction
 from simharness.reality.validation import validation as validation_module
 from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.unseen_prediction import halves
-from simharness.reality.validation.validation import Plan, validate
+from simharness.reality.validation.validation import ValidationPlan, validate
 from simharness.reality.validation.validation_summary import summarize_validation
-from simharness.reality.validation.verdicts import State
+from simharness.reality.validation.verdicts import VerdictState
 from simharness.scenario.toml_files import dumps_keys
 from simharness.trial.provenance import provenance
 
-PLAN = Plan(twin_every=1, draws=2, detection_draws=1, variants=("full", "fast"))
+PLAN = ValidationPlan(twin_every=1, draws=2, detection_draws=1, variants=("full", "fast"))
 TWINS = 2
 
 
@@ -71,7 +71,7 @@ def test_a_recording_is_its_own_twin(recorded):
     own = validate(recorded, [recorded, recorded], plan=PLAN)
     apart = [each for each in own.verdicts if np.isfinite(each.real) and each.difference != pytest.approx(0, abs=1e-9)]
     assert [each.name for each in apart if each.group != "subsets"] == []
-    assert {each.state for each in own.verdicts} == {State.HOLDS}
+    assert {each.state for each in own.verdicts} == {VerdictState.HOLDS}
     assert own.joints.rank_correlation == pytest.approx(1.0)
 
 

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from simharness.reality.validation.evidence import Compared, compared
-from simharness.reality.validation.rank_correlation import rank_correlation
+from simharness.reality.validation.evidence import Compared, compared, rank_correlation
 from simharness.reality.validation.verdicts import (
     BOUNDS,
-    State,
+    VerdictState,
     at_least,
     average,
     near,
@@ -19,7 +18,7 @@ from simharness.reality.validation.verdicts import (
 )
 from simharness.statistics.intervals import Interval
 
-HOLDS, UNCLEAR, FAILS = State.HOLDS, State.UNCLEAR, State.FAILS
+HOLDS, UNCLEAR, FAILS = VerdictState.HOLDS, VerdictState.UNCLEAR, VerdictState.FAILS
 
 
 def figure(real, twin, *, real_width=0.0, twin_width=0.0):

@@ -18,8 +18,16 @@ from simharness.scenario.load import load
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scoring.catalogue import SCORES
 from simharness.scoring.failure_classes import FailureKind, find_failures
-from simharness.scoring.stage_blame import FAILURE_SCHEMA, Stage, blame, failure_scores, failure_table
-from simharness.scoring.substitution import perfect_detections, true_labels, with_labels
+from simharness.scoring.stage_blame import (
+    FAILURE_SCHEMA,
+    Stage,
+    blame,
+    failure_scores,
+    failure_table,
+    perfect_detections,
+    true_labels,
+    with_labels,
+)
 
 RIG = ring(4)
 PEOPLE = crowd(3, spacing=1.2)

@@ -8,8 +8,8 @@ from trackeval_oracle import random_case
 
 from mvpose import COCO17, SHELF14
 from simharness.scoring.tracking.clear_mot import ABSENT, MISSED, clear_mot
-from simharness.scoring.tracking.figures import COUNTS, SHARES, identity_figures
 from simharness.scoring.tracking.hota import hota
+from simharness.scoring.tracking.identity_figures import COUNTS, SHARES, identity_figures
 from simharness.scoring.tracking.identity_scores import identity_scores
 from simharness.scoring.tracking.tracked_frames import roots, tracked_frames
 

@@ -1,0 +1,173 @@
+"""Scores of identities over time: the columns of tables at 0.5 m on the mean joint, and the entry ``tracking`` of
+``summary.json`` at every distance and place. A figure that does not apply is None.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mvpose import COCO17, SHELF14, Estimate
+from mvpose.arrays import Floats
+from mvpose.skeleton import HeadMapping, coco17_to_shelf14
+from simharness.scoring.pairing import pair
+from simharness.scoring.score_registry import ScoreInfo, ScoreInput, scores
+from simharness.scoring.tracking.clear_mot import clear_mot
+from simharness.scoring.tracking.hota import hota
+from simharness.scoring.tracking.identity_scores import identity_scores
+from simharness.scoring.tracking.motion_scores import rms_jerk, velocity_error
+from simharness.scoring.tracking.tracked_frames import DISTANCES, PLACES, TrackedFrames, ids_of, tracked_frames
+from simharness.scoring.tracking.tracked_poses import pose_figures
+
+Figures = dict[str, float | None]
+Summary = dict[str, Any]
+
+DISTANCE = 0.5
+"""Distance of the columns, metres: also the largest one at which people and estimates are paired for other scores."""
+
+SHARES = ("hota", "deta", "assa", "loca", "idf1", "idp", "idr", "mota")
+COUNTS = ("id_switches", "fragmentations", "interruptions", "switches_per_minute")
+
+OF_SOME_PEOPLE = ("idr", "id_switches", "interruptions", "switches_per_minute")
+"""Figures that hold where some people are annotated, in some frames: all others count the estimates of the rest as
+false, or the other frames as gaps."""
+
+_SHARES = {
+    "hota": ("HOTA", "people found and kept under one identity, mean over 19 thresholds"),
+    "deta": ("DetA", "part of HOTA: people found; ghosts and missed people lower it"),
+    "assa": ("AssA", "part of HOTA: agreement of tracks with people over the whole time"),
+    "loca": ("LocA", "part of HOTA: similarity of pairs, 100 at no distance, 50 at 0.5 m"),
+    "idf1": ("IDF1", "harmonic mean of IDP and IDR"),
+    "idp": ("IDP", "estimates within 0.5 m of the person that their identity stands for"),
+    "idr": ("IDR", "people with the estimate of their identity within 0.5 m"),
+    "mota": ("MOTA", "100 less missed people, ghosts and switches per true person"),
+    "pcp_tracked": ("PCP tracked", "PCP where estimates under another identity are missed"),
+}
+_ERRORS = (
+    ScoreInfo("mpjpe_tracked_mm", "MPJPE tracked", "mm", "MPJPE of people found under their identity", "lower", 1),
+    ScoreInfo("id_switches", "Switches", "", "changes of identity of people in the whole recording", "lower", 0),
+    ScoreInfo("switches_per_minute", "Switch rate", "/min", "changes of identity per minute and person", "lower", 2),
+    ScoreInfo("fragmentations", "Fragmentations", "", "people found again after frames without them", "lower", 0),
+)
+_IDENTITIES = (*(ScoreInfo(key, title, "%", about, "higher", 1) for key, (title, about) in _SHARES.items()), *_ERRORS)
+
+IDENTITY_SCORES = tuple(info.key for info in _IDENTITIES)
+"""Keys of the scores that only variants with identities have."""
+
+
+@scores(*_IDENTITIES)
+def identity_columns(given: ScoreInput) -> Mapping[str, float | None]:
+    """Return the scores of identities; all None without identities."""
+    ids = ids_of(given.estimates)
+    if ids is None:
+        return dict.fromkeys(IDENTITY_SCORES)
+    joints = [estimate.joints for estimate in given.estimates]
+    frames = tracked_frames(given.truth, joints, ids, skeleton=COCO17)
+    figures = identity_figures(frames, given.recording.time, distance=DISTANCE)
+    percents = {key: 100.0 * share for key in SHARES if (share := figures[key]) is not None}
+    return figures | percents | pose_figures(frames, given.truth, joints, distance=DISTANCE)
+
+
+def identity_figures(frames: TrackedFrames, time: Floats, *, distance: float) -> Figures:
+    """Return HOTA, DetA, AssA, LocA, IDF1, IDP, IDR and MOTA as shares, and numbers of switches and gaps.
+
+    All are None without true people; IDP without estimates, LocA without pairs, switches a minute with one frame alone.
+
+    Args:
+        frames: people and identities.
+        time: times of the frames, (T,), seconds.
+        distance: distance at which the similarity is 0.5, and largest distance of a pair, metres.
+    """
+    people = int(frames.frames_of_people.sum())
+    if not people:
+        return dict.fromkeys((*SHARES, *COUNTS))
+    higher = hota(frames, distance=distance)
+    names = identity_scores(frames, distance=distance)
+    pairs = clear_mot(frames, distance=distance)
+    minutes = people * float(np.median(np.diff(time))) / 60.0 if len(time) > 1 else 0.0
+    return {
+        "hota": float(higher.hota.mean()),
+        "deta": float(higher.detection.mean()),
+        "assa": float(higher.association.mean()),
+        "loca": float(higher.location.mean()) if higher.pairs.any() else None,
+        "idf1": names.f1,
+        "idp": names.precision if frames.frames_of_tracks.any() else None,
+        "idr": names.recall,
+        "mota": pairs.mota,
+        "id_switches": float(pairs.switches),
+        "fragmentations": float(pairs.fragmentations),
+        "interruptions": float(pairs.interruptions),
+        "switches_per_minute": pairs.switches / minutes if minutes else None,
+    }
+
+
+def tracking_summary(truth: Floats, estimates: Sequence[Estimate], time: Floats) -> Summary:
+    """Return the scores over time of a variant, where all people are known.
+
+    Args:
+        truth: true joints on COCO-17, (T, P, 17, 3), metres; NaN where undefined.
+        estimates: estimates, T.
+        time: times of the frames, (T,), seconds.
+
+    Returns:
+        ``mean_joint`` and ``root``, each with the figures of
+        :func:`simharness.scoring.tracking.identity_figures.identity_figures` by distance ("0.25", "0.5", "1" metres);
+        ``pcp_tracked`` (percent) and ``mpjpe_tracked_mm``; ``velocity_mm_s``; ``jerk_m_s3``, the RMS jerk of the
+        ``estimate`` and of the ``truth``. Those of identities are None without identities.
+    """
+    joints = [estimate.joints for estimate in estimates]
+    ids = ids_of(estimates)
+    found: Summary = dict.fromkeys((*PLACES, "pcp_tracked", "mpjpe_tracked_mm"))
+    if ids is not None:
+        for place in PLACES:
+            frames = tracked_frames(truth, joints, ids, skeleton=COCO17, place=place)
+            found[place] = {f"{each:g}": identity_figures(frames, time, distance=each) for each in DISTANCES}
+        frames = tracked_frames(truth, joints, ids, skeleton=COCO17)
+        found |= pose_figures(frames, truth, joints, distance=DISTANCE)
+    paired = np.full(truth.shape, np.nan)
+    for row, true, estimated in zip(paired, truth, joints, strict=True):
+        partner = pair(true, estimated).estimate
+        row[partner >= 0] = estimated[partner[partner >= 0]]
+    velocity, jerk = velocity_error(truth, paired, time), rms_jerk(truth, paired, time)
+    return found | {
+        "velocity_mm_s": None if velocity is None else 1000.0 * velocity,
+        "jerk_m_s3": dict(zip(("estimate", "truth"), jerk or (None, None), strict=True)),
+    }
+
+
+def tracking_of_some(
+    truth: Floats,
+    estimates: Sequence[Estimate],
+    time: Floats,
+    *,
+    head: HeadMapping = "voxelpose",
+    actors: Sequence[int] | None = None,
+) -> Summary | None:
+    """Return the scores of identities where only some of the people there are annotated; None without identities.
+
+    The estimates of the others count against no score.
+
+    Args:
+        truth: annotated joints on SHELF14, (T, P, 14, 3), metres; NaN where a person is not annotated.
+        estimates: estimates on COCO-17, T.
+        time: times of the frames, (T,), seconds.
+        head: mapping to the head of SHELF14.
+        actors: indices of the people whose PCP is averaged; None: all.
+
+    Returns:
+        ``mean_joint`` and ``root``, each with IDR, switches, interruptions and switches a minute by distance;
+        ``pcp_tracked`` (percent) and ``mpjpe_tracked_mm``.
+    """
+    ids = ids_of(estimates)
+    if ids is None:
+        return None
+    joints = [coco17_to_shelf14(estimate.joints, head=head) for estimate in estimates]
+    found: Summary = {}
+    for place in PLACES:
+        frames = tracked_frames(truth, joints, ids, skeleton=SHELF14, place=place)
+        figures = {f"{each:g}": identity_figures(frames, time, distance=each) for each in DISTANCES}
+        found[place] = {key: {name: each[name] for name in OF_SOME_PEOPLE} for key, each in figures.items()}
+    frames = tracked_frames(truth, joints, ids, skeleton=SHELF14)
+    return found | pose_figures(frames, truth, joints, distance=DISTANCE, actors=actors)
