@@ -14,6 +14,7 @@ from simharness.reality.validation.evidence import Compared, Evidence, compared,
 from simharness.reality.validation.frame_scores import RULES, FrameScores, HeadRule
 from simharness.reality.validation.passes import (
     VARIANTS,
+    CameraSubset,
     RecordingChange,
     Tallies,
     Unchanged,
@@ -21,7 +22,7 @@ from simharness.reality.validation.passes import (
     run_passes,
     score_recordings,
 )
-from simharness.reality.validation.subsets import Cameras, SubsetComparison, camera_subsets, compare_subsets
+from simharness.reality.validation.subsets import SubsetComparison, camera_subsets, compare_subsets
 from simharness.reality.validation.tally import Tally
 from simharness.reality.validation.treatments import treatments
 from simharness.reality.validation.variant_comparison import (
@@ -152,7 +153,7 @@ def validate(
         for each in (real, *whole):
             measurements.append(measure_detections(each))
             advance(1)
-    changes: list[RecordingChange] = [Unchanged(), *map(Cameras, camera_subsets(len(real.rig)))]
+    changes: list[RecordingChange] = [Unchanged(), *map(CameraSubset, camera_subsets(len(real.rig)))]
     changes += treatments(draws=plan.draws, detection_draws=plan.detection_draws) if plan.treated else ()
     with reporter.stage("subsets and treatments", len(changes) * (1 + len(thinned))) as advance:
         passes = run_passes([real, *thinned], changes, variants=plan.variants, workers=plan.workers, progress=advance)
