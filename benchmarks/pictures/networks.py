@@ -17,7 +17,7 @@ from onnx import TensorProto, checker, helper, numpy_helper, save
 from benchmarks.pictures.painted_bodies import PEOPLE, SEGMENTS, SHADES
 from mvpose import COCO17
 from mvpose.networks import Card
-from simharness.world.humans.segments import Segment
+from simharness.world.humans.anatomy import Segment
 
 CARD = Card(mean=(0.0, 0.0, 0.0), std=(1 / 255,) * 3)
 """Networks take colours of 0 to 255."""

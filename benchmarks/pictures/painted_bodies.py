@@ -14,7 +14,7 @@ from simharness.outputs.benchmark.cameras import hd_names
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import picture_source_of
-from simharness.world.humans.segments import Segment
+from simharness.world.humans.anatomy import Segment
 from simharness.world.scene.playback import Playback
 
 PEOPLE = 6

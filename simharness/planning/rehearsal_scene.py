@@ -19,7 +19,7 @@ from simharness.reality.validation.frame_scores import RULES, HeadRule
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import Scenario
-from simharness.world.humans.wearing import take_off
+from simharness.world.humans.accessories import take_off
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.scene.build import Scene, build, compile_model
 from simharness.world.scene.objects.geoms import Box

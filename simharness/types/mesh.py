@@ -27,7 +27,7 @@ class Mesh:
         uv: texture coordinates of the three corners of each face, (k, 3, 2) float32: u to the right and v down, the
             whole texture from 0 to 1; outside this range it repeats. Required with a texture, forbidden without.
         parts: label of each face, -1 for none, (k,) int8; for a body the
-            :class:`simharness.world.humans.segments.Segment`. None if no face has a label.
+            :class:`simharness.world.humans.anatomy.Segment`. None if no face has a label.
         still: whether the mesh stays where it is as long as the scene lasts: renderers draw it once for each camera
             that stays too.
         emission: radiance that the surface sends out, linear RGB, multiplied by ``colors`` and ``texture``: what a

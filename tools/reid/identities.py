@@ -13,12 +13,12 @@ from typing import Literal
 
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
+from simharness.world.humans.accessories import wear
 from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.clothing import dress
 from simharness.world.humans.figure import figure_mesh
 from simharness.world.humans.population import draw_shape, is_child
 from simharness.world.humans.wardrobe import Look, draw_looks
-from simharness.world.humans.wearing import wear
 
 Split = Literal["training", "validation", "held-out"]
 

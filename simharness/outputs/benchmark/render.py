@@ -46,7 +46,7 @@ class RenderPlan:
         overlay: layers drawn into the pictures, of ``LAYERS``.
         channels: images written beside every picture as PNG, of ``CHANNELS``. depth: 16 bits, millimetres, 0 for no
             surface. ids: 8 bits, person + 1, 255 for objects and the room, 0 for none. parts: 8 bits,
-            :class:`simharness.world.humans.segments.Segment` + 1, 0 where there is no body.
+            :class:`simharness.world.humans.anatomy.Segment` + 1, 0 where there is no body.
         every: step between rendered frames.
         finer: samples per pixel along each axis.
 

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.arrays import Floats, Integers
 from mvpose.skeleton import COCO17, Skeleton
 from simharness.types.landmarks import LANDMARKS, of_skeleton
-from simharness.world.humans import segments
+from simharness.world.humans.anatomy import segments_of_faces
 from simharness.world.humans.limb_lengths import LIMBS, limb_stretches, stretch_vertices
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.skinning import Skirt, enclosed, mix, skin
@@ -33,7 +33,7 @@ class FacePart(IntEnum):
     """Body part that a face of the mesh shows.
 
     Torso, arms, legs, shoes and soles are faces of a suit, which also have a level (see :class:`Body`). The parts
-    from ``GLASSES`` are accessories (:mod:`simharness.world.humans.accessories`), whose faces come last.
+    from ``GLASSES`` are accessories (:mod:`simharness.world.humans.wardrobe`), whose faces come last.
     """
 
     SKIN = 0
@@ -290,8 +290,8 @@ class Body:
 
     @cached_property
     def segments(self) -> NDArray[np.int8]:
-        """Body segment of every face, (k,) :class:`~simharness.world.humans.segments.Segment`."""
-        return segments.of_faces(self.faces, self.weight_bones, self.weights, bones=self.bones)
+        """Body segment of every face, (k,) :class:`~simharness.world.humans.anatomy.Segment`."""
+        return segments_of_faces(self.faces, self.weight_bones, self.weights, bones=self.bones)
 
     @property
     def joint_radii(self) -> Floats:

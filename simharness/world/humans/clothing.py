@@ -11,14 +11,12 @@ from scipy import sparse
 
 from mvpose.arrays import Floats
 from simharness.world.humans import cloth_texture
+from simharness.world.humans.accessories import accessory_colors
 from simharness.world.humans.added_mesh import AddedMesh, add_mesh
 from simharness.world.humans.body import Body, FacePart
-from simharness.world.humans.expressions import express
-from simharness.world.humans.grooming import groom
-from simharness.world.humans.hair_styles import bob, curls, ponytail
-from simharness.world.humans.skirts_and_hair import bun, long_hair, skirt
+from simharness.world.humans.face_colors import express, groom
+from simharness.world.humans.skirts_and_hair import bob, bun, curls, long_hair, ponytail, skirt
 from simharness.world.humans.wardrobe import HEMS, LEGS, SLEEVES, Color, Look, mix
-from simharness.world.humans.wearing import accessory_colors
 
 
 class Garment(IntEnum):
@@ -59,7 +57,7 @@ class SurfaceColors:
 
 def paint(body: Body, look: Look) -> SurfaceColors:
     """Return the colours and texture of a look on a body, before or after :func:`dress` and
-    :func:`~simharness.world.humans.wearing.wear`.
+    :func:`~simharness.world.humans.accessories.wear`.
     """
     colors, texture = face_colors(body, look), cloth_texture.texture_image(look)
     if texture is None:

@@ -15,7 +15,7 @@ from simharness.types.finish import Finish, Material
 from simharness.types.mesh import Mesh
 from simharness.world.humans.body import Body, FacePart, body_model
 from simharness.world.humans.clothing import Garment, garments, paint
-from simharness.world.humans.grooming import places_of_head
+from simharness.world.humans.face_colors import places_of_head
 from simharness.world.humans.wardrobe import Look
 
 _OF_PART = {

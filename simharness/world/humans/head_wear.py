@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
-from simharness.world.humans.added_mesh import AddedMesh, grid, hull, hull_reach, rigid
+from simharness.world.humans.added_mesh import AddedMesh, FacePoints, grid, hull, hull_reach, rigid
 from simharness.world.humans.body import Body, FacePart
-from simharness.world.humans.face_points import FacePoints
 
 Sheet = tuple[Floats, NDArray[np.int32]]
 

@@ -11,13 +11,13 @@ from functools import cached_property, lru_cache
 
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
+from simharness.world.humans.accessories import plain, wear
 from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.clothing import dress
 from simharness.world.humans.figure import figure_mesh
 from simharness.world.humans.population import draw_shape, is_child
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import Look
-from simharness.world.humans.wearing import plain, wear
 from simharness.world.motion.poses.kinematics import Kinematics
 
 _KEPT = 24  # people, about 5 MB each: those of a scene and of the next ones
@@ -30,7 +30,7 @@ class Person:
     Attributes:
         look: clothes, hair and accessories.
         body: dressed body with accessories.
-        mover: kinematics of the body of the plain look (:func:`~simharness.world.humans.wearing.plain`). Poses are
+        mover: kinematics of the body of the plain look (:func:`~simharness.world.humans.accessories.plain`). Poses are
             computed in its MuJoCo data, so threads must not share it.
     """
 

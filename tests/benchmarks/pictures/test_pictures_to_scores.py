@@ -12,7 +12,7 @@ from benchmarks.pictures.painted_bodies import SEGMENTS, SHADES
 from mvpose import COCO17
 from mvpose.cli.app import app as mvpose
 from simharness.cli import app as simharness
-from simharness.world.humans.segments import Segment
+from simharness.world.humans.anatomy import Segment
 
 SMALL = ["people.count=2", "duration=0.4", "cameras.count=3", "cameras.size=[640,480]", "clutter.shelves=0"]
 

@@ -15,15 +15,14 @@ from simharness.capture.rendering.raster import RasterRenderer
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.types.views import Visibility
-from simharness.world.humans.accessories import BAGS, GLASSES, HATS
+from simharness.world.humans.accessories import take_off, wear
+from simharness.world.humans.anatomy import Segment
 from simharness.world.humans.body import FacePart, make_body
 from simharness.world.humans.clothing import dress, face_colors
 from simharness.world.humans.mujoco_model import neutral_transforms
 from simharness.world.humans.population import draw_sex, draw_shape
-from simharness.world.humans.segments import Segment
 from simharness.world.humans.shape import Shape
-from simharness.world.humans.wardrobe import HAIR_STYLES, draw_look, draw_looks
-from simharness.world.humans.wearing import take_off, wear
+from simharness.world.humans.wardrobe import BAGS, GLASSES, HAIR_STYLES, HATS, draw_look, draw_looks
 from simharness.world.scene.people import make_person
 
 BARE = {"hat": "none", "bag": "none", "glasses": "none", "mask": "none", "hair_style": "short", "bald": 0.0}

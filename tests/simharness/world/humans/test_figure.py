@@ -12,7 +12,7 @@ from simharness.capture.rendering.figure_kernels import grain_of
 from simharness.types.finish import Material
 from simharness.world.humans.body import FacePart, make_body
 from simharness.world.humans.clothing import Garment, dress, face_colors, garments
-from simharness.world.humans.expressions import EXPRESSIONS
+from simharness.world.humans.face_colors import EXPRESSIONS
 from simharness.world.humans.figure import figure_mesh, materials_of
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import draw_looks

@@ -4,9 +4,16 @@ import numpy as np
 import pytest
 
 from simharness.types.random_streams import stream
-from simharness.world.humans.anthropometry import ADULTS, child_mass_index, child_stature
 from simharness.world.humans.body import make_body
-from simharness.world.humans.population import draw_shape, fit_shape, is_child, measures
+from simharness.world.humans.population import (
+    ADULTS,
+    child_mass_index,
+    child_stature,
+    draw_shape,
+    fit_shape,
+    is_child,
+    measures,
+)
 from simharness.world.humans.shape import LIMITS, Shape
 
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from simharness.world.humans.anatomy import Segment, segments_of_bones, segments_of_faces
 from simharness.world.humans.body import FacePart, make_body
 from simharness.world.humans.clothing import dress
-from simharness.world.humans.segments import Segment, of_bones, of_faces
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import draw_looks
 
@@ -64,7 +64,12 @@ def test_a_face_belongs_to_the_segment_with_the_larger_weight():
     faces, bones = [[0, 1, 2], [1, 2, 3]], ("Hips", "LeftArm", "LeftArmTwist", "Nothing")
     weight_bones = np.array([[1, 0], [1, 0], [0, 2], [0, 3]])
     weights = np.array([[0.9, 0.1], [0.6, 0.4], [0.7, 0.3], [1.0, 0.0]])
-    assert of_bones(bones).tolist() == [Segment.TORSO, Segment.LEFT_UPPER_ARM, Segment.LEFT_UPPER_ARM, Segment.TORSO]
+    assert segments_of_bones(bones).tolist() == [
+        Segment.TORSO,
+        Segment.LEFT_UPPER_ARM,
+        Segment.LEFT_UPPER_ARM,
+        Segment.TORSO,
+    ]
     # First face: arm 0.9 + 0.6 + 0.3 against torso 1.2; second face: arm 0.6 + 0.3 against torso 2.1.
-    segments = of_faces(faces, weight_bones, weights, bones=bones)
+    segments = segments_of_faces(faces, weight_bones, weights, bones=bones)
     assert segments.tolist() == [Segment.LEFT_UPPER_ARM, Segment.TORSO]
