@@ -266,7 +266,7 @@ def test_the_digest_covers_all_modules_that_are_imported_for_rendering():
         "simharness/world/humans/data/anny.npz",
         "mvpose/networks/crops.py",
         "simharness/types/random_streams.py",
-        "simharness/world/scene/rooms/lights_of_kinds.py",
+        "simharness/world/scene/rooms/lamps.py",
         "sensors/webcam.toml",
     } <= names
     # Crops depend neither on cards and networks nor on the training.

@@ -16,12 +16,11 @@ from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.placement.free_space import FreeSpace
 from simharness.world.scene.placement.furniture import place_furniture
-from simharness.world.scene.rooms.interior import make_interior
 from simharness.world.scene.rooms.kinds import settled
-from simharness.world.scene.rooms.lighting import room_lighting
-from simharness.world.scene.rooms.lights_of_kinds import lights_of
-from simharness.world.scene.rooms.openings import draw_openings
-from simharness.world.scene.rooms.walls import walls_of
+from simharness.world.scene.rooms.lamps import area_lights
+from simharness.world.scene.rooms.openings import draw_openings, room_walls
+from simharness.world.scene.rooms.room_lighting import room_lighting
+from simharness.world.scene.rooms.shell import make_interior
 
 REACH = 1.5
 """Half the side of the square in which people stand, metres."""
@@ -74,10 +73,10 @@ def furnish(rng: np.random.Generator, room: RoomSection, seed: int, cameras: Seq
     paint = rng.uniform(0.4, 1.0, (2, 3)).astype(np.float32)
     room = settled(room, seed)
     openings, rig = draw_openings(room, seed), Rig(cameras)
-    areas = lights_of(room, seed, openings) if room.walls and not is_bare else ()
+    areas = area_lights(room, seed, openings) if room.walls and not is_bare else ()
     furniture = place_furniture(seed, _free_space(room, rig), openings)
     solids = make_interior(room, seed, rig, openings=openings, areas=areas, objects=furniture)
-    tints = {"floor": paint[0], "ground": paint[0]} | {wall.name: paint[1] for wall in walls_of(room)}
+    tints = {"floor": paint[0], "ground": paint[0]} | {wall.name: paint[1] for wall in room_walls(room)}
     tinted = [_tinted(solid, tints) if is_tinted else solid.mesh for solid in solids]
     return SiteRoom(
         room=room,

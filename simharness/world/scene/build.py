@@ -1,10 +1,15 @@
-"""Construction of a scene from a scenario: people, motions, room and objects in one MuJoCo model."""
+"""Construction of a scene from a scenario: people, motions, room and objects in one MuJoCo model.
+
+People before they move depend on their shape and look alone and take half of the time in which a scene is built. Scenes
+that differ in cameras, clutter, faults or detector have the same people, so a process keeps the people whom it made
+last.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import mujoco
 import numpy as np
@@ -15,9 +20,14 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
-from simharness.world.humans.body import Body
+from simharness.types.random_streams import stream
+from simharness.world.humans.accessories import plain, wear
+from simharness.world.humans.body import Body, make_body
+from simharness.world.humans.clothing import dress
+from simharness.world.humans.figure import figure_mesh
+from simharness.world.humans.population import draw_shape, is_child
 from simharness.world.humans.shape import Shape
-from simharness.world.humans.wardrobe import draw_looks
+from simharness.world.humans.wardrobe import Look, draw_looks
 from simharness.world.motion.choreography import choreograph
 from simharness.world.motion.mocap import load_tracks, recorded_shape
 from simharness.world.motion.motion import Motion
@@ -28,19 +38,39 @@ from simharness.world.scene.camera_clearance import check_rig
 from simharness.world.scene.dynamics.motion_servos import track
 from simharness.world.scene.objects.props import make_prop
 from simharness.world.scene.objects.solids import Solid
-from simharness.world.scene.people import make_person, shape_of_person
 from simharness.world.scene.placement.clutter import place_clutter
 from simharness.world.scene.placement.decoys import place_decoys
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, FreeSpace
 from simharness.world.scene.placement.furniture import place_furniture
-from simharness.world.scene.rooms.interior import make_interior
 from simharness.world.scene.rooms.kinds import check_size, settled
-from simharness.world.scene.rooms.lamps import has_ceiling
-from simharness.world.scene.rooms.lighting import room_lighting
-from simharness.world.scene.rooms.lights_of_kinds import lights_of
+from simharness.world.scene.rooms.lamps import area_lights, has_ceiling
 from simharness.world.scene.rooms.openings import draw_openings
+from simharness.world.scene.rooms.room_lighting import room_lighting
+from simharness.world.scene.rooms.shell import make_interior
 
 CLOCK_MARGIN = 1.0  # seconds of motion before and after the sequence: clock errors of cameras are smaller
+_KEPT = 24  # people, about 5 MB each: those of a scene and of the next ones
+
+
+@dataclass(frozen=True)
+class ScenePerson:
+    """One person in the rest pose. Several scenes may share it, so its arrays are never changed.
+
+    Attributes:
+        look: clothes, hair and accessories.
+        body: dressed body with accessories.
+        mover: kinematics of the body of the plain look (:func:`~simharness.world.humans.wearing.plain`). Poses are
+            computed in its MuJoCo data, so threads must not share it.
+    """
+
+    look: Look
+    body: Body
+    mover: Kinematics
+
+    @cached_property
+    def figure(self) -> Mesh:
+        """Visible mesh of body and clothing in the rest pose."""
+        return figure_mesh(self.body, self.look)
 
 
 @dataclass(frozen=True)
@@ -119,7 +149,7 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     )
     decoys = place_decoys(seed, scenario.decoys, space)
     openings = draw_openings(room, seed, props + decoys)
-    areas = lights_of(room, seed, openings) if has_ceiling(room, rig) else ()
+    areas = area_lights(room, seed, openings) if has_ceiling(room, rig) else ()
     furniture = place_furniture(seed, replace(space, taken=props + decoys), openings)
     clutter = place_clutter(seed, scenario.clutter, replace(space, taken=props + decoys + furniture))
     objects = (*furniture, *props, *decoys, *clutter)
@@ -167,3 +197,24 @@ def _check_area(scenario: Scenario) -> None:
             f"people.area = {scenario.people.area:g} m does not fit between the walls of room.size = "
             f"{list(scenario.room.size)}: use people.area of at most {largest:.2f} or a larger room.size"
         )
+
+
+@lru_cache(maxsize=_KEPT)
+def make_person(shape: Shape, look: Look) -> ScenePerson:
+    """Return the person of a shape and look, made once in a process."""
+    bare, simple = make_body(shape), plain(look)
+    moved = dress(bare, simple)
+    same = (look.hat, look.hair_style) == (simple.hat, simple.hair_style)
+    return ScenePerson(look, wear(moved if same else dress(bare, look), look), Kinematics(moved))
+
+
+@lru_cache(maxsize=_KEPT)
+def shape_of_person(seed: int, person: int, children: float) -> Shape:
+    """Return the shape of a person of a scene, drawn from the streams of that person.
+
+    Args:
+        seed: seed of the scene.
+        person: index of the person.
+        children: share of people who are children, 0 to 1.
+    """
+    return draw_shape(stream(seed, "people", person, "shape"), child=is_child(seed, person, children))

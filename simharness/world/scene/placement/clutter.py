@@ -1,4 +1,7 @@
-"""Clutter by kind and number: objects placed where they occlude people but do not obstruct their paths."""
+"""Clutter by kind and number: objects that occlude people but do not obstruct their paths, and carts that move.
+
+A cart oscillates on a line or circulates on an ellipse, always clear of people.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mvpose.arrays import Floats
 from simharness.scenario.sections.room_section import ClutterSection, RoomSection
 from simharness.types.random_streams import stream
-from simharness.world.scene.objects.fixtures import draw_partition, draw_pillar
+from simharness.world.motion.trajectory import Trajectory
+from simharness.world.scene.objects.fixtures import draw_cart, draw_partition, draw_pillar
 from simharness.world.scene.objects.furniture import draw_chair, draw_table
+from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.plants import draw_plant
 from simharness.world.scene.objects.solids import ObjectModel, Solid
 from simharness.world.scene.objects.storage import draw_box, draw_rack, draw_shelf
-from simharness.world.scene.placement.carts import place_cart
-from simharness.world.scene.placement.coverage import cover
 from simharness.world.scene.placement.free_space import (
+    BODY_HALF_WIDTH,
+    LIMB,
     TRIES,
     FreeSpace,
     PlaceSampler,
@@ -25,6 +31,16 @@ from simharness.world.scene.placement.free_space import (
     near_people,
     towards_walls,
 )
+from simharness.world.scene.placement.occlusion import cover
+
+_SPEED = (0.35, 0.7)  # m/s: largest speed on the path
+_LINE = (0.4, 2.5)  # metres from the middle of a line to its ends
+_MIN_RADIUS = 0.7  # metres
+_LINE_CHANCE = 0.6
+_BEARING_SPREAD = 0.2  # radians: standard deviation of the bearing of a path about that of a wall
+_PHASES = 24  # phases of one period at which clearance from objects is checked
+_COARSE = 6  # every sixth time step shows most encounters with people
+_LIMBS_REACH = 1.6  # metres: largest distance from a pelvis to a joint
 
 
 @dataclass(frozen=True)
@@ -95,3 +111,96 @@ def _place(seed: int, kind: ClutterKind, k: int, site: Site) -> Solid:
             "room.size"
         )
     return solid
+
+
+def place_cart(seed: int, k: int, site: Site) -> Solid:
+    """Draw cart k and a path for it.
+
+    At all times for which people are planned it keeps the same distance from them as objects at rest, and is clear of
+    objects, of the paths of other carts, of walls and of cameras.
+
+    Raises:
+        ValueError: no path is free.
+    """
+    cart = draw_cart(stream(seed, "clutter", "cart", k))
+    rng = stream(seed, "clutter", "cart", k, "way")
+    space = site.space
+    for _ in range(TRIES):
+        path = _draw_path(rng, space)
+        period = path.at(path.period * np.arange(_PHASES) / _PHASES)
+        if not all(site.clear(cart.extent.moved(pose[:2], _yaw(pose))) for pose in period):
+            continue
+        pose = path.at(space.time)
+        if not (_meets_people(cart.extent, pose, space, _COARSE) or _meets_people(cart.extent, pose, space, 1)):
+            return cart.along(Trajectory(space.time, pose), kind="clutter", name=f"cart{k}")
+    raise ValueError(
+        f"clutter.carts: found no free path for cart {k} in {TRIES} tries, clear of people, objects and cameras in "
+        f"room.size = {list(space.room.size)}: lower clutter.carts, people.area or people.count, or enlarge room.size"
+    )
+
+
+@dataclass(frozen=True)
+class _Path:
+    """Harmonic path: an ellipse, whose second radius is 0 for a line.
+
+    Attributes:
+        middle: centre, (2,), metres.
+        bearing: bearing of the first radius, radians.
+        radii: radii, (2,), metres.
+        period: period in seconds; negative for clockwise.
+        phase: phase at time 0, radians.
+    """
+
+    middle: Floats
+    bearing: float
+    radii: Floats
+    period: float
+    phase: float
+
+    def at(self, time: Floats) -> Floats:
+        """Return poses (n, 7) at times (n,); the cart keeps its orientation on a line and faces ahead on an ellipse."""
+        angle = 2 * np.pi * time / self.period + self.phase
+        c, s = np.cos(self.bearing), np.sin(self.bearing)
+        turn = np.array([[c, s], [-s, c]])
+        place = self.middle + np.column_stack([np.cos(angle), np.sin(angle)]) * self.radii @ turn
+        ahead = np.column_stack([-np.sin(angle), np.cos(angle)]) * self.radii @ turn * np.sign(self.period)
+        yaw = np.arctan2(ahead[:, 1], ahead[:, 0]) if self.radii[1] else np.full(len(time), self.bearing)
+        flat = np.zeros(len(time))
+        return np.column_stack([place, flat, np.cos(yaw / 2), flat, flat, np.sin(yaw / 2)])
+
+
+def _draw_path(rng: np.random.Generator, space: FreeSpace) -> _Path:
+    on_a_line, speed, sense = rng.uniform() < _LINE_CHANCE, rng.uniform(*_SPEED), rng.choice([-1.0, 1.0])
+    quarter, deviation, phase = rng.integers(4), rng.normal(0.0, _BEARING_SPREAD), rng.uniform(0, 2 * np.pi)
+    share, reach = rng.uniform(-1, 1, 2), rng.uniform(0, 1, 2)
+    bearing = float(quarter * np.pi / 2 + deviation)
+    if on_a_line:
+        radii = np.array([_LINE[0] + (_LINE[1] - _LINE[0]) * reach[0] ** 2, 0.0])
+        middle = share * space.half
+    else:
+        radii = _MIN_RADIUS + np.maximum(space.half - _MIN_RADIUS, 0) * reach
+        middle = share * np.maximum(space.half - radii, 0)
+    return _Path(middle, bearing, radii, float(sense * 2 * np.pi * radii.max() / speed), phase)
+
+
+def _meets_people(extent: Box, pose: Floats, space: FreeSpace, stride: int) -> bool:
+    """Return whether a person comes too close to an object on its path, checked at every ``stride``-th time."""
+    pose, pelvises = pose[::stride], space.pelvises[::stride]
+    apart = np.linalg.norm(pelvises[..., :2] - pose[:, None, :2], axis=-1)
+    n, p = np.nonzero(apart < np.hypot(*extent.half[:2]) + _LIMBS_REACH)
+    if _least_distance(extent, pose[n], pelvises[n, p][:, None]) < BODY_HALF_WIDTH:
+        return True
+    return _least_distance(extent, pose[n], space.joints[::stride][n, p]) < LIMB
+
+
+def _least_distance(extent: Box, pose: Floats, points: Floats) -> float:
+    """Return the least horizontal distance between an object in poses (n, 7) and points (n, J, 3), metres."""
+    yaw = np.arctan2(pose[:, 6], pose[:, 3]) * 2
+    c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
+    x, y = np.moveaxis(points[..., :2] - pose[:, None, :2], -1, 0)
+    local = np.stack([c * x + s * y, c * y - s * x, np.zeros_like(x)], axis=-1)
+    return float(extent.distance_on_floor(local).min(initial=np.inf))
+
+
+def _yaw(pose: Floats) -> float:
+    return float(2 * np.arctan2(pose[6], pose[3]))

@@ -12,12 +12,11 @@ from simharness.world.scene.objects.furnishing import Furnishing
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.materials import draw_sheet
 from simharness.world.scene.objects.solids import ObjectModel, Solid
-from simharness.world.scene.placement.coverage import lines_in
 from simharness.world.scene.placement.free_space import FreeSpace, Site
+from simharness.world.scene.placement.occlusion import lines_in
 from simharness.world.scene.placement.sight_lines import SightLines
 from simharness.world.scene.rooms.kinds import ROOM_KINDS
-from simharness.world.scene.rooms.openings import Opening
-from simharness.world.scene.rooms.walls import Wall, walls_of
+from simharness.world.scene.rooms.openings import Opening, Wall, room_walls
 
 _TRIES = 40  # places tried for one piece
 _WALLS = 28.0  # metres of walls for which the numbers of a kind are given
@@ -44,7 +43,7 @@ def place_furniture(seed: int, space: FreeSpace, openings: Sequence[Opening]) ->
     kind = ROOM_KINDS[space.room.kind]
     if not kind.furniture:
         return ()
-    site, sheet, walls = Site(space), draw_sheet(seed), walls_of(space.room)
+    site, sheet, walls = Site(space), draw_sheet(seed), room_walls(space.room)
     lines = _thinned(lines_in(space))
     area = Box((0.0, 0.0, 1.0), (space.area, space.area, 1.0)) if space.pelvises.size else None
     share = sum(wall.length for wall in walls) / _WALLS

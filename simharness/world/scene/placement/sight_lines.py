@@ -19,7 +19,7 @@ _COLUMNS, _ROWS = 20, 15  # grid of rays that samples a picture
 _FAR = 100.0  # metres: length of these rays
 
 
-def cuts(mesh: Mesh, starts: ArrayLike, ends: ArrayLike) -> Bools:
+def intersects(mesh: Mesh, starts: ArrayLike, ends: ArrayLike) -> Bools:
     """Return whether the lines from ``starts`` (n, 3) to ``ends`` (n, 3) intersect a mesh, (n,)."""
     starts, ends = np.ascontiguousarray(starts, float), np.ascontiguousarray(ends, float)
     result = np.zeros(len(starts), bool)
@@ -92,9 +92,9 @@ class SightLines:
     def cut_by(self, solid: Solid) -> Bools:
         """Return whether a solid, at its positions at their times, cuts the lines, (n,)."""
         if solid.trajectory is None:
-            return cuts(solid.mesh, self.starts, self.ends)
+            return intersects(solid.mesh, self.starts, self.ends)
         pose = solid.trajectory.at(self.time)
-        return cuts(solid.mesh, _into(pose, self.starts), _into(pose, self.ends))
+        return intersects(solid.mesh, _into(pose, self.starts), _into(pose, self.ends))
 
     def hidden(self, solids: Iterable[Solid]) -> Bools:
         """Return whether any of the solids cuts the lines, (n,)."""
@@ -143,7 +143,7 @@ class PictureFill:
         return bool((more.mean(axis=1) <= np.maximum(most, self.filled.mean(axis=1))).all())
 
     def _of(self, solid: Solid) -> Bools:
-        return np.reshape([cuts(solid.mesh, starts, ends) for starts, ends in self._rays], self.filled.shape)
+        return np.reshape([intersects(solid.mesh, starts, ends) for starts, ends in self._rays], self.filled.shape)
 
 
 def _grid(camera: Camera) -> tuple[Floats, Floats]:

@@ -19,9 +19,8 @@ from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.materials import draw_sheet
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.kinds import ROOM_KINDS
-from simharness.world.scene.rooms.lighting import mood_of
-from simharness.world.scene.rooms.openings import Opening
-from simharness.world.scene.rooms.walls import Wall, walls_of
+from simharness.world.scene.rooms.openings import Opening, Wall, room_walls
+from simharness.world.scene.rooms.room_lighting import room_mood
 
 REVEAL = 0.16  # metres: depth of the opening of a window, from the inner face of the wall to the glass
 DEEPEST = 0.09  # metres that a fitting may stand out from its wall
@@ -48,7 +47,7 @@ def make_fittings(
     sheet, rng = draw_sheet(seed), stream(seed, "room", "fittings")
     frame, leaf = _FRAMES[rng.integers(len(_FRAMES))], _LEAVES[rng.integers(len(_LEAVES))]
     made, frames = Furnishing(sheet), Furnishing(sheet)
-    for number, wall in enumerate(walls_of(room)):
+    for number, wall in enumerate(room_walls(room)):
         local, openings_here = Furnishing(sheet), Furnishing(sheet)  # x into the room, y along the wall, z up
         taken = _taken(wall, solids)
         for opening in openings:
@@ -67,7 +66,7 @@ def make_fittings(
             made.group(local, (*wall.left, 0.0), wall.yaw)
         if openings_here.parts:
             frames.group(openings_here, (*wall.left, 0.0), wall.yaw)
-    glow = _GLOW * np.array(mood_of(room, seed).window)
+    glow = _GLOW * np.array(room_mood(room, seed).window)
     meshes = {"fittings": made.mesh()} if made.parts else {}
     if frames.parts:
         meshes["window frames"] = replace(frames.mesh(), emission=(float(glow[0]), float(glow[1]), float(glow[2])))

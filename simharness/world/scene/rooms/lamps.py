@@ -1,75 +1,45 @@
-"""Windows and lamps of a room, as area lights, and the ceiling that the lamps hang from."""
+"""Lamps and windows of a room as area lights, what pictures show of them, and the ceiling."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from types import MappingProxyType
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simharness.scenario.sections.room_section import RoomSection
-from simharness.types.light_sources import AreaLight, Sun, Vector
+from simharness.types.light_sources import AreaLight, Vector
+from simharness.world.scene.objects.furnishing import Furnishing
 from simharness.world.scene.objects.geoms import Box
-from simharness.world.scene.objects.shapes import box_mesh, quad_mesh
+from simharness.world.scene.objects.materials import draw_sheet
+from simharness.world.scene.objects.shapes import quad_mesh
 from simharness.world.scene.objects.solids import Solid
-from simharness.world.scene.rooms.fixtures import fixture
+from simharness.world.scene.rooms.kinds import ROOM_KINDS, LampKind
+from simharness.world.scene.rooms.openings import Opening
+from simharness.world.scene.rooms.room_lighting import Mood, room_mood
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from mvpose.camera import Rig
+
 
 _CEILING = (0.93, 0.93, 0.92)  # sRGB of white paint
 _CELL = 1.0  # metres: cell size of the ceiling
 _BELOW_CEILING = 0.06  # metres: a camera that is nearer to the ceiling, or above it, films a room without one
-_PANEL = (0.3, 0.3)  # metres: half the sides of a lamp
-_PITCH = 3.4  # metres between lamps
-_MOST_LAMPS = 4  # along a side of the room
-_HANGS = 0.03  # metres from the ceiling to the front of a lamp
-_WINDOW = (1.5, 1.3)  # metres
-_SILL, _LINTEL = 0.95, 0.3
-_FRAME = 0.07  # metres: width of a window frame
-_OUT = 0.012  # metres that the glass of a window on a wall without a hole stands out
-
-
-@dataclass(frozen=True)
-class Mood:
-    """Strengths of the lights of a room, relative to each other.
-
-    Attributes:
-        window: radiance of the sky that windows show; zeros for none.
-        lamp: radiance of the lamps; zeros for lamps that are off.
-        sun: the sun, if it shines in.
-        brightness: see :class:`~simharness.types.light_sources.LightSources`.
-        every: every how many lamps one is on.
-    """
-
-    window: Vector
-    lamp: Vector
-    sun: Sun | None = None
-    brightness: float = 1.0
-    every: int = 1
-
-
-# Colours of light are those of black bodies and of daylight after the larger part of a camera's white balance: sky
-# 7500 K, sun 5200 K, lamps 4000 K and 2700 K. Radiances are relative: an overcast sky has 2000 to 6000 cd/m2, a ceiling
-# panel of an office 4000, a lamp in a living room half of it on a smaller part of the ceiling (EN 12464-1).
-MOODS: Mapping[str, Mood] = MappingProxyType(
-    {
-        "day": Mood(window=(5.2, 5.7, 6.3), lamp=(5.0, 4.9, 4.5), brightness=0.88),
-        "warm": Mood(window=(0.10, 0.14, 0.22), lamp=(7.0, 5.1, 3.1), brightness=0.78),
-        "side": Mood(
-            window=(5.4, 5.9, 6.6),
-            lamp=(0.0, 0.0, 0.0),
-            sun=Sun((0.80, 0.34, 0.50), (3.6, 3.35, 3.0)),
-            brightness=0.8,
-        ),
-        "dim": Mood(window=(0.06, 0.075, 0.11), lamp=(2.6, 2.3, 1.9), brightness=0.4, every=3),
-    }
-)
-"""Moods of the lightings of :data:`~simharness.world.scene.rooms.lighting.LIGHTS`, by their names."""
+_AHEAD = 0.004  # metres in front of the rectangle of the light
+# Metres from the wall to the area light of its window: behind it, so that it does not light the wall.
+_IN_PLANE = -0.002
+_LAMPS: dict[LampKind, tuple[tuple[float, float], float, float, float, float]] = {
+    "panels": ((0.30, 0.30), 2.6, 0.03, 1.0, 0.0),
+    "tubes": ((0.70, 0.09), 2.6, 0.12, 2.2, 0.0),
+    "downlights": ((0.10, 0.10), 1.7, 0.02, 4.0, 3.0),
+    "pendants": ((0.22, 0.22), 3.6, 0.55, 1.6, 0.0),
+    "spots": ((0.10, 0.10), 2.0, 0.30, 6.0, 8.0),
+}
+"""Half sides, pitch, distance from the ceiling (metres), strength relative to a panel, and focus of a lamp, by kind."""
+_MOST = 4  # lamps along a side of the room
+_DARK, _SHADE = np.array([0.14, 0.14, 0.15]), np.array([0.92, 0.90, 0.84])
 
 
 def has_ceiling(room: RoomSection, rig: Rig) -> bool:
@@ -89,64 +59,83 @@ def make_ceiling(room: RoomSection) -> Solid:
     return Solid("room", "ceiling", mesh, (), Box((0.0, 0.0, z), (x, y, 0.0)))
 
 
-def ceiling_lamps(room: RoomSection, mood: Mood) -> tuple[AreaLight, ...]:
-    """Return square panels in a grid below the ceiling."""
-    counts = [min(max(1, round(side / _PITCH)), _MOST_LAMPS) for side in room.size[:2]]
+def fixture(light: AreaLight, name: str) -> Solid:
+    """Return the glowing front of an area light, for pictures alone: no ray and no person touches it."""
+    corners = light.corners + _AHEAD * light.normal
+    mesh = quad_mesh(corners, np.array([[0, 1, 2, 3]]), np.ones((1, 3)))
+    return Solid("room", name, replace(mesh, emission=light.radiance), (), Box.around(corners))
+
+
+def area_lights(room: RoomSection, seed: int, openings: Sequence[Opening]) -> tuple[AreaLight, ...]:
+    """Return the lamps and windows of a room with a drawn kind and a ceiling; at least one lamp is on."""
+    mood = room_mood(room, seed)
+    windows = tuple(
+        _window_light(opening, mood) for opening in openings if opening.kind == "window" and any(mood.window)
+    )
+    lamps = _lamps(room, mood)
+    return (*lamps, *windows) or _lamps(room, replace(mood, lamp=(2.6, 2.5, 2.3)))
+
+
+def _window_light(opening: Opening, mood: Mood) -> AreaLight:
+    (a, b), (low, high) = opening.span, opening.heights
+    middle = opening.wall.at(((a + b) / 2, _IN_PLANE, (low + high) / 2))
+    along = np.append(opening.wall.along, 0.0) * (b - a) / 2  # right x up looks into the room
+    return AreaLight(_vector(middle), _vector(along), (0.0, 0.0, (high - low) / 2), mood.window, kind="window")
+
+
+def _lamps(room: RoomSection, mood: Mood) -> tuple[AreaLight, ...]:
+    kind = ROOM_KINDS[room.kind].lamps
+    if kind == "none" or not any(mood.lamp):
+        return ()
+    (dx, dy), pitch, down, strength, focus = _LAMPS[kind]
+    z = room.size[2] - min(down, 0.15 * room.size[2])
+    if room.size[0] < room.size[1]:
+        dx, dy = dy, dx
+    counts = [min(max(1, round(side / pitch)), _MOST) for side in room.size[:2]]
     places = [((np.arange(n) + 0.5) / n - 0.5) * side for n, side in zip(counts, room.size[:2], strict=True)]
-    z = room.size[2] - _HANGS
+    radiance = _vector(strength * np.array(mood.lamp))
     lamps = [
-        AreaLight((float(x), float(y), z), (0.0, _PANEL[1], 0.0), (_PANEL[0], 0.0, 0.0), mood.lamp)
+        AreaLight((float(x), float(y), z), (0.0, dy, 0.0), (dx, 0.0, 0.0), radiance, focus)
         for x in places[0]
         for y in places[1]
     ]
-    return tuple(lamps[mood.every // 2 :: mood.every]) if any(mood.lamp) else ()
+    return tuple(lamps[mood.every // 2 :: mood.every])
 
 
-def wall_windows(room: RoomSection, mood: Mood, towards: Sequence[float]) -> tuple[AreaLight, ...]:
-    """Return windows in a row in the wall that lies most in a direction (x, y); none where they do not fit."""
-    x, y, z = room.size
-    axis = 0 if abs(towards[0]) * y > abs(towards[1]) * x else 1
-    sign = 1.0 if towards[axis] >= 0 else -1.0
-    length, top = room.size[1 - axis], min(z - _LINTEL, _SILL + _WINDOW[1])
-    count = min(int((length - 0.8) // (_WINDOW[0] + 0.5)), 4)
-    if count < 1 or top - _SILL < 0.5 or not any(mood.window):
-        return ()
-    inward = np.zeros(3)
-    inward[axis] = -sign
-    along = np.cross([0.0, 0.0, 1.0], inward)
-    middle = -inward * (room.size[axis] / 2 - _OUT)
-    places = ((np.arange(count) + 0.5) / count - 0.5) * (length - 0.8)
-    return tuple(
-        AreaLight(
-            tuple((middle + place * along + [0, 0, (_SILL + top) / 2]).tolist()),
-            tuple((along * _WINDOW[0] / 2).tolist()),
-            (0.0, 0.0, (top - _SILL) / 2),
-            mood.window,
-            kind="window",
-        )
-        for place in places
-    )
+def shown_lamps(room: RoomSection, seed: int, areas: Sequence[AreaLight]) -> tuple[Solid, ...]:
+    """Return what pictures show of the lamps: glowing fronts, and their bodies."""
+    lamps = [area for area in areas if area.kind == "lamp"]
+    shown = [fixture(lamp, f"lamp{k}") for k, lamp in enumerate(lamps)]
+    bodies = Furnishing(draw_sheet(seed))
+    for lamp in lamps:
+        _lamp_body(bodies, ROOM_KINDS[room.kind].lamps, lamp, room.size[2])
+    if bodies.parts:
+        mesh = bodies.mesh()
+        shown.append(Solid("room", "lamp bodies", mesh, (), Box.around(mesh.vertices)))
+    return tuple(shown)
 
 
-def shown_lights(areas: Sequence[AreaLight]) -> tuple[Solid, ...]:
-    """Return what pictures show of lamps and windows: glowing rectangles, and the frames of windows."""
-    solids = [fixture(area, f"{area.kind}{k}") for k, area in enumerate(areas)]
-    bars = [bar for area in areas if area.kind == "window" for bar in _frame(area)]
-    if bars:
-        mesh = box_mesh(bars, np.full((len(bars), 3), 0.9))
-        solids.append(Solid("room", "window frames", mesh, (), Box.around(mesh.vertices)))
-    return tuple(solids)
+def _lamp_body(f: Furnishing, kind: LampKind, lamp: AreaLight, ceiling: float) -> None:
+    """Add the housing of a lamp above its glowing front."""
+    x, y, z = lamp.center
+    dx, dy, up = abs(lamp.up[0]), abs(lamp.right[1]), max(ceiling - z, 0.01)
+    if kind == "panels":
+        f.block((x - dx - 0.02, y - dy - 0.02, z), (x + dx + 0.02, y + dy + 0.02, ceiling), 0.95 * _SHADE)
+    elif kind == "tubes":
+        f.block((x - dx - 0.02, y - dy - 0.02, z), (x + dx + 0.02, y + dy + 0.02, z + 0.06), 0.95 * _SHADE)
+        for side in (-0.6, 0.6):
+            end = (x + side * dx, y + (side * dy if dy > dx else 0.0), 0.0)
+            f.bar((end[0], end[1], z + 0.06), (end[0], end[1], ceiling), 0.006, _DARK, sides=5)
+    elif kind == "downlights":
+        f.turned([(0.0, 0.0), (0.15, 0.0), (0.15, up), (0.0, up)], _SHADE, at=(x, y, z), sides=20)
+    elif kind == "pendants":
+        f.turned([(0.33, 0.0), (0.30, 0.12), (0.06, 0.24), (0.0, 0.25)], _SHADE, "fabric", at=(x, y, z), sides=22)
+        f.bar((x, y, z + 0.24), (x, y, ceiling), 0.006, _DARK, sides=5)
+    else:
+        f.turned([(0.15, -0.04), (0.15, 0.16), (0.08, 0.22), (0.0, 0.22)], _DARK, at=(x, y, z), sides=14)
+        f.bar((x, y, z + 0.2), (x, y, ceiling), 0.015, _DARK, sides=6)
 
 
-def _frame(window: AreaLight) -> list[Box]:
-    """Return the frame of a window, with a bar in its middle."""
-    center, right, up, out = (np.array(v) for v in (window.center, window.right, window.up, window.normal))
-    wide, high, yaw = float(np.linalg.norm(right)), float(np.linalg.norm(up)), float(np.arctan2(right[1], right[0]))
-    half = _FRAME / 2
-    pieces = [(-wide, 0.0, half, high), (wide, 0.0, half, high), (0.0, 0.0, half, high)]
-    pieces += [(0.0, -high, wide, half), (0.0, high, wide + half, half)]
-    bars = []
-    for across, rise, a, b in pieces:
-        x, y, z = (center + across * right / wide + rise * up / high + 0.01 * out).tolist()
-        bars.append(Box((x, y, z), (a, 0.022, b), yaw))
-    return bars
+def _vector(values: NDArray[np.float64]) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

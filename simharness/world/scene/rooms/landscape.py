@@ -19,8 +19,7 @@ from simharness.types.panorama import Panorama, directions
 from simharness.types.random_streams import stream
 from simharness.types.srgb import from_linear, to_linear
 from simharness.world.scene.rooms.noise import smooth_noise
-from simharness.world.scene.rooms.sky import clouds
-from simharness.world.scene.rooms.weather import Weather
+from simharness.world.scene.rooms.weather import Weather, clouds
 
 WHITE = 2.5
 """Radiance that white in the picture stands for."""

@@ -1,4 +1,4 @@
-"""Windows and doors: where they are in the walls, and their frames."""
+"""Walls of a room as frames, and the windows and doors in them."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from mvpose.arrays import Floats
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.kinds import ROOM_KINDS
-from simharness.world.scene.rooms.lighting import room_lighting
-from simharness.world.scene.rooms.walls import Wall, walls_of
+from simharness.world.scene.rooms.room_lighting import room_lighting
 
 _WINDOW = (1.1, 1.5)  # metres: least and largest width
 _APART = 0.45  # metres between windows
@@ -23,6 +24,54 @@ _LINTEL = 0.35  # metres of wall over a window
 _DOOR = (0.95, 2.05)  # metres: width and height
 _ON_WALL = 0.12  # metres: what is nearer to the wall hangs on it
 _FREE = 0.9  # metres of free floor in front of a door
+
+
+@dataclass(frozen=True)
+class Wall:
+    """Wall as seen from inside the room.
+
+    Attributes:
+        name: "wall +x" and so on, by the direction in which it lies.
+        left: foot of its left corner, (2,), metres.
+        along: unit vector from its left to its right corner, (2,).
+        length, height: metres.
+    """
+
+    name: str
+    left: tuple[float, float]
+    along: tuple[float, float]
+    length: float
+    height: float
+
+    @property
+    def inward(self) -> Floats:
+        """Unit vector into the room, (2,)."""
+        return np.array([self.along[1], -self.along[0]])
+
+    @property
+    def yaw(self) -> float:
+        """Yaw of an object whose front looks into the room, radians."""
+        return float(np.arctan2(self.inward[1], self.inward[0]))
+
+    def at(self, places: ArrayLike) -> Floats:
+        """Return points (..., 3) in the world, given along, into the room and up, metres."""
+        places = np.asarray(places, float)
+        floor = self.left + places[..., :1] * np.array(self.along) + places[..., 1:2] * self.inward
+        return np.concatenate([floor, places[..., 2:]], axis=-1)
+
+    def box(self, span: tuple[float, float], heights: tuple[float, float], depth: float) -> Box:
+        """Return the box in front of a part of the wall, ``depth`` metres into the room."""
+        middle = self.at(((span[0] + span[1]) / 2, depth / 2, (heights[0] + heights[1]) / 2))
+        half = ((span[1] - span[0]) / 2, depth / 2, (heights[1] - heights[0]) / 2)
+        return Box((float(middle[0]), float(middle[1]), float(middle[2])), half, float(np.arctan2(*self.along[::-1])))
+
+
+def room_walls(room: RoomSection) -> tuple[Wall, ...]:
+    """Return the four walls of a room."""
+    x, y, z = room.size[0] / 2, room.size[1] / 2, room.size[2]
+    corners = {"+x": ((x, y), (0.0, -1.0), 2 * y), "-x": ((-x, -y), (0.0, 1.0), 2 * y)}
+    corners |= {"+y": ((-x, y), (1.0, 0.0), 2 * x), "-y": ((x, -y), (-1.0, 0.0), 2 * x)}
+    return tuple(Wall(f"wall {side}", left, along, length, z) for side, (left, along, length) in corners.items())
 
 
 @dataclass(frozen=True)
@@ -61,7 +110,7 @@ def draw_openings(room: RoomSection, seed: int, solids: Sequence[Solid] = ()) ->
     """
     if not room.walls:
         return ()
-    kind, walls = ROOM_KINDS[room.kind], walls_of(room)
+    kind, walls = ROOM_KINDS[room.kind], room_walls(room)
     rng = stream(seed, "room", "openings")
     towards = room_lighting(room, seed).direction[:2]
     sunny = int(np.argmax([-wall.inward @ towards * min(room.size[:2]) / wall.length for wall in walls]))

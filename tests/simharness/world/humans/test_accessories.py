@@ -23,7 +23,7 @@ from simharness.world.humans.mujoco_model import neutral_transforms
 from simharness.world.humans.population import draw_sex, draw_shape
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import BAGS, GLASSES, HAIR_STYLES, HATS, draw_look, draw_looks
-from simharness.world.scene.people import make_person
+from simharness.world.scene.build import make_person
 
 BARE = {"hat": "none", "bag": "none", "glasses": "none", "mask": "none", "hair_style": "short", "bald": 0.0}
 HEAD_WEAR = [{"glasses": kind} for kind in GLASSES[1:]] + [{"hat": kind} for kind in HATS[1:]] + [{"mask": "medical"}]

@@ -21,7 +21,7 @@ from simharness.world.scene.playback import simulate
 from simharness.world.scene.rooms.fittings import make_fittings
 from simharness.world.scene.rooms.kinds import ROOM_KINDS, check_size, settled
 from simharness.world.scene.rooms.openings import draw_openings
-from simharness.world.scene.rooms.room import make_room
+from simharness.world.scene.rooms.shell import make_room
 
 KINDS = [name for name, kind in ROOM_KINDS.items() if kind.furniture]
 

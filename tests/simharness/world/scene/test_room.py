@@ -6,9 +6,10 @@ from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.lighting import Lighting
 from simharness.world.rigs.layouts import build_rig
-from simharness.world.scene.rooms.lamps import MOODS, has_ceiling, make_ceiling, shown_lights
-from simharness.world.scene.rooms.lighting import LIGHTS, room_areas, room_lighting
-from simharness.world.scene.rooms.room import make_room
+from simharness.world.scene.rooms.lamps import area_lights, has_ceiling, make_ceiling, shown_lamps
+from simharness.world.scene.rooms.openings import draw_openings
+from simharness.world.scene.rooms.room_lighting import LIGHTS, MOODS, room_lighting
+from simharness.world.scene.rooms.shell import make_room
 from simharness.world.scene.rooms.textures import FLOORS, WALLS
 
 SIZE = (6.0, 8.0, 3.0)
@@ -134,8 +135,8 @@ def test_a_ceiling_is_for_pictures_alone_and_looks_into_the_room():
     np.testing.assert_allclose(normals, np.tile((0, 0, -1), (len(normals), 1)), atol=1e-6)
     assert areas.sum() == pytest.approx(SIZE[0] * SIZE[1], rel=1e-5)
     assert ceiling.mesh.vertices[:, 2].min() == SIZE[2]
-    lights = room_areas(ROOM, 0)
-    assert not any(solid.geoms for solid in (ceiling, *shown_lights(lights)))
+    lights = area_lights(ROOM, 0, draw_openings(ROOM, 0))
+    assert not any(solid.geoms for solid in (ceiling, *shown_lamps(ROOM, 0, lights)))
 
 
 @pytest.mark.parametrize(("height", "walls", "has"), [(2.8, True, True), (2.8, False, False), (3.0, True, False)])
@@ -147,12 +148,12 @@ def test_a_room_has_a_ceiling_if_all_cameras_hang_below_it(height, walls, has):
 @pytest.mark.parametrize("name", LIGHTS)
 def test_lamps_and_windows_shine_into_the_room(name):
     room = ROOM.model_copy(update={"light": name})
-    areas = room_areas(room, 0)
+    areas = area_lights(room, 0, draw_openings(room, 0))
     assert {area.kind for area in areas} >= ({"lamp"} if any(MOODS[name].lamp) else {"window"})
     for area in areas:
         low, high = area.corners.min(axis=0), area.corners.max(axis=0)
-        assert (low >= [-3, -4, 0]).all()
-        assert (high <= [3, 4, 3]).all()
+        assert (low >= [-3.01, -4.01, 0]).all()
+        assert (high <= [3.01, 4.01, 3]).all()
         assert area.normal @ (np.array([0, 0, 1.5]) - area.center) > 0
     sources = room_lighting(room, 0, areas).sources
     assert sources.areas == areas

@@ -8,8 +8,7 @@ from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.build_trial import true_rig
 from simharness.world.humans.wardrobe import draw_looks
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.scene import people
-from simharness.world.scene.build import build
+from simharness.world.scene.build import build, make_person, shape_of_person
 
 SMALL = ("duration=0.4", "rate=5", "people.count=2", "rendering.renderer=rays", "clutter.shelves=0")
 
@@ -22,8 +21,8 @@ def built(*overrides):
 @pytest.fixture
 def nobody_made():
     """Forget all people, as in a new process."""
-    people.make_person.cache_clear()
-    people.shape_of_person.cache_clear()
+    make_person.cache_clear()
+    shape_of_person.cache_clear()
 
 
 def arrays(scene):
@@ -39,12 +38,12 @@ def arrays(scene):
 
 def test_a_scene_after_others_and_after_their_trials_is_that_of_a_new_process(nobody_made):
     new = [array.copy() for array in arrays(built("seed=3"))]
-    assert people.make_person.cache_info().misses == 2
+    assert make_person.cache_info().misses == 2
     for other in ("people.activities=['hug', 'talk']", "cameras.count=3", "people.playback=dynamic"):
         scenario = load("quickstart", overrides=[*SMALL, "seed=3", other])
         run_trial(scenario, variants=["fast"], until="estimate")
     again = arrays(built("seed=3"))
-    assert people.make_person.cache_info().misses == 2, "nobody is made a second time"
+    assert make_person.cache_info().misses == 2, "nobody is made a second time"
     for first, second in zip(new, again, strict=True):
         np.testing.assert_array_equal(first, second)
 
@@ -58,7 +57,7 @@ def test_other_people_are_not_taken_for_these(nobody_made, other):
 
 def test_poses_leave_nothing_behind_in_the_kinematics_that_scenes_share(nobody_made):
     walking, waving = built("seed=3").motions
-    mover = people.make_person(people.shape_of_person(3, 0, 0.0), draw_looks(3, 1)[0]).mover
-    assert people.make_person.cache_info().misses == 2  # that of the scene
+    mover = make_person(shape_of_person(3, 0, 0.0), draw_looks(3, 1)[0]).mover
+    assert make_person.cache_info().misses == 2  # that of the scene
     mover.joints(waving)
     np.testing.assert_array_equal(mover.joints(walking), Kinematics(mover.body).joints(walking))

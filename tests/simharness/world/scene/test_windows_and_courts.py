@@ -10,10 +10,10 @@ from simharness.scenario.sections.room_section import RoomSection
 from simharness.world.rigs.layouts import intrinsics, look_at
 from simharness.world.scene.rooms.court import make_court
 from simharness.world.scene.rooms.kinds import ROOM_KINDS, settled
-from simharness.world.scene.rooms.lighting import room_lighting
-from simharness.world.scene.rooms.lights_of_kinds import lights_of
+from simharness.world.scene.rooms.lamps import area_lights
 from simharness.world.scene.rooms.openings import draw_openings
-from simharness.world.scene.rooms.room import make_room
+from simharness.world.scene.rooms.room_lighting import room_lighting
+from simharness.world.scene.rooms.shell import make_room
 
 
 def camera_at(center, aim, fov):
@@ -23,7 +23,7 @@ def camera_at(center, aim, fov):
 @pytest.mark.parametrize("kind", [name for name, kind in ROOM_KINDS.items() if kind.windows[0]])
 def test_windows_shine_into_the_room(kind):
     room = settled(RoomSection(kind=kind), 1)
-    areas = [area for area in lights_of(room, 1, draw_openings(room, 1)) if area.kind == "window"]
+    areas = [area for area in area_lights(room, 1, draw_openings(room, 1)) if area.kind == "window"]
     assert areas
     for area in areas:
         towards = np.array([0.0, 0.0, 1.5]) - area.center
@@ -35,7 +35,7 @@ def test_daylight_is_brightest_below_the_windows():
     """With its lamps off, the floor of a room is brighter near the windows than at the opposite wall."""
     room = settled(RoomSection(kind="office", size=(8.0, 8.0, 3.0), light="side"), 1)
     openings = [opening for opening in draw_openings(room, 1) if opening.kind == "window"][:1]
-    lighting = room_lighting(room, 1, lights_of(room, 1, openings))
+    lighting = room_lighting(room, 1, area_lights(room, 1, openings))
     meshes = [solid.mesh for solid in make_room(room, 1, openings)]
     wall = openings[0].wall
     image = RasterRenderer().render(camera_at((0.0, 0.01, 2.9), (0.0, 0.0, 0.0), fov=100.0), meshes, lighting=lighting)
@@ -50,7 +50,7 @@ def test_daylight_is_brightest_below_the_windows():
 def test_a_window_without_a_pane_shows_the_panorama():
     room = settled(RoomSection(kind="office"), 2)
     openings = draw_openings(room, 2)
-    lighting = room_lighting(room, 2, lights_of(room, 2, openings))
+    lighting = room_lighting(room, 2, area_lights(room, 2, openings))
     assert lighting.panorama is not None
     assert max(lighting.panorama.emission) > 0
     window = next(opening for opening in openings if opening.kind == "window")

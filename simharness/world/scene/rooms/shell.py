@@ -1,7 +1,7 @@
-"""Room: floor and four walls (the ceiling is in :mod:`~simharness.world.scene.rooms.lamps`), or a floor alone.
+"""Shell of a room: floor and four walls, or a floor alone, with everything fixed to them.
 
 The faces of the floor look up and those of the walls look into the room: counter-clockwise as seen from inside the
-room, which is the outside of a wall as a solid.
+room, which is the outside of a wall as a solid. The ceiling is in :mod:`~simharness.world.scene.rooms.lamps`.
 """
 
 from __future__ import annotations
@@ -13,22 +13,24 @@ from typing import TypeVar
 import numpy as np
 
 from mvpose.arrays import Bools, Floats
+from mvpose.camera import Rig
 from simharness.scenario.sections.room_section import RoomSection
+from simharness.types.light_sources import AreaLight
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import quad_mesh
 from simharness.world.scene.objects.solids import Solid
-from simharness.world.scene.rooms.finish import Finish
+from simharness.world.scene.rooms.court import make_court
+from simharness.world.scene.rooms.fittings import make_fittings
 from simharness.world.scene.rooms.kinds import settled
-from simharness.world.scene.rooms.lighting import room_lighting
-from simharness.world.scene.rooms.openings import Opening
-from simharness.world.scene.rooms.surroundings import AROUND
-from simharness.world.scene.rooms.textures import FLOORS, WALLS
-from simharness.world.scene.rooms.walls import Wall, walls_of
+from simharness.world.scene.rooms.lamps import make_ceiling, shown_lamps
+from simharness.world.scene.rooms.openings import Opening, Wall, room_walls
+from simharness.world.scene.rooms.room_lighting import room_lighting
+from simharness.world.scene.rooms.surroundings import AROUND, make_surroundings
+from simharness.world.scene.rooms.textures import FLOORS, WALLS, TiledTexture
 
 Choice = TypeVar("Choice")
-
 _ANY = 4  # finishes from which "any" is drawn: the first of each list
 _CELL = 1.0  # metres: approximate cell size of the grids of floor and walls
 _THICK = 0.1  # metres: thickness of floor and walls as solids, outside the room
@@ -36,6 +38,31 @@ _LAWN = 0.3  # metres: approximate cell size of the ground around a floor outdoo
 _RIM = 0.25  # metres: approximate cell size of that ground, which fades into the background
 # Opposite walls share a tone, so that corners are visible and pictures show the direction of view.
 _TONES = {"x": (0.93, 0.97, 1.0), "y": (1.0, 0.98, 0.93)}
+
+
+def make_interior(
+    room: RoomSection,
+    seed: int,
+    rig: Rig,
+    *,
+    openings: Sequence[Opening],
+    areas: Sequence[AreaLight],
+    objects: Sequence[Solid],
+) -> tuple[Solid, ...]:
+    """Return floor, walls, ceiling, lamps and fittings of a room, or floor and surroundings outdoors.
+
+    Args:
+        room: room with a drawn kind.
+        seed: seed of the scenario.
+        rig: true cameras.
+        openings: windows and doors.
+        areas: area lights; none without a ceiling.
+        objects: objects in the room: nothing hangs behind one that stands or hangs at the wall.
+    """
+    above = (make_ceiling(room), *shown_lamps(room, seed, areas)) if areas else ()
+    around = make_surroundings(room, seed, rig) if room.kind == "outdoors" else above
+    shell = (*make_room(room, seed, openings), *make_court(room, seed), *around)
+    return (*shell, *make_fittings(room, seed, openings, objects))
 
 
 def make_room(room: RoomSection, seed: int, openings: Sequence[Opening] = ()) -> tuple[Solid, ...]:
@@ -47,34 +74,34 @@ def make_room(room: RoomSection, seed: int, openings: Sequence[Opening] = ()) ->
     room = settled(room, seed)
     x, y, z = room.size[0] / 2, room.size[1] / 2, room.size[2]
     rng = stream(seed, "room", "floor")
-    finish = _chosen(FLOORS, room.floor, rng)(rng)
+    texture = _chosen(FLOORS, room.floor, rng)(rng)
     slab = Box((0.0, 0.0, -_THICK / 2), (x, y, _THICK / 2))
-    floor = Solid("room", "floor", _floor(x, y, finish), (slab,), slab)
+    floor = Solid("room", "floor", _floor(x, y, texture), (slab,), slab)
     if room.kind == "outdoors":
-        return floor, _open_ground(x, y, finish)
+        return floor, _open_ground(x, y, texture)
     if not room.walls:
-        return floor, _ground(room, seed, finish)
+        return floor, _ground(room, seed, texture)
     rng = stream(seed, "room", "wall")
     paper = _chosen(WALLS, room.wall, rng)(rng, z)
     return floor, *(
         _wall(wall, paper, [opening for opening in openings if (opening.wall, opening.kind) == (wall, "window")])
-        for wall in walls_of(room)
+        for wall in room_walls(room)
     )
 
 
 def _chosen(finishes: Mapping[str, Choice], name: str, rng: np.random.Generator) -> Choice:
-    """Return a finish by name, or a drawn one for "any". It is always drawn, so that later draws do not shift."""
+    """Return a texture by name, or a drawn one for "any". It is always drawn, so that later draws do not shift."""
     drawn = list(finishes)[rng.integers(_ANY)]
     return finishes[drawn if name == "any" else name]
 
 
-def _floor(x: float, y: float, finish: Finish) -> Mesh:
+def _floor(x: float, y: float, texture: TiledTexture) -> Mesh:
     columns, rows = _ticks(-x, x, _CELL), _ticks(-y, y, _CELL)
     grid = np.stack([*np.meshgrid(columns, rows, indexing="ij"), np.zeros((len(columns), len(rows)))], axis=-1)
-    return _textured_grid(grid, grid[..., :2], finish, (1.0, 1.0, 1.0))
+    return _textured_grid(grid, grid[..., :2], texture, (1.0, 1.0, 1.0))
 
 
-def _wall(wall: Wall, finish: Finish, windows: Sequence[Opening]) -> Solid:
+def _wall(wall: Wall, texture: TiledTexture, windows: Sequence[Opening]) -> Solid:
     length, height, along = wall.length, wall.height, np.array(wall.along)
     middle = wall.at((length / 2, -_THICK / 2, height / 2))
     block = Box(
@@ -82,8 +109,8 @@ def _wall(wall: Wall, finish: Finish, windows: Sequence[Opening]) -> Solid:
         (length / 2 + _THICK, _THICK / 2, height / 2),
         float(np.arctan2(along[1], along[0])),
     )
-    columns = _cut(_ticks(0.0, length, _CELL), [edge for window in windows for edge in window.span])
-    rows = _cut(_ticks(0.0, height, _CELL), [edge for window in windows for edge in window.heights])
+    columns = _merged_ticks(_ticks(0.0, length, _CELL), [edge for window in windows for edge in window.span])
+    rows = _merged_ticks(_ticks(0.0, height, _CELL), [edge for window in windows for edge in window.heights])
     place = np.stack(np.meshgrid(columns, rows, indexing="ij"), axis=-1)
     grid = wall.at(np.insert(place, 1, 0.0, axis=-1))
     middles = (place[:-1, :-1] + place[1:, 1:]) / 2
@@ -91,22 +118,22 @@ def _wall(wall: Wall, finish: Finish, windows: Sequence[Opening]) -> Solid:
     for window in windows:
         low, high = np.transpose([window.span, window.heights])
         solid &= ~((middles > low) & (middles < high)).all(axis=-1)
-    mesh = _textured_grid(grid, place, finish, _TONES[wall.name[-1]], solid)
+    mesh = _textured_grid(grid, place, texture, _TONES[wall.name[-1]], solid)
     return Solid("room", wall.name, mesh, (block,), block)
 
 
-def _cut(ticks: Floats, edges: Sequence[float]) -> Floats:
+def _merged_ticks(ticks: Floats, edges: Sequence[float]) -> Floats:
     """Return sorted positions with additional ones, without those that are closer than a millimetre to another."""
     both = np.sort(np.concatenate([ticks, edges]))
     return both[np.concatenate([[True], np.diff(both) > 1e-3])]
 
 
-def _ground(room: RoomSection, seed: int, finish: Finish) -> Solid:
+def _ground(room: RoomSection, seed: int, texture: TiledTexture) -> Solid:
     """Return the ground around an open floor, in the mean colour of the floor and fading outwards as in haze."""
     half = np.array(room.size[:2]) / 2
     light = room_lighting(room, seed)
     shown = np.array(light.background) / np.sqrt((light.key * light.direction[2] + light.sky) * np.array(light.tint))
-    mean = finish.texture.reshape(-1, 3).mean(axis=0) / 255
+    mean = texture.texture.reshape(-1, 3).mean(axis=0) / 255
     steps = round(AROUND / _RIM)
     rings = np.stack([_outline(half + AROUND * k / steps) for k in range(steps + 1)])
     sides = rings.shape[1]
@@ -124,19 +151,21 @@ def _ground(room: RoomSection, seed: int, finish: Finish) -> Solid:
     return Solid("room", "ground", mesh, (slab,), slab)
 
 
-def _open_ground(x: float, y: float, finish: Finish) -> Solid:
+def _open_ground(x: float, y: float, texture: TiledTexture) -> Solid:
     """Return the ground around a floor outdoors, which goes on like the floor.
 
     It is smooth, so that its light is computed at its vertices alone.
     """
     columns, rows = (
-        _cut(_ticks(-half, half, _LAWN), [side * at for side in (-1, 1) for at in _ticks(half, half + AROUND, _LAWN)])
+        _merged_ticks(
+            _ticks(-half, half, _LAWN), [side * at for side in (-1, 1) for at in _ticks(half, half + AROUND, _LAWN)]
+        )
         for half in (x, y)
     )
     grid = np.stack([*np.meshgrid(columns, rows, indexing="ij"), np.zeros((len(columns), len(rows)))], axis=-1)
     middles = (grid[:-1, :-1, :2] + grid[1:, 1:, :2]) / 2
     beside: Bools = np.any(np.abs(middles) > (x, y), axis=-1)
-    mesh = replace(_textured_grid(grid, grid[..., :2], finish, (1.0, 1.0, 1.0), beside), smooth=True)
+    mesh = replace(_textured_grid(grid, grid[..., :2], texture, (1.0, 1.0, 1.0), beside), smooth=True)
     slab = Box((0.0, 0.0, -_THICK / 2), (x + AROUND, y + AROUND, _THICK / 2))
     return Solid("room", "ground", mesh, (slab,), slab)
 
@@ -154,7 +183,7 @@ def _ticks(low: float, high: float, step: float) -> Floats:
 
 
 def _textured_grid(
-    grid: Floats, place: Floats, finish: Finish, tone: tuple[float, float, float], kept: Bools | None = None
+    grid: Floats, place: Floats, texture: TiledTexture, tone: tuple[float, float, float], kept: Bools | None = None
 ) -> Mesh:
     """Return the textured mesh of a grid of vertices (c, r, 3).
 
@@ -162,7 +191,7 @@ def _textured_grid(
         grid: vertices by column; right, then up, is counter-clockwise.
         place: position of the vertices on the surface, metres to the right and up, (c, r, 2); the lower edge of the
             texture is at height 0.
-        finish: texture and its size.
+        texture: texture and its size.
         tone: colour that multiplies the texture.
         kept: cells of the grid that have a surface, (c - 1, r - 1); all by default.
     """
@@ -172,5 +201,5 @@ def _textured_grid(
     quads = np.stack([corner, corner + rows, corner + rows + 1, corner + 1], axis=-1)
     quads = quads if kept is None else quads[kept.ravel()]
     mesh = quad_mesh(grid.reshape(-1, 3), quads, np.broadcast_to(np.array(tone), (len(quads), 3)))
-    uv = place.reshape(-1, 2) / finish.size * [1.0, -1.0] + [0.0, 1.0]
-    return replace(mesh, texture=finish.texture, uv=uv[mesh.faces].astype(np.float32))
+    uv = place.reshape(-1, 2) / texture.size * [1.0, -1.0] + [0.0, 1.0]
+    return replace(mesh, texture=texture.texture, uv=uv[mesh.faces].astype(np.float32))
