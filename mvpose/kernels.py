@@ -3,7 +3,8 @@
 Numba's own cache looks at the file that a kernel is in. But compiled code also holds the kernels that it calls and the
 constants that it refers to, and when those are edited in another file, it goes on with the old ones. Here the name of
 an entry says all that the code is compiled from (:mod:`mvpose.kernel_code`), for which arguments and which processor.
-An entry is one file, written whole. A process that needs a kernel that another one compiles waits for its entry.
+An entry is one file, written whole. A process that needs a kernel that another one compiles waits for its entry. Only
+kernels that Python calls have entries: those that they call are part of them (:mod:`mvpose.kernel_callees`).
 
 Python's collector of cyclic garbage rests during compilation, which makes millions of objects and few cycles: its
 searches take an eighth of the time.
@@ -29,6 +30,7 @@ import numpy as np
 from numba import types
 from numba.core.compiler_lock import global_compiler_lock
 
+from mvpose.kernel_callees import callees_linked, is_callee, under_way
 from mvpose.kernel_code import code_digest
 from mvpose.kernel_lock import locked
 
@@ -70,6 +72,7 @@ def njit(
     kernel = numba.njit(**{**_DEFAULTS, "_nrt": not borrows, **options})(function)
     if hasattr(kernel, "compile"):  # not with NUMBA_DISABLE_JIT
         kernel.compile = _compilation_of(kernel)
+        kernel.get_call_template = _call_template_of(kernel)
     if cache and hasattr(kernel, "_cache"):  # not with NUMBA_DISABLE_JIT, nor in a numba that keeps its cache elsewhere
         kernel._cache = KernelCache(kernel)
     return kernel
@@ -84,14 +87,37 @@ def _compilation_of(kernel: Any) -> Callable[[Any], Any]:
 
     @functools.wraps(original)
     def compilation(signature: Any) -> Any:
-        if tuple(getattr(signature, "args", signature)) in kernel.overloads:
-            return original(signature)
-        kept = isinstance(kernel._cache, KernelCache)
-        alone = kernel._cache.compiling(signature) if kept else contextlib.nullcontext()
-        with global_compiler_lock, _collector_paused(), alone:
-            return original(signature)
+        arguments = tuple(getattr(signature, "args", signature))
+        with global_compiler_lock:
+            if under_way():
+                return original(signature)
+            known = kernel.overloads.get(arguments)
+            if known is not None and not is_callee(known):
+                return original(signature)
+            if known is not None:
+                del kernel.overloads[arguments]
+            kept = isinstance(kernel._cache, KernelCache)
+            alone = kernel._cache.compiling(signature) if kept else contextlib.nullcontext()
+            with _collector_paused(), alone, callees_linked(kernel):
+                return original(signature)
 
     return compilation
+
+
+def _call_template_of(kernel: Any) -> Callable[[Any, Any], Any]:
+    """Return the method of a kernel that compiles it for a caller: once for all values of an argument.
+
+    Numba compiles ``f(x, 1)``, ``f(x, 2)`` and ``f(x, n)`` one by one, to the same code.
+    """
+    original = kernel.get_call_template
+
+    @functools.wraps(original)
+    def call_template(arguments: Any, keywords: Any) -> Any:
+        return original(
+            tuple(map(types.unliteral, arguments)), {name: types.unliteral(each) for name, each in keywords.items()}
+        )
+
+    return call_template
 
 
 @contextlib.contextmanager
@@ -158,6 +184,8 @@ class KernelCache:
     def save_overload(self, signature: Any, compiled: Any) -> None:
         """Write compiled code, and delete entries of earlier code of the kernel."""
         try:
+            if is_callee(compiled):
+                return
             entry, implementation = self._entry(signature), self._implementation()
             if entry is None or not implementation.check_cachable(compiled):
                 return
