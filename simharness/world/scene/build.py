@@ -38,8 +38,7 @@ from simharness.world.scene.camera_clearance import check_rig
 from simharness.world.scene.dynamics.motion_servos import track
 from simharness.world.scene.objects.props import make_prop
 from simharness.world.scene.objects.solids import Solid
-from simharness.world.scene.placement.clutter import place_clutter
-from simharness.world.scene.placement.decoys import place_decoys
+from simharness.world.scene.placement.clutter import place_clutter, place_decoys
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, FreeSpace
 from simharness.world.scene.placement.furniture import place_furniture
 from simharness.world.scene.rooms.kinds import check_size, settled
@@ -59,7 +58,7 @@ class ScenePerson:
     Attributes:
         look: clothes, hair and accessories.
         body: dressed body with accessories.
-        mover: kinematics of the body of the plain look (:func:`~simharness.world.humans.wearing.plain`). Poses are
+        mover: kinematics of the body of the plain look (:func:`~simharness.world.humans.accessories.plain`). Poses are
             computed in its MuJoCo data, so threads must not share it.
     """
 

@@ -10,10 +10,9 @@ import numpy as np
 from simharness.types.random_streams import stream
 from simharness.world.motion.performance import Prop
 from simharness.world.scene.objects.assembly import Assembly
-from simharness.world.scene.objects.furniture import chair, table
+from simharness.world.scene.objects.laboratory import BOX_COLORS, chair, table, taped
 from simharness.world.scene.objects.shapes import lathe
 from simharness.world.scene.objects.solids import ObjectModel, Solid
-from simharness.world.scene.objects.storage import BOX_COLORS, taped
 
 Size = tuple[float, float, float]
 

@@ -1,4 +1,4 @@
-"""Clutter by kind and number: objects that occlude people but do not obstruct their paths, and carts that move.
+"""Clutter and decoys by kind and number: objects that occlude people or look like them, clear of their paths.
 
 A cart oscillates on a line or circulates on an ellipse, always clear of people.
 """
@@ -11,15 +11,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.room_section import ClutterSection, RoomSection
+from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.trajectory import Trajectory
-from simharness.world.scene.objects.fixtures import draw_cart, draw_partition, draw_pillar
-from simharness.world.scene.objects.furniture import draw_chair, draw_table
+from simharness.world.scene.objects.decoy_models import DECOY_MODELS
 from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.laboratory import (
+    draw_box,
+    draw_cart,
+    draw_chair,
+    draw_partition,
+    draw_pillar,
+    draw_rack,
+    draw_shelf,
+    draw_table,
+)
 from simharness.world.scene.objects.plants import draw_plant
 from simharness.world.scene.objects.solids import ObjectModel, Solid
-from simharness.world.scene.objects.storage import draw_box, draw_rack, draw_shelf
 from simharness.world.scene.placement.free_space import (
     BODY_HALF_WIDTH,
     LIMB,
@@ -27,6 +35,7 @@ from simharness.world.scene.placement.free_space import (
     FreeSpace,
     PlaceSampler,
     Site,
+    inward_yaw,
     near_origin,
     near_people,
     towards_walls,
@@ -40,6 +49,7 @@ _LINE_CHANCE = 0.6
 _BEARING_SPREAD = 0.2  # radians: standard deviation of the bearing of a path about that of a wall
 _PHASES = 24  # phases of one period at which clearance from objects is checked
 _COARSE = 6  # every sixth time step shows most encounters with people
+_ON_WALL_CHANCE = 0.7  # chance that a poster or mirror hangs at a wall, if there are walls
 _LIMBS_REACH = 1.6  # metres: largest distance from a pelvis to a joint
 
 
@@ -204,3 +214,38 @@ def _least_distance(extent: Box, pose: Floats, points: Floats) -> float:
 
 def _yaw(pose: Floats) -> float:
     return float(2 * np.arctan2(pose[6], pose[3]))
+
+
+def place_decoys(seed: int, decoys: DecoysSection, space: FreeSpace) -> tuple[Solid, ...]:
+    """Draw the decoys and find a place for each: on a wall, or near the paths of people.
+
+    Each is drawn and placed by a separate stream, so one more moves none of those placed before it.
+
+    Raises:
+        ValueError: no place is found for a decoy.
+    """
+    site = Site(space)
+    for plural, (name, draw) in DECOY_MODELS.items():
+        for k in range(getattr(decoys, plural)):
+            rng = stream(seed, "decoys", name, k)
+            on_wall = rng.uniform() < _ON_WALL_CHANCE and space.room.walls and plural in ("posters", "mirrors")
+            model = draw(rng, on_wall)
+            place_rng = stream(seed, "decoys", name, k, "place")
+            sample_place = _at_wall if on_wall else near_people
+            solid = site.find(place_rng, model, sample_place, kind="decoy", name=f"{name}{k}", at_wall=on_wall)
+            if solid is None:
+                raise ValueError(
+                    f"decoys.{plural}: found no place for {name} {k} in {TRIES} tries, clear of {len(site.solids)} "
+                    f"other objects, of the paths of people and of the cameras, in room.size = "
+                    f"{list(space.room.size)}: lower decoys.{plural} or people.count, or enlarge room.size"
+                )
+            site.add(solid)
+    return tuple(site.solids[len(space.taken) :])
+
+
+def _at_wall(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
+    """Draw a place along a wall and the yaw that faces into the room."""
+    side, sense, along = rng.integers(2), rng.choice([-1.0, 1.0]), rng.uniform(-0.85, 0.85)
+    unit = np.array([sense, along]) if side == 0 else np.array([along, sense])
+    outward = np.array([sense, 0.0]) if side == 0 else np.array([0.0, sense])
+    return unit * space.half, inward_yaw(outward)

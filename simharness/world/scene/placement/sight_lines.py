@@ -24,12 +24,12 @@ def intersects(mesh: Mesh, starts: ArrayLike, ends: ArrayLike) -> Bools:
     starts, ends = np.ascontiguousarray(starts, float), np.ascontiguousarray(ends, float)
     result = np.zeros(len(starts), bool)
     if len(mesh.faces) and len(starts):
-        _cut(starts, ends, mesh.vertices[mesh.faces].astype(float), result)
+        _intersect(starts, ends, mesh.vertices[mesh.faces].astype(float), result)
     return result
 
 
 @njit(cache=True, error_model="numpy")
-def _cut(starts, ends, triangles, result):
+def _intersect(starts, ends, triangles, result):
     """Intersect by Möller and Trumbore, "Fast, minimum storage ray/triangle intersection", 1997, after a box test."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for t in range(len(triangles)):

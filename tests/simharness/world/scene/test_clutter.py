@@ -7,11 +7,10 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build
-from simharness.world.scene.objects.fixtures import draw_cart
-from simharness.world.scene.objects.storage import draw_box, draw_shelf
+from simharness.world.scene.objects.laboratory import draw_box, draw_cart, draw_shelf
 from simharness.world.scene.placement.clutter import CLUTTER_KINDS, place_clutter
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, LENS, LIMB
-from simharness.world.scene.placement.sight_lines import PictureFill, cuts
+from simharness.world.scene.placement.sight_lines import PictureFill, intersects
 
 ROOM = RoomSection()
 DRAW = {kind.name: lambda rng, draw=kind.draw: draw(rng, ROOM) for kind in CLUTTER_KINDS} | {"cart": draw_cart}
@@ -47,7 +46,7 @@ def test_geoms_match_the_mesh(name):
         center, half = np.array(solid.hull.center), np.array(solid.hull.half)
         start = center + [3.0, 1.0, 1.0]
         ends = start + 2 * (center + rng.uniform(-1, 1, (400, 3)) * half - start)
-        seen = cuts(solid.mesh, np.tile(start, (400, 1)), ends)
+        seen = intersects(solid.mesh, np.tile(start, (400, 1)), ends)
         met = np.isfinite(rays.distance(start, ends))
         assert seen.any()
         assert (seen == met).mean() >= 0.985

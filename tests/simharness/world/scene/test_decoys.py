@@ -6,14 +6,13 @@ from walkers import Rays, ring, space
 
 from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
 from simharness.types.random_streams import stream
-from simharness.world.scene.placement.clutter import place_clutter
-from simharness.world.scene.placement.decoys import (
+from simharness.world.scene.objects.decoy_models import (
     draw_coat_stand,
     draw_mannequin,
     draw_mirror,
     draw_poster,
-    place_decoys,
 )
+from simharness.world.scene.placement.clutter import place_clutter, place_decoys
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH
 
 ALL = DecoysSection(posters=2, mannequins=1, coat_stands=1, mirrors=2)

@@ -8,7 +8,7 @@ from simharness.world.motion.trajectory import Trajectory
 from simharness.world.scene.objects.assembly import Assembly
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import box_mesh
-from simharness.world.scene.placement.sight_lines import PictureFill, SightLines, cuts, lines_of_sight
+from simharness.world.scene.placement.sight_lines import PictureFill, SightLines, intersects, lines_of_sight
 
 numbers = st.floats(-2, 2)
 
@@ -22,12 +22,14 @@ def test_boxes_cut_lines_as_the_slab_test(x, y, yaw, seed):
     one, two = (-np.array(box.half) - a) / (b - a), (np.array(box.half) - a) / (b - a)
     into, out = np.minimum(one, two).max(axis=1), np.maximum(one, two).min(axis=1)
     crosses = (into <= out) & (((into >= 0) & (into <= 1)) | ((out >= 0) & (out <= 1)))
-    assert (cuts(box_mesh([box], np.full((1, 3), 0.5)), starts, ends) == crosses).mean() > 0.995  # except at the edges
+    assert (
+        intersects(box_mesh([box], np.full((1, 3), 0.5)), starts, ends) == crosses
+    ).mean() > 0.995  # except at the edges
 
 
 def test_no_lines_and_no_faces():
     mesh = box_mesh([Box((0.0, 0.0, 0.5), (0.5, 0.5, 0.5))], np.full((1, 3), 0.5))
-    assert cuts(mesh, np.zeros((0, 3)), np.zeros((0, 3))).shape == (0,)
+    assert intersects(mesh, np.zeros((0, 3)), np.zeros((0, 3))).shape == (0,)
 
 
 def test_a_moving_solid_cuts_lines_at_its_position_in_time():

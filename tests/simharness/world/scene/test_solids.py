@@ -11,7 +11,7 @@ from simharness.world.motion.trajectory import Trajectory
 from simharness.world.scene.objects.assembly import Assembly
 from simharness.world.scene.objects.geoms import Box, Cylinder, Surface, carried
 from simharness.world.scene.objects.shapes import TOP, bar_mesh, box_mesh, hexahedron, joined, lathe, shifted
-from simharness.world.scene.placement.sight_lines import cuts
+from simharness.world.scene.placement.sight_lines import intersects
 
 numbers = st.floats(-3, 3)
 
@@ -84,7 +84,7 @@ def test_rays_hit_a_tilted_bar_at_its_mesh(end):
     rng, middle = np.random.default_rng(0), np.array(solid.hull.center)
     start = middle + [2.0, -1.5, 1.0]
     ends = start + 2 * (middle + rng.uniform(-1, 1, (500, 3)) * solid.hull.half - start)
-    seen = cuts(solid.mesh, np.tile(start, (500, 1)), ends)
+    seen = intersects(solid.mesh, np.tile(start, (500, 1)), ends)
     met = np.isfinite(Rays([solid]).distance(start, ends))
     assert seen.sum() > 30
     assert (seen != met).sum() <= 5

@@ -1,4 +1,4 @@
-"""Decoys, objects that a detector may take for people: posters, mannequins, coat stands, mirrors.
+"""Models of decoys: objects that a detector may take for people: posters, mannequins, coat stands, mirrors.
 
 Each except the mirror has the joints that a detector would find on it (``Solid.figure``); a mirror has its glass
 (``Solid.mirror``) and shows the people in front of it.
@@ -15,30 +15,24 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.room_section import DecoysSection
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
-from simharness.types.random_streams import stream
 from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.shape import Shape
 from simharness.world.scene.objects.artwork import draw_person
 from simharness.world.scene.objects.assembly import Assembly
 from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.laboratory import WOOD
 from simharness.world.scene.objects.shapes import box_mesh, joined, lathe, loft, shifted
-from simharness.world.scene.objects.solids import ObjectModel, Solid
-from simharness.world.scene.objects.storage import WOOD
-from simharness.world.scene.placement.free_space import TRIES, FreeSpace, Site, inward_yaw, near_people
+from simharness.world.scene.objects.solids import ObjectModel
 
 _POSTER_RESOLUTION = 320  # pixels per metre
-_ON_WALL = 0.7  # chance of a place at a wall, if there are walls
 _ALUMINIUM = np.array([0.74, 0.75, 0.77])
 _FRAMES = np.array([[0.20, 0.20, 0.22], [0.85, 0.84, 0.81], [0.62, 0.47, 0.33], [0.40, 0.30, 0.24]])
 _GLASS = np.array([0.78, 0.84, 0.85])
 _SHOP_COLORS = np.array([[0.90, 0.88, 0.85], [0.80, 0.69, 0.58], [0.30, 0.31, 0.33], [0.74, 0.75, 0.77]])
 _CLOTHS = np.array([[0.29, 0.31, 0.36], [0.62, 0.50, 0.36], [0.34, 0.40, 0.32], [0.46, 0.26, 0.26], [0.24, 0.32, 0.44]])
-
 _ARM_OUT = 0.2  # angle of the upper arms of a mannequin from the vertical, radians
-
 # Profile of a coat on a stand: height, half width, half depth; metres.
 _COAT = np.array(
     [
@@ -47,41 +41,6 @@ _COAT = np.array(
     ]
 )
 _FOLDS = 7
-
-
-def place_decoys(seed: int, decoys: DecoysSection, space: FreeSpace) -> tuple[Solid, ...]:
-    """Draw the decoys and find a place for each: on a wall, or near the paths of people.
-
-    Each is drawn and placed by a separate stream, so one more moves none of those placed before it.
-
-    Raises:
-        ValueError: no place is found for a decoy.
-    """
-    site = Site(space)
-    for plural, (name, draw) in _DECOYS.items():
-        for k in range(getattr(decoys, plural)):
-            rng = stream(seed, "decoys", name, k)
-            on_wall = rng.uniform() < _ON_WALL and space.room.walls and plural in ("posters", "mirrors")
-            model = draw(rng, on_wall)
-            place_rng = stream(seed, "decoys", name, k, "place")
-            sample_place = _at_wall if on_wall else near_people
-            solid = site.find(place_rng, model, sample_place, kind="decoy", name=f"{name}{k}", at_wall=on_wall)
-            if solid is None:
-                raise ValueError(
-                    f"decoys.{plural}: found no place for {name} {k} in {TRIES} tries, clear of {len(site.solids)} "
-                    f"other objects, of the paths of people and of the cameras, in room.size = "
-                    f"{list(space.room.size)}: lower decoys.{plural} or people.count, or enlarge room.size"
-                )
-            site.add(solid)
-    return tuple(site.solids[len(space.taken) :])
-
-
-def _at_wall(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
-    """Draw a place along a wall and the yaw that faces into the room."""
-    side, sense, along = rng.integers(2), rng.choice([-1.0, 1.0]), rng.uniform(-0.85, 0.85)
-    unit = np.array([sense, along]) if side == 0 else np.array([along, sense])
-    outward = np.array([sense, 0.0]) if side == 0 else np.array([0.0, sense])
-    return unit * space.half, inward_yaw(outward)
 
 
 def draw_poster(rng: np.random.Generator, on_wall: bool) -> ObjectModel:
@@ -265,7 +224,7 @@ def _coat_figure(shape: Floats, crown: float, tall: float) -> Floats:
     return np.array([*head, *((x, s * y, z) for x, y, z in rows for s in (1, -1))])
 
 
-_DECOYS: MappingProxyType[str, tuple[str, Callable[[np.random.Generator, bool], ObjectModel]]] = MappingProxyType(
+DECOY_MODELS: MappingProxyType[str, tuple[str, Callable[[np.random.Generator, bool], ObjectModel]]] = MappingProxyType(
     {
         "posters": ("poster", draw_poster),
         "mirrors": ("mirror", draw_mirror),
