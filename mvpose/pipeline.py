@@ -58,7 +58,7 @@ class Pipeline:
                 appearance is the only affinity.
         """
         start = time.perf_counter()
-        chosen, ordered, rays = enter(rig, detections, self.duplicates)
+        chosen, ordered, rays = prepare_rays(rig, detections, self.duplicates)
         affinity = self.affinity(rig, ordered, rays)
         compared = time.perf_counter()
         matching = self.matching(affinity, number_views(ordered.view))
@@ -82,13 +82,13 @@ class UnmatchedPipeline:
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Estimate the people of one frame; see :meth:`Pipeline.estimate`. Only reconstruction takes time."""
         start = time.perf_counter()
-        chosen, _, rays = enter(rig, detections, self.duplicates)
+        chosen, _, rays = prepare_rays(rig, detections, self.duplicates)
         ready = time.perf_counter()
         poses, labels = self.reconstruction(rays, detections.skeleton)
         return _estimate(poses, _restored(Matching(labels), chosen, len(detections)), start, ready, ready)
 
 
-def enter(
+def prepare_rays(
     rig: Rig, detections: Detections, duplicates: Callable[[Detections], NDArray[np.bool_]]
 ) -> tuple[NDArray[np.int64], Detections, Rays]:
     """Return the indices of the detections that take part, in canonical order, and their detections and rays.

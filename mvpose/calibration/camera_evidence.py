@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.calibration.camera_models import HEALTHY, Fault
+from mvpose.calibration.camera_models import HEALTHY, FaultHypothesis
 from mvpose.calibration.normal_equations import PARAMETERS, NormalEquations
 
 _LEAST_TEMPER = 2.0  # keypoints of one pose are never independent of each other
@@ -40,7 +40,7 @@ class Quadratic:
         """Sums over all blocks."""
         return self.H.sum(axis=0), self.b.sum(axis=0)
 
-    def with_faults(self, faults: Sequence[Fault]) -> tuple[Floats, Floats, Floats]:
+    def with_faults(self, faults: Sequence[FaultHypothesis]) -> tuple[Floats, Floats, Floats]:
         """Return curvature and vector of errors and faults together, and the variances of their priors."""
         H, b = self.total
         variances = np.tile(HEALTHY**2, len(b) // PARAMETERS)
@@ -57,14 +57,14 @@ class Quadratic:
             variances = np.concatenate([variances, np.square(fault.model.sigma)])
         return H, b, variances
 
-    def posterior(self, faults: Sequence[Fault]) -> tuple[Floats, Floats]:
+    def posterior(self, faults: Sequence[FaultHypothesis]) -> tuple[Floats, Floats]:
         """Return mean and covariance of errors and faults."""
         H, b, variances = self.with_faults(faults)
         scale = np.sqrt(variances)
         covariance = scale[:, None] * np.linalg.inv(np.eye(len(b)) + scale[:, None] * H * scale) * scale
         return covariance @ b, covariance
 
-    def evidence(self, faults: Sequence[Fault]) -> float:
+    def evidence(self, faults: Sequence[FaultHypothesis]) -> float:
         """Return the log marginal likelihood, up to what all models share."""
         H, b, variances = self.with_faults(faults)
         scale = np.sqrt(variances)
@@ -74,7 +74,7 @@ class Quadratic:
         return float(0.5 * half @ half - np.log(np.diagonal(factor)).sum())
 
 
-def errors_of(mean: Floats, found: list[Fault], shape: tuple[int, ...]) -> Floats:
+def errors_of(mean: Floats, found: list[FaultHypothesis], shape: tuple[int, ...]) -> Floats:
     """Return the errors of all cameras in each block, (B, 11 V)."""
     errors = np.tile(mean[: shape[1]], (shape[0], 1))
     column = shape[1]

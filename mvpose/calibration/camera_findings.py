@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from mvpose.calibration.cameras import CameraFault, Fit
+from mvpose.calibration.cameras import CameraFault, CameraFit
 from mvpose.calibration.findings import Finding, Severity
 from mvpose.camera import Camera, Rig
 
@@ -27,7 +27,9 @@ _REPAIR = "mvpose repair CALIBRATION DETECTIONS --out NEW"
 _DRAWS = 4000
 
 
-def of(fit: Fit, rig: Rig, starts: Floats, names: Sequence[str], *, undetermined: bool) -> list[Finding]:
+def findings_of_cameras(
+    fit: CameraFit, rig: Rig, starts: Floats, names: Sequence[str], *, undetermined: bool
+) -> list[Finding]:
     """Return the findings about single cameras.
 
     Args:
@@ -86,7 +88,13 @@ def _of_all_lenses(findings: list[Finding], rig: Rig) -> list[Finding]:
 
 
 def _finding(
-    found: CameraFault, fit: Fit, rig: Rig, starts: Floats, names: Sequence[str], depth: Floats, undetermined: bool
+    found: CameraFault,
+    fit: CameraFit,
+    rig: Rig,
+    starts: Floats,
+    names: Sequence[str],
+    depth: Floats,
+    undetermined: bool,
 ) -> Finding | None:
     view, kind, change = found.fault.view, found.fault.model.kind, found.change
     name = names[view]
@@ -148,7 +156,7 @@ def _finding(
     )
 
 
-def of_turn(rig: Rig, cameras: Floats, covariance: Floats, view: int, names: Sequence[str]) -> Finding:
+def turn_finding(rig: Rig, cameras: Floats, covariance: Floats, view: int, names: Sequence[str]) -> Finding:
     """Return the finding of a camera that was turned so far that it had to be searched for.
 
     Args:
@@ -169,7 +177,7 @@ def of_turn(rig: Rig, cameras: Floats, covariance: Floats, view: int, names: Seq
     return Finding("moved-camera", text, "alarm", 0.99, names[view], view, size, interval, cost, _REPAIR)
 
 
-def _note(fit: Fit, view: int, names: Sequence[str], depth: Floats) -> list[Finding]:
+def _note(fit: CameraFit, view: int, names: Sequence[str], depth: Floats) -> list[Finding]:
     """Return a note if the estimated correction is significant but as small as that of good calibrations."""
     change, covariance = fit.change[view], fit.covariance[view]
     deviation = np.abs(change[:6]) / np.sqrt(np.diagonal(covariance)[:6])
@@ -203,7 +211,7 @@ def _range(values: Floats) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _outer_radius(fit: Fit, camera: Camera) -> float:
+def _outer_radius(fit: CameraFit, camera: Camera) -> float:
     """Return the distance from the axis, in focal lengths, beyond which a tenth of the joints in the picture are."""
     joints = fit.equations.joints
     pixels = camera.project(joints[np.isfinite(joints[:, 0])])
@@ -214,7 +222,7 @@ def _outer_radius(fit: Fit, camera: Camera) -> float:
     return float(np.quantile(np.linalg.norm(away, axis=1), 0.9))
 
 
-def _depths(fit: Fit, rig: Rig) -> Floats:
+def _depths(fit: CameraFit, rig: Rig) -> Floats:
     """Return the median distance of people from each camera, (V,), metres."""
     joints = fit.equations.joints
     joints = joints[np.isfinite(joints[:, 0])]

@@ -58,7 +58,7 @@ _NOTHING = 1.0 - sum(each.prior for each in MODELS)
 
 
 @dataclass(frozen=True)
-class Fault:
+class FaultHypothesis:
     """A model of one camera, with its course over time.
 
     Attributes:
@@ -90,11 +90,13 @@ def _courses(blocks: int) -> list[tuple[str, Floats, float]]:
     return [(ALWAYS, always, _COURSES[ALWAYS]), *steps, (GROWING, ramp, _COURSES[GROWING])]
 
 
-def candidates(blocks: int, view: int) -> list[tuple[Fault, float]]:
+def candidates(blocks: int, view: int) -> list[tuple[FaultHypothesis, float]]:
     """Return all faults of a camera with their log prior odds to no fault."""
     result = []
     for model in MODELS:
         courses = _courses(blocks) if model.kind == "moved-camera" else [(ALWAYS, np.ones(blocks), 1.0)]
         for course, profile, prior in courses:
-            result.append((Fault(model, view, course, profile), float(np.log(model.prior * prior / _NOTHING))))
+            result.append(
+                (FaultHypothesis(model, view, course, profile), float(np.log(model.prior * prior / _NOTHING)))
+            )
     return result

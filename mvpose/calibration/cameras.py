@@ -19,7 +19,7 @@ from scipy.special import logsumexp
 
 from mvpose.arrays import Floats, Integers
 from mvpose.calibration.camera_evidence import Quadratic, errors_of, quadratic_of
-from mvpose.calibration.camera_models import ALWAYS, SINCE, Fault, candidates
+from mvpose.calibration.camera_models import ALWAYS, SINCE, FaultHypothesis, candidates
 from mvpose.calibration.fault_support import is_for_everybody
 from mvpose.calibration.normal_equations import PARAMETERS, JointViews, NormalEquations, normal_equations, with_errors
 
@@ -49,7 +49,7 @@ class CameraFault:
             courses.
     """
 
-    fault: Fault
+    fault: FaultHypothesis
     probability: float
     kind_probability: float
     change: Floats
@@ -59,7 +59,7 @@ class CameraFault:
 
 
 @dataclass(frozen=True)
-class Fit:
+class CameraFit:
     """Result of the search.
 
     Attributes:
@@ -77,7 +77,7 @@ class Fit:
     quadratic: Quadratic
 
 
-def fit(cameras: Floats, sightings: JointViews) -> Fit:
+def fit(cameras: Floats, sightings: JointViews) -> CameraFit:
     """Find the faults of cameras.
 
     Args:
@@ -85,7 +85,7 @@ def fit(cameras: Floats, sightings: JointViews) -> Fit:
         sightings: joints seen by several views.
     """
     views, blocks = len(cameras), sightings.blocks
-    found: list[Fault] = []
+    found: list[FaultHypothesis] = []
     refuted: set[int] = set()
     strongest = 0.0
     errors = np.zeros((blocks, PARAMETERS * views))
@@ -118,7 +118,7 @@ def fit(cameras: Floats, sightings: JointViews) -> Fit:
         column += len(fault.index)
     covariance = to_end @ covariance @ to_end.T
     blocks_of_cameras = [slice(PARAMETERS * view, PARAMETERS * (view + 1)) for view in range(views)]
-    return Fit(
+    return CameraFit(
         faults,
         (to_end @ mean).reshape(views, PARAMETERS),
         np.stack([covariance[each, each] for each in blocks_of_cameras]),
@@ -128,8 +128,8 @@ def fit(cameras: Floats, sightings: JointViews) -> Fit:
 
 
 def _next(
-    quadratic: Quadratic, found: list[Fault], views: int, refuted: set[int], strongest: float
-) -> tuple[Fault, float] | None:
+    quadratic: Quadratic, found: list[FaultHypothesis], views: int, refuted: set[int], strongest: float
+) -> tuple[FaultHypothesis, float] | None:
     """Return the likeliest further fault and its log posterior odds; None if none is likely enough.
 
     Args:
@@ -150,18 +150,18 @@ def _next(
     return best
 
 
-def _least_odds(fault: Fault) -> float:
+def _least_odds(fault: FaultHypothesis) -> float:
     if fault.course != ALWAYS:
         return _LEAST_ODDS_CHANGE
     return _LEAST_ODDS if fault.model.kind == "moved-camera" else _LEAST_ODDS_INTRINSICS
 
 
-def _described(quadratic: Quadratic, found: list[Fault], fault: Fault, views: int) -> CameraFault:
+def _described(quadratic: Quadratic, found: list[FaultHypothesis], fault: FaultHypothesis, views: int) -> CameraFault:
     """Return a fault with its probabilities, all other faults given."""
     others = [each for each in found if each is not fault]
     taken = {each.view for each in others}
     base = quadratic.evidence(others)
-    gains: dict[int, list[tuple[Fault, float]]] = {
+    gains: dict[int, list[tuple[FaultHypothesis, float]]] = {
         view: [
             (each, quadratic.evidence([*others, each]) - base + prior)
             for each, prior in candidates(len(quadratic.H), view)

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Bools, Floats
-from mvpose.calibration.joint_tracks import JointTracks
+from mvpose.calibration.joint_tracks import ImageTracks
 from mvpose.camera import Rig
 
 _TURN, _SHIFT = np.radians(3.0), 0.3  # rad, m: standard deviations of the errors of cameras, before any data
@@ -66,7 +66,7 @@ class ClockAdjustment:
     settled: bool = True
 
 
-def adjust(rig: Rig, tracks: JointTracks, start: Floats) -> ClockAdjustment:
+def adjust(rig: Rig, tracks: ImageTracks, start: Floats) -> ClockAdjustment:
     """Return the offsets of the clocks near a start.
 
     Args:
@@ -104,7 +104,7 @@ def adjust(rig: Rig, tracks: JointTracks, start: Floats) -> ClockAdjustment:
     return replace(_solution(equations, offsets, prior, instants, terms.spread), settled=settled)
 
 
-def _instants(tracks: JointTracks) -> Floats:
+def _instants(tracks: ImageTracks) -> Floats:
     """Return times at which the joints are compared, (K,), seconds: evenly spaced, as many as are of use."""
     times = np.nanmedian(tracks.times, axis=1)
     joints = (np.isfinite(tracks.points[..., 0]).sum(axis=1) >= 2).sum()
@@ -169,7 +169,7 @@ class _Equations:
     memory: float
 
 
-def _equations(tracks: JointTracks, terms: _Terms, instants: Floats, memory: float) -> _Equations:
+def _equations(tracks: ImageTracks, terms: _Terms, instants: Floats, memory: float) -> _Equations:
     """Return the normal equations of all tracks, for residuals that go like ``memory`` times the one before."""
     views = terms.seen.shape[2]
     size, clocks = views * _PARAMETERS, np.arange(views) * _PARAMETERS + 6
@@ -241,7 +241,7 @@ def _solution(equations: _Equations, offsets: Floats, prior: Floats, times: Floa
 
 
 def _terms(
-    tracks: JointTracks, instants: Floats, offsets: Floats, turns: Floats, centers: Floats, scale: float
+    tracks: ImageTracks, instants: Floats, offsets: Floats, turns: Floats, centers: Floats, scale: float
 ) -> _Terms:
     """Return the terms at offsets (V,) and cameras with rotations (V, 3, 3) and centres (V, 3)."""
     points, speeds, sigma = (np.moveaxis(each, 1, 2) for each in tracks.sample(instants[:, None] - offsets))

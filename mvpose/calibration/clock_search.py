@@ -11,7 +11,7 @@ import itertools
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.calibration.joint_tracks import JointTracks
+from mvpose.calibration.joint_tracks import ImageTracks
 from mvpose.camera import Rig
 
 _MOST = 3000  # points of a view that are compared at each shift
@@ -19,7 +19,7 @@ _LEAST = 30  # points that two views share, for a pair to count
 _ROUNDS = 20
 
 
-def coarse_offsets(rig: Rig, tracks: JointTracks, *, largest: float) -> Floats:
+def coarse_offsets(rig: Rig, tracks: ImageTracks, *, largest: float) -> Floats:
     """Return offsets of the clocks, (V,), seconds: whole frames, true time minus given time, some of them 0.
 
     Args:

@@ -20,7 +20,7 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.calibration.clock_adjustment import ClockAdjustment, adjust
 from mvpose.calibration.clock_search import coarse_offsets
 from mvpose.calibration.findings import Finding, camera_names
-from mvpose.calibration.joint_tracks import JointTracks
+from mvpose.calibration.joint_tracks import ImageTracks
 from mvpose.calibration.picture_order import ClockStep, find_step, joined_steps, repeated_pictures
 from mvpose.calibration.sightings import Sightings, gather
 from mvpose.camera import Rig
@@ -170,7 +170,7 @@ def estimate_clocks(
     sightings = recording if isinstance(recording, Sightings) else gather(rig, recording, period=period)
     repeated = repeated_pictures(sightings)
     part, first = _busiest(sightings)
-    tracks = JointTracks.of(rig, part, without=repeated[first : first + len(part.times)])
+    tracks = ImageTracks.of_sightings(rig, part, without=repeated[first : first + len(part.times)])
     names = camera_names(rig)
     if not _comparable(tracks):
         return _unknown(names, repeated, sightings.times, tracks.period)
@@ -204,7 +204,7 @@ def _busiest(sightings: Sightings) -> tuple[Sightings, int]:
     return replace(inside, frame=inside.frame - first, times=inside.times[first : first + _MOST_FRAMES]), first
 
 
-def _comparable(tracks: JointTracks) -> bool:
+def _comparable(tracks: ImageTracks) -> bool:
     """Return whether views share enough for any comparison."""
     return bool((np.isfinite(tracks.points[..., 0]).sum(axis=1) >= 2).sum() >= _FEWEST)
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mvpose.calibration.consistency import Reading
-from mvpose.calibration.conventions import Verdict
+from mvpose.calibration.conventions import FoundMistake
 from mvpose.calibration.findings import Finding
 
 _UNITS = {
@@ -27,7 +27,7 @@ _ODD = 1.6  # times as large or as small as adults: an alarm; a child of six has
 _UNUSUAL = 1.25  # a note
 
 
-def of(verdict: Verdict, names: Sequence[str]) -> Finding:
+def mistake_finding(verdict: FoundMistake, names: Sequence[str]) -> Finding:
     """Return the finding of a mistake in the files."""
     mistake = verdict.mistake
     named = [names[view] for view in mistake.views]

@@ -37,7 +37,7 @@ _NOTHING = 0.8  # prior probability that the files are right
 
 
 @dataclass(frozen=True)
-class Verdict:
+class FoundMistake:
     """A mistake found.
 
     Attributes:
@@ -55,7 +55,7 @@ class Verdict:
 
 def search(
     consistency: Consistency, given: Reading, offsets: OffsetSearch, corrected: Callable[[Reading], Reading]
-) -> tuple[Reading, list[Verdict]]:
+) -> tuple[Reading, list[FoundMistake]]:
     """Return the reading under which the cameras agree best, and the mistakes that lead to it, in the order found.
 
     Args:
@@ -99,7 +99,7 @@ def hypotheses(reading: Reading, sizes: Sequence[Size]) -> Iterator[tuple[Mistak
 
 def _best(
     consistency: Consistency, reading: Reading, offsets: OffsetSearch, corrected: Callable[[Reading], Reading]
-) -> tuple[Reading, Verdict] | None:
+) -> tuple[Reading, FoundMistake] | None:
     """Return the reading without the likeliest mistake, and the mistake; None if none is certain.
 
     A mistake is named only if it explains clearly more than corrections of the poses do. Crops and turns are searched
@@ -108,15 +108,15 @@ def _best(
     best = _likeliest(consistency, reading, hypotheses(reading, offsets.sizes))
     if best is None and _explained(consistency, reading):
         return None
-    now = _Moved.of(consistency, reading, corrected)
-    then = None if best is None else _Moved.of(consistency, best[0], corrected)
+    now = _Moved.corrected(consistency, reading, corrected)
+    then = None if best is None else _Moved.corrected(consistency, best[0], corrected)
     if then is not None and not then.explains_more_than(now):
         best, then = None, None
     latest = then or now
     if latest.small and _explained(consistency, latest.reading):
         return best
     other = _likeliest(consistency, reading, offsets.candidates(reading))
-    if other is None or not _Moved.of(consistency, other[0], corrected).explains_more_than(latest):
+    if other is None or not _Moved.corrected(consistency, other[0], corrected).explains_more_than(latest):
         return best
     return other
 
@@ -138,9 +138,9 @@ class _Moved:
     largest: float
 
     @classmethod
-    def of(cls, consistency: Consistency, reading: Reading, corrected: Callable[[Reading], Reading]) -> _Moved:
+    def corrected(cls, consistency: Consistency, reading: Reading, correction: Callable[[Reading], Reading]) -> _Moved:
         """Return a reading with corrected cameras."""
-        moved = corrected(reading)
+        moved = correction(reading)
         before, after = reading.cameras, moved.cameras
         turns = after[:, 5:14].reshape(-1, 3, 3) @ before[:, 5:14].reshape(-1, 3, 3).swapaxes(1, 2)
         angles = Rotation.from_matrix(turns).magnitude()
@@ -167,7 +167,7 @@ def _explained(consistency: Consistency, reading: Reading) -> bool:
 
 def _likeliest(
     consistency: Consistency, reading: Reading, candidates: Iterator[tuple[Mistake, Reading]]
-) -> tuple[Reading, Verdict] | None:
+) -> tuple[Reading, FoundMistake] | None:
     now = consistency(reading).sum()
     mistakes, readings, scores = [], [], []
     for mistake, other in candidates:
@@ -190,4 +190,4 @@ def _likeliest(
     wanted = max(_AGREES * float(np.median(rest)) if len(rest) > 1 else 0.0, _LEAST_AGREEMENT)
     if np.mean(after[views]) < wanted:
         return None
-    return readings[best], Verdict(named, probability, float(gains[best]), len(views) == len(after))
+    return readings[best], FoundMistake(named, probability, float(gains[best]), len(views) == len(after))

@@ -9,23 +9,23 @@ import numpy as np
 
 from mvpose.arrays import Floats, Integers
 from mvpose.calibration import camera_findings, convention_findings
-from mvpose.calibration.cameras import Fit, fit
+from mvpose.calibration.cameras import CameraFit, fit
 from mvpose.calibration.clocks import estimate_clocks
 from mvpose.calibration.consistency import Consistency, Reading
-from mvpose.calibration.conventions import Verdict, search
+from mvpose.calibration.conventions import FoundMistake, search
 from mvpose.calibration.findings import Diagnosis, Finding, camera_names
 from mvpose.calibration.joint_views import joint_views
 from mvpose.calibration.mismatches import without_mismatches
 from mvpose.calibration.normal_equations import JointViews, residuals_of_others, with_errors
 from mvpose.calibration.people_size import relative_size
 from mvpose.calibration.picture_offsets import COARSE_SPACING, OffsetSearch, blurred
-from mvpose.calibration.pieces import cut
+from mvpose.calibration.pieces import cut_into_windows
 from mvpose.calibration.reread import reread_rig, reread_tracklets
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
 from mvpose.calibration.sufficiency import DIFFERENT, RECORD, travelled, unknowns
 from mvpose.calibration.tracklet_matching import PeopleGroups
 from mvpose.calibration.tracklets import Tracklets, link
-from mvpose.calibration.views import Agreement, silent_views, strangers
+from mvpose.calibration.views import PairAgreement, silent_views, strangers
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 
@@ -49,13 +49,15 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     tracklets = link(rig, frames, period=period)
     if not len(tracklets.frame):
         empty = Finding("cannot-tell", "cannot tell: there are no detections", "unknown", 1.0, mend=RECORD)
-        return Diagnosis.of([empty], evidence=[], cameras=names, residuals=np.full(len(rig), np.nan))
+        return Diagnosis.of_findings([empty], evidence=[], cameras=names, residuals=np.full(len(rig), np.nan))
     detections = np.bincount(tracklets.view, minlength=len(rig))
     findings = silent_views(detections, names)
-    consistency = Consistency(cut(tracklets))
+    consistency = Consistency(cut_into_windows(tracklets))
     reading, mistakes = _without_mistakes(rig, tracklets, consistency)
     turned = {each.mistake.views[0] for each in mistakes if each.mistake.kind == "moved-camera"}
-    findings += [convention_findings.of(each, names) for each in mistakes if each.mistake.kind != "moved-camera"]
+    findings += [
+        convention_findings.mistake_finding(each, names) for each in mistakes if each.mistake.kind != "moved-camera"
+    ]
     ratio, bones = relative_size(consistency, reading, tracklets.skeleton)
     reading, unit = convention_findings.unit(reading, ratio)
     findings += unit
@@ -66,7 +68,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     matched = match_over_time(mended, tracklets)
     sightings, joints, rows, result = _fitted(mended, tracklets, matched)
     moved = replace(reading, cameras=matched.rig.packed)
-    agreement = Agreement.of(consistency, reading, _corrected(reading, result), moved)
+    agreement = PairAgreement.measured(consistency, reading, _corrected(reading, result), moved)
     found_strangers = strangers(agreement, detections, names)
     if found_strangers:
         sightings = sightings.select(
@@ -89,11 +91,12 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     findings += missing
     starts = np.array([times[first][joints.block == block].min(initial=np.inf) for block in range(joints.blocks)])
     undetermined = any(each.camera is None for each in missing)
-    of_cameras = camera_findings.of(result, mended, starts, names, undetermined=undetermined)
+    of_cameras = camera_findings.findings_of_cameras(result, mended, starts, names, undetermined=undetermined)
     findings += [each for each in of_cameras if each.view not in turned or each.kind != "moved-camera"]
     after = _corrected(reading, result).cameras
     findings += [
-        camera_findings.of_turn(rig, after, result.covariance[view], view, names) for view in sorted(turned - useless)
+        camera_findings.turn_finding(rig, after, result.covariance[view], view, names)
+        for view in sorted(turned - useless)
     ]
     different = any(DIFFERENT in each.text for each in missing)  # then neither files nor clocks can be compared
     if not different:
@@ -102,7 +105,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     if undetermined:
         findings = [replace(each, severity="unknown") if _doubtful(each, different) else each for each in findings]
     residuals = residuals_of_others(mended.packed, joints, scale=result.equations.scale)
-    return Diagnosis.of(
+    return Diagnosis.of_findings(
         findings,
         evidence=_evidence(result, times, agreement, ratio, bones, residuals, names),
         cameras=names,
@@ -110,7 +113,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     )
 
 
-def _without_mistakes(rig: Rig, tracklets: Tracklets, consistency: Consistency) -> tuple[Reading, list[Verdict]]:
+def _without_mistakes(rig: Rig, tracklets: Tracklets, consistency: Consistency) -> tuple[Reading, list[FoundMistake]]:
     """Return the files of a rig as they should be read, and the mistakes in them."""
 
     def corrected(reading: Reading) -> Reading:
@@ -121,7 +124,7 @@ def _without_mistakes(rig: Rig, tracklets: Tracklets, consistency: Consistency) 
         return replace(reading, cameras=found.packed)
 
     sizes = [camera.size for camera in rig]
-    coarse = Consistency(blurred(cut(tracklets, spacing=COARSE_SPACING), sizes))
+    coarse = Consistency(blurred(cut_into_windows(tracklets, spacing=COARSE_SPACING), sizes))
     offsets = OffsetSearch(consistency, coarse, sizes)
     return search(consistency, Reading.as_given(rig.packed), offsets, corrected)
 
@@ -141,7 +144,7 @@ def _doubtful(finding: Finding, different: bool) -> bool:
     return finding.severity == "alarm" and finding.kind not in _USELESS and (different or finding.kind in _SUBTLE)
 
 
-def _fitted(rig: Rig, tracklets: Tracklets, groups: PeopleGroups) -> tuple[Sightings, JointViews, Integers, Fit]:
+def _fitted(rig: Rig, tracklets: Tracklets, groups: PeopleGroups) -> tuple[Sightings, JointViews, Integers, CameraFit]:
     """Return the matched sightings, the joints among them, their rows, and the fit of the cameras."""
     matched = sightings_of(tracklets, groups.person)
     sightings = without_mismatches(rig.packed, matched, *joint_views(matched))
@@ -149,12 +152,12 @@ def _fitted(rig: Rig, tracklets: Tracklets, groups: PeopleGroups) -> tuple[Sight
     return sightings, joints, rows, fit(rig.packed, joints)
 
 
-def _corrected(reading: Reading, result: Fit) -> Reading:
+def _corrected(reading: Reading, result: CameraFit) -> Reading:
     """Return the reading with the estimated corrections of the cameras, at the end of the recording."""
     return replace(reading, cameras=with_errors(reading.cameras, result.change.reshape(1, -1))[0, :, :22].copy())
 
 
-def _with_found_lenses(rig: Rig, reading: Reading, result: Fit) -> Rig:
+def _with_found_lenses(rig: Rig, reading: Reading, result: CameraFit) -> Rig:
     """Return the rig with the intrinsics of cameras whose intrinsics were found to be wrong.
 
     Poses are corrected along with the clocks (:mod:`.clock_adjustment`), lenses are not.
@@ -188,9 +191,9 @@ def _travelled(sightings: Sightings, rows: Integers, joints: Floats) -> float:
 
 
 def _evidence(
-    result: Fit,
+    result: CameraFit,
     times: Floats,
-    agreement: Agreement,
+    agreement: PairAgreement,
     ratio: float,
     bones: int,
     residuals: Floats,

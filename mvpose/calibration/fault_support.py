@@ -14,7 +14,7 @@ import numpy as np
 
 from mvpose.arrays import Bools, Floats
 from mvpose.calibration.camera_evidence import Quadratic, temper_of, vector
-from mvpose.calibration.camera_models import MODELS, Fault
+from mvpose.calibration.camera_models import MODELS, FaultHypothesis
 from mvpose.calibration.normal_equations import JointViews, NormalEquations, normal_equations, with_errors
 
 _MOST_PEOPLE = 8  # who are tried, those with the most joints in the view
@@ -25,8 +25,8 @@ camera had moved (Shelf, 38 draws apart from those of the benchmark)."""
 
 
 def is_for_everybody(
-    fault: Fault,
-    found: Sequence[Fault],
+    fault: FaultHypothesis,
+    found: Sequence[FaultHypothesis],
     cameras: Floats,
     errors: Floats,
     sightings: JointViews,
@@ -58,12 +58,12 @@ def is_for_everybody(
     parts.append((H, b))
     quadratic = Quadratic(np.concatenate([H for H, _ in parts]), np.concatenate([b for _, b in parts]), temper)
 
-    def of(each: Fault, people_of: Bools) -> Fault:
+    def restricted(each: FaultHypothesis, people_of: Bools) -> FaultHypothesis:
         return replace(each, profile=np.outer(people_of, each.profile).ravel())
 
     def evidence(people_of: Bools) -> float:
-        known = [of(each, np.ones(len(parts), np.bool_)) for each in found]
-        return max(quadratic.evidence([*known, of(replace(fault, model=model), people_of)]) for model in MODELS)
+        known = [restricted(each, np.ones(len(parts), np.bool_)) for each in found]
+        return max(quadratic.evidence([*known, restricted(replace(fault, model=model), people_of)]) for model in MODELS)
 
     alone = np.eye(len(parts), dtype=np.bool_)[:-1]
     return evidence(np.ones(len(parts), np.bool_)) > max(evidence(each) for each in alone) - _RARER

@@ -152,7 +152,7 @@ class Diagnosis(Sealed):
         object.__setattr__(self, "residuals", as_array(self.residuals, (len(self.cameras),), "residuals"))
 
     @classmethod
-    def of(
+    def of_findings(
         cls, findings: Sequence[Finding], *, evidence: Sequence[str], cameras: Sequence[str], residuals: Floats
     ) -> Diagnosis:
         """Return the diagnosis of findings in any order, with the verdict that follows from them."""

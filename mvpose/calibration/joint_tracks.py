@@ -23,7 +23,7 @@ _FRAMES = 1.6  # least bandwidth in frames: a neighbour on each side has weight
 
 
 @dataclass(frozen=True)
-class JointTracks:
+class ImageTracks:
     """Tracks of G joints (of a person each) in V views over F frames, in normalised coordinates without distortion.
 
     Attributes:
@@ -43,7 +43,7 @@ class JointTracks:
     period: float
 
     @classmethod
-    def of(cls, rig: Rig, sightings: Sightings, *, without: Bools | None = None) -> JointTracks:
+    def of_sightings(cls, rig: Rig, sightings: Sightings, *, without: Bools | None = None) -> ImageTracks:
         """Return the tracks of sightings.
 
         Args:
@@ -118,7 +118,7 @@ def _filled(times: Floats) -> Floats:
 
 @njit(cache=True)
 def _sample(points, sigma, times, at, bandwidth):
-    """Fit a parabola to each track around each time; see :meth:`JointTracks.sample`."""
+    """Fit a parabola to each track around each time; see :meth:`ImageTracks.sample`."""
     tracks, views = sigma.shape[:2]
     values = np.full((tracks, views, len(at), 2), np.nan)
     speeds = np.full((tracks, views, len(at), 2), np.nan)

@@ -50,7 +50,7 @@ class Pieces:
         return self.start.shape[1]
 
 
-def cut(tracklets: Tracklets, *, spacing: float = _SPACING, window: float = _WINDOW) -> Pieces:
+def cut_into_windows(tracklets: Tracklets, *, spacing: float = _SPACING, window: float = _WINDOW) -> Pieces:
     """Return the detections of frames about ``spacing`` seconds apart, in windows of ``window`` seconds."""
     views = tracklets.times.shape[1]
     chosen = chosen_frames(tracklets, spacing=spacing)

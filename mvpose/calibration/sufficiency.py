@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.calibration.camera_models import MODELS, Fault
-from mvpose.calibration.cameras import Fit
+from mvpose.calibration.camera_models import MODELS, FaultHypothesis
+from mvpose.calibration.cameras import CameraFit
 from mvpose.calibration.findings import Finding
-from mvpose.calibration.views import Agreement
+from mvpose.calibration.views import PairAgreement
 
 _SECONDS = 3.0  # of people whom several views see; errors of a detector last for half a second
 _TRAVELLED = 1.0  # metres, all people together
@@ -46,11 +46,11 @@ def travelled(places: Floats) -> float:
 
 
 def unknowns(
-    fit: Fit,
+    fit: CameraFit,
     *,
     seconds: float,
     moved: float,
-    agreement: Agreement,
+    agreement: PairAgreement,
     left_out: set[int],
     names: Sequence[str],
 ) -> list[Finding]:
@@ -100,11 +100,11 @@ def unknowns(
     return findings
 
 
-def _uncertainty(fit: Fit, view: int, views: int) -> tuple[float, float]:
+def _uncertainty(fit: CameraFit, view: int, views: int) -> tuple[float, float]:
     """Return the standard deviations of turn (rad) and shift (m) of a camera of which nothing is believed."""
     widest = max((each for each in MODELS if each.kind == "moved-camera"), key=lambda each: each.sigma)
     blocks = len(fit.quadratic.H)
-    _, covariance = fit.quadratic.posterior([Fault(widest, view, "always", np.ones(blocks))])
+    _, covariance = fit.quadratic.posterior([FaultHypothesis(widest, view, "always", np.ones(blocks))])
     pose = covariance[-6:, -6:]
     return float(np.sqrt(np.trace(pose[:3, :3]) / 3)), float(np.sqrt(np.trace(pose[3:, 3:]) / 3))
 

@@ -25,7 +25,7 @@ _SHARED = 0.40  # agreement from which two views see the same people
 
 
 @dataclass(frozen=True)
-class Agreement:
+class PairAgreement:
     """How well pairs of views agree.
 
     Attributes:
@@ -36,7 +36,7 @@ class Agreement:
     pairs: Floats
 
     @classmethod
-    def of(cls, consistency: Consistency, *readings: Reading) -> Agreement:
+    def measured(cls, consistency: Consistency, *readings: Reading) -> PairAgreement:
         """Return the agreement of all pairs of views, at each time under the best of some readings."""
         evidence = np.max([consistency(each) for each in readings], axis=0).sum(axis=2)
         ideal = consistency.ideal(readings[0]).sum(axis=2)
@@ -82,7 +82,7 @@ def silent_views(detections: Integers, names: Sequence[str]) -> list[Finding]:
     return findings
 
 
-def strangers(agreement: Agreement, detections: Integers, names: Sequence[str]) -> list[Finding]:
+def strangers(agreement: PairAgreement, detections: Integers, names: Sequence[str]) -> list[Finding]:
     """Return findings about views that agree with no other view, where the others agree with each other.
 
     Args:

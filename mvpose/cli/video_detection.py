@@ -15,7 +15,7 @@ from mvpose.cli.progress import bar
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import parse_json, read_bytes
 from mvpose.formats.pictures import PictureSource
-from mvpose.networks.detector import Found, PersonDetector
+from mvpose.networks.detector import PeopleInPicture, PersonDetector
 from mvpose.networks.people import detect_people
 from mvpose.networks.pose import PoseHead
 
@@ -77,7 +77,7 @@ def networks_text(detector: Path, pose: Path | None, *, least: float, kind: str)
     return " ".join([*digests, f"{least:g}", kind])
 
 
-def _failing(founds: Iterator[Found]) -> Iterator[Found]:
+def _failing(founds: Iterator[PeopleInPicture]) -> Iterator[PeopleInPicture]:
     """Yield what a network finds; its errors become a RunError, those of a damaged video stay."""
     while True:
         try:
@@ -107,7 +107,7 @@ def _digest(source: PictureSource) -> list[Any]:
     return [source.name, source.count, list(source.size), stat.st_size, stat.st_mtime_ns]
 
 
-def _instances(found: Found) -> list[dict[str, Any]]:
+def _instances(found: PeopleInPicture) -> list[dict[str, Any]]:
     """Return the people of a picture as MMPose writes them; a keypoint that is missing is 0, 0 with score 0."""
     assert found.keypoints is not None, "the detector or the head gives them"
     assert found.keypoint_scores is not None

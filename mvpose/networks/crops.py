@@ -117,7 +117,7 @@ def check_images(images: Images, view: NDArray[np.int64], boxes: Floats) -> None
             raise ValueError(f"image of view {index} must be (h, w, 3) uint8, red green blue, got {got}")
 
 
-def cut(
+def crop_images(
     images: Images, view: NDArray[np.int64], placement: Placement, size: tuple[int, int], *, fill: tuple[int, int, int]
 ) -> Pixels:
     """Cut crops out of images, (m, height, width, 3), red green blue.

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.networks.card import Card
-from mvpose.networks.crops import Pixels, Placement, cut
+from mvpose.networks.crops import Pixels, Placement, crop_images
 from mvpose.networks.session import Provider, Session
 
 Kind = Literal["yolox", "rtmdet", "rtmo", "yolo"]
@@ -44,7 +44,7 @@ _BOX = 5  # columns of boxes after non-maximum suppression: corners and score
 
 
 @dataclass(frozen=True)
-class Found:
+class PeopleInPicture:
     """People in one picture.
 
     Attributes:
@@ -59,10 +59,10 @@ class Found:
     keypoints: Floats | None = None
     keypoint_scores: Floats | None = None
 
-    def select(self, rows: NDArray[np.int64]) -> Found:
+    def select(self, rows: NDArray[np.int64]) -> PeopleInPicture:
         """Return some people, in a given order."""
         kept = [None if each is None else each[rows] for each in (self.keypoints, self.keypoint_scores)]
-        return Found(self.boxes[rows], self.scores[rows], *kept)
+        return PeopleInPicture(self.boxes[rows], self.scores[rows], *kept)
 
 
 class PersonDetector:
@@ -103,22 +103,22 @@ class PersonDetector:
             self._session.card = replace(CARDS[self.kind], size=self._session.size)
         self.one_stage = self.find(np.zeros((64, 64, 3), np.uint8)).keypoints is not None
 
-    def find(self, picture: Pixels) -> Found:
+    def find(self, picture: Pixels) -> PeopleInPicture:
         """Return the people in a picture, (h, w, 3) uint8, red green blue, the most confident first."""
         size = self._session.size
         height, width = picture.shape[:2]
         stride = max(width / size[0], height / size[1])
         origin = np.full((1, 2), 0.5 * stride - 0.5)
         placement = Placement(origin, np.full((1, 2), stride))
-        crop = cut([picture], np.zeros(1, np.int64), placement, size, fill=_FILL)
+        crop = crop_images([picture], np.zeros(1, np.int64), placement, size, fill=_FILL)
         found = self._decoded(self._session.outputs_of(crop))
         rows = np.argsort(-found.scores, kind="stable")
         found = found.select(rows[found.scores[rows] >= self._least])
         found = found.select(suppressed(found.boxes, overlap=self._overlap))
         keypoints = None if found.keypoints is None else stride * found.keypoints
-        return Found(stride * found.boxes, np.minimum(found.scores, 1.0), keypoints, found.keypoint_scores)
+        return PeopleInPicture(stride * found.boxes, np.minimum(found.scores, 1.0), keypoints, found.keypoint_scores)
 
-    def _decoded(self, outputs: Sequence[NDArray[Any]]) -> Found:
+    def _decoded(self, outputs: Sequence[NDArray[Any]]) -> PeopleInPicture:
         if len(outputs) == 1 and outputs[0].ndim == 3 and outputs[0].shape[2] != _BOX:
             values = outputs[0][0].astype(float)
             return decode_yolox(values, self._session.size) if self.kind == "yolox" else decode_yolo(values)
@@ -126,7 +126,7 @@ class PersonDetector:
         corners, scores = boxes[:, :4], boxes[:, 4]
         labels = next((each[0] for each in outputs if each.ndim == 2), np.zeros(len(boxes)))
         points = next((each[0] for each in outputs if each.ndim == 4), None)
-        found = Found(_of_corners(corners), np.where(labels == _PERSON, scores, 0.0))
+        found = PeopleInPicture(_of_corners(corners), np.where(labels == _PERSON, scores, 0.0))
         if points is None:
             return found
         return replace(found, keypoints=points[..., :2].astype(float), keypoint_scores=np.clip(points[..., 2], 0, 1))
@@ -179,7 +179,7 @@ class _PictureSession(Session):
         return sides[0], sides[1]
 
 
-def decode_yolox(values: Floats, size: tuple[int, int]) -> Found:
+def decode_yolox(values: Floats, size: tuple[int, int]) -> PeopleInPicture:
     """Return the boxes of all cells, (A, 5 + C): x, y relative to the cell, log width and height, in strides."""
     grids, strides = [], []
     for each in _STRIDES:
@@ -189,18 +189,18 @@ def decode_yolox(values: Floats, size: tuple[int, int]) -> Found:
     stride = np.concatenate(strides)[:, None]
     middle = (values[:, :2] + np.concatenate(grids)) * stride
     sides = np.exp(np.minimum(values[:, 2:4], 20.0)) * stride
-    return Found(np.concatenate([middle - sides / 2, sides], axis=1), values[:, 4] * values[:, 5 + _PERSON])
+    return PeopleInPicture(np.concatenate([middle - sides / 2, sides], axis=1), values[:, 4] * values[:, 5 + _PERSON])
 
 
-def decode_yolo(values: Floats) -> Found:
+def decode_yolo(values: Floats) -> PeopleInPicture:
     """Return the boxes of all cells, (4 + C, A), and their keypoints, (5 + 3 J, A): middle, width, height in pixels."""
     x, y, width, height, score = values[:5]
     boxes = np.stack([x - width / 2, y - height / 2, width, height], axis=1)
     points = values[5:]
     if len(points) < 3 or len(points) % 3 or np.abs(points).max(initial=0.0) <= 1.0:  # other classes
-        return Found(boxes, score)
+        return PeopleInPicture(boxes, score)
     points = points.reshape(-1, 3, points.shape[1]).transpose(2, 0, 1)
-    return Found(boxes, score, points[..., :2], np.clip(points[..., 2], 0.0, 1.0))
+    return PeopleInPicture(boxes, score, points[..., :2], np.clip(points[..., 2], 0.0, 1.0))
 
 
 def suppressed(boxes: Floats, *, overlap: float) -> NDArray[np.int64]:

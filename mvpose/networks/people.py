@@ -9,14 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from mvpose.networks.crops import Pixels
-from mvpose.networks.detector import Found, PersonDetector
+from mvpose.networks.detector import PeopleInPicture, PersonDetector
 from mvpose.networks.pose import PoseHead
 from mvpose.networks.session import Provider, Session
 from mvpose.skeleton import COCO17, Skeleton
 from mvpose.wholebody import SKELETONS, skeleton_by_name
 
 
-def detect_people(pictures: Iterable[Pixels], detector: PersonDetector, head: PoseHead | None) -> Iterator[Found]:
+def detect_people(
+    pictures: Iterable[Pixels], detector: PersonDetector, head: PoseHead | None
+) -> Iterator[PeopleInPicture]:
     """Yield the people of every picture with their keypoints.
 
     Args:
@@ -51,6 +53,6 @@ def open_head(path: str | Path, *, provider: Provider = "cpu", threads: int = 1)
     return PoseHead(session, skeleton=skeleton, likelihoods=False)
 
 
-def _nobody(head: PoseHead | None) -> Found:
+def _nobody(head: PoseHead | None) -> PeopleInPicture:
     joints = len(COCO17 if head is None else head.skeleton)
-    return Found(np.zeros((0, 4)), np.zeros(0), np.zeros((0, joints, 2)), np.zeros((0, joints)))
+    return PeopleInPicture(np.zeros((0, 4)), np.zeros(0), np.zeros((0, joints, 2)), np.zeros((0, joints)))

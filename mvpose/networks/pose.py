@@ -13,7 +13,7 @@ from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from mvpose.detections import Detections
 from mvpose.heatmaps import Heatmaps
-from mvpose.networks.crops import Images, Placement, check_images, cut, in_view, padded, stretched
+from mvpose.networks.crops import Images, Placement, check_images, crop_images, in_view, padded, stretched
 from mvpose.networks.decoding import Cells, Values, outer_product, placed_heatmaps, simcc_modes
 from mvpose.networks.session import Session, as_session
 from mvpose.skeleton import COCO17, Skeleton
@@ -141,7 +141,7 @@ class PoseHead:
         return outputs
 
     def _run(self, images: Images, view: NDArray[np.int64], placement: Placement) -> list[Values]:
-        outputs = self.session(cut(images, view, placement, self.session.size, fill=_BLACK))
+        outputs = self.session(crop_images(images, view, placement, self.session.size, fill=_BLACK))
         if self._joints_last:
             outputs = [np.moveaxis(values, -1, 1) for values in outputs]
         return [values / np.float32(self.session.card.peak) for values in outputs]

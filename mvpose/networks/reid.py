@@ -12,7 +12,7 @@ from mvpose.affinity import AppearanceAffinity
 from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from mvpose.detections import Detections
-from mvpose.networks.crops import Images, check_images, cut, in_view, stretched
+from mvpose.networks.crops import Images, check_images, crop_images, in_view, stretched
 from mvpose.networks.session import Session, as_session
 
 DEFAULT = Path(__file__).parent / "data" / "reid.onnx"
@@ -102,7 +102,7 @@ class ReId:
         seen = in_view(images, view, whole, self.session.size, least=_LEAST)
         red, green, blue = (round(255 * min(max(mean, 0.0), 1.0)) for mean in self.session.card.mean)
         placement = whole.select(seen)
-        crops = cut(images, view[seen], placement, self.session.size, fill=(red, green, blue))
+        crops = crop_images(images, view[seen], placement, self.session.size, fill=(red, green, blue))
         result = np.full((len(view), self.dimensions), np.nan)
         (raw,) = self.session(crops)
         raw = raw.reshape(len(crops), self.dimensions).astype(np.float64)

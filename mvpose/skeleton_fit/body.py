@@ -16,11 +16,11 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.skeleton import Skeleton
 from mvpose.skeleton_fit import joint_limits
-from mvpose.skeleton_fit.joint_limits import Hinge, Limit
+from mvpose.skeleton_fit.joint_limits import HingeLimit, Limit
 
 
 @dataclass(frozen=True)
-class Segment:
+class BodySegment:
     """Segment of the body.
 
     Attributes:
@@ -74,34 +74,34 @@ _HAND = {
 _CENTRES = {"mid_hip": "Hips", "hip": "Hips", "pelvis": "Hips", "neck": "Neck", "thorax": "Neck"}
 
 
-def _bent(hinge: Hinge) -> tuple[float, float, float]:
+def _bent(hinge: HingeLimit) -> tuple[float, float, float]:
     """Return the rest of a hinge, a rotation vector in degrees: a little bent."""
     x, y, z = hinge.axis
     return (30.0 * x, 30.0 * y, 30.0 * z)
 
 
-def _side(side: str) -> tuple[Segment, ...]:
+def _side(side: str) -> tuple[BodySegment, ...]:
     """Return the segments of one side of the body."""
     name, out = side.capitalize(), (0.0, 1.0 if side == "left" else -1.0, 0.0)
     girdle, arm, forearm, leg = (f"{name}{each}" for each in ("Shoulder", "Arm", "ForeArm", "UpLeg"))
     down, elbow, knee = (0.0, 0.0, -1.0), joint_limits.ELBOWS[side], joint_limits.KNEE
     hanging = (-80.0 * out[1], 0.0, 0.0)
     return (
-        Segment(girdle, "Spine", _Z, "trunk", joint_limits.GIRDLES[side], (_X, _Z), 10.0, 0.8),
-        Segment(arm, girdle, out, "shoulder", joint_limits.SHOULDERS[side], _BALL, _FREE, 1.0, hanging),
-        Segment(forearm, arm, out, "upper arm", elbow, (elbow.axis,), _FREE, 1.0, _bent(elbow)),
-        Segment(f"{name}Hand", forearm, out, "forearm", joint_limits.HANDS[side], (), _FREE),
-        Segment(leg, "Hips", out, "hip", joint_limits.HIPS[side], _BALL, _FREE),
-        Segment(f"{name}Leg", leg, down, "thigh", knee, (knee.axis,), _FREE, 1.0, _bent(knee)),
-        Segment(f"{name}Foot", f"{name}Leg", down, "shank", joint_limits.FEET[side], (), 20.0),
+        BodySegment(girdle, "Spine", _Z, "trunk", joint_limits.GIRDLES[side], (_X, _Z), 10.0, 0.8),
+        BodySegment(arm, girdle, out, "shoulder", joint_limits.SHOULDERS[side], _BALL, _FREE, 1.0, hanging),
+        BodySegment(forearm, arm, out, "upper arm", elbow, (elbow.axis,), _FREE, 1.0, _bent(elbow)),
+        BodySegment(f"{name}Hand", forearm, out, "forearm", joint_limits.HANDS[side], (), _FREE),
+        BodySegment(leg, "Hips", out, "hip", joint_limits.HIPS[side], _BALL, _FREE),
+        BodySegment(f"{name}Leg", leg, down, "thigh", knee, (knee.axis,), _FREE, 1.0, _bent(knee)),
+        BodySegment(f"{name}Foot", f"{name}Leg", down, "shank", joint_limits.FEET[side], (), 20.0),
     )
 
 
 SEGMENTS = (
-    Segment("Hips", "", _Z, "trunk", None, _BALL, np.inf, 0.0),
+    BodySegment("Hips", "", _Z, "trunk", None, _BALL, np.inf, 0.0),
     # Joints do not show how the trunk bends between hips and shoulders: the less of it, the likelier.
-    Segment("Spine", "Hips", _Z, "trunk", joint_limits.SPINE, _BALL, 15.0, 0.2),
-    Segment("Neck", "Spine", _Z, "trunk", joint_limits.NECK, _BALL, 60.0, 0.8),
+    BodySegment("Spine", "Hips", _Z, "trunk", joint_limits.SPINE, _BALL, 15.0, 0.2),
+    BodySegment("Neck", "Spine", _Z, "trunk", joint_limits.NECK, _BALL, 60.0, 0.8),
     *_side("left"),
     *_side("right"),
 )
@@ -117,7 +117,7 @@ _ORIGINS = {
 
 
 @dataclass(frozen=True)
-class Body:
+class ArticulatedBody:
     """Body of one person: its segments and the joints of a skeleton on them, in metres.
 
     Attributes:
@@ -129,7 +129,7 @@ class Body:
         places: their places in the frames of their segments, (M, 3).
     """
 
-    segments: tuple[Segment, ...]
+    segments: tuple[BodySegment, ...]
     offsets: Floats
     joints: tuple[str, ...]
     rows: tuple[int, ...]
@@ -207,5 +207,5 @@ class Body:
         return line
 
 
-def _offsets(segments: tuple[Segment, ...], lengths: dict[str, float]) -> Floats:
+def _offsets(segments: tuple[BodySegment, ...], lengths: dict[str, float]) -> Floats:
     return np.array([np.multiply(each.bone, each.share * lengths[each.length]) for each in segments])

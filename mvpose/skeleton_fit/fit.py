@@ -8,9 +8,9 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.recording import People
-from mvpose.skeleton_fit.body import Body
+from mvpose.skeleton_fit.body import ArticulatedBody
 from mvpose.skeleton_fit.initial_pose import initial_pose
-from mvpose.skeleton_fit.inverse_kinematics import Target, reach
+from mvpose.skeleton_fit.inverse_kinematics import JointTargets, reach
 from mvpose.skeleton_fit.kinematics import Pose
 from mvpose.skeleton_fit.proportions import first_lengths, fitted_body
 
@@ -38,7 +38,7 @@ class FittedBody:
     pose: Pose
 
     @property
-    def body(self) -> Body:
+    def body(self) -> ArticulatedBody:
         """The body: segments, offsets, joints."""
         return self.pose.body
 
@@ -56,19 +56,19 @@ def fit_bodies(people: People) -> list[FittedBody]:
     Raises:
         ValueError: a skeleton without hips and shoulders.
     """
-    template = Body.of_skeleton(people.skeleton)
+    template = ArticulatedBody.of_skeleton(people.skeleton)
     fits = (_fit(people, row, template) for row in range(len(people)))
     return [fit for fit in fits if fit is not None]
 
 
-def _fit(people: People, row: int, body: Body) -> FittedBody | None:
+def _fit(people: People, row: int, body: ArticulatedBody) -> FittedBody | None:
     span, rows = people.span(row), list(body.rows)
     joints = people.joints[span, row][:, rows]
     torso = [body.joints.index(f"{side}_{part}") for side in ("left", "right") for part in ("hip", "shoulder")]
     if np.isfinite(joints[:, torso]).all(axis=(1, 2)).sum() < _FEWEST_FRAMES:
         return None
     covariance = None if people.covariance is None else people.covariance[span, row][:, rows]
-    target = Target(people.times[span], joints, _whitening(joints, covariance))
+    target = JointTargets(people.times[span], joints, _whitening(joints, covariance))
     body = body.resized(first_lengths(body, joints))
     pose = initial_pose(body, _filled(target.times, joints))
     for step, iterations in enumerate(_STEPS):
@@ -78,13 +78,13 @@ def _fit(people: People, row: int, body: Body) -> FittedBody | None:
     return FittedBody(int(people.ids[row]), span.start, target.times, pose)
 
 
-def _in_windows(pose: Pose, target: Target, steps: int) -> Pose:
+def _in_windows(pose: Pose, target: JointTargets, steps: int) -> Pose:
     """Fit long recordings in windows that overlap, so that the memory is bounded."""
     count = len(target.times)
     root, rotations = pose.root.copy(), pose.rotations.copy()
     for start in range(0, max(count - _OVERLAP, 1), _WINDOW - _OVERLAP):
         part = slice(start, min(start + _WINDOW, count))
-        some = Target(target.times[part], target.joints[part], target.whitening[part])
+        some = JointTargets(target.times[part], target.joints[part], target.whitening[part])
         found = reach(Pose(pose.body, root[part], rotations[part]), some, steps=steps)
         skipped = _OVERLAP // 2 if start else 0
         root[start + skipped : part.stop] = found.root[skipped:]

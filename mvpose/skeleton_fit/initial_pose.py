@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.skeleton_fit.body import Body
+from mvpose.skeleton_fit.body import ArticulatedBody
 from mvpose.skeleton_fit.kinematics import Pose
 from mvpose.skeleton_fit.rotations import frame, unit
 
 _STRAIGHT = 0.25  # sine of the angle at an elbow or knee; a straighter limb does not show its axis
 
 
-def initial_pose(body: Body, joints: Floats) -> Pose:
+def initial_pose(body: ArticulatedBody, joints: Floats) -> Pose:
     """Return poses with bones in the directions of the joints.
 
     Args:
@@ -74,7 +74,7 @@ def _axis(upper: Floats, lower: Floats, usual: Floats, front: Floats) -> Floats:
     return axis + 1e-9 * np.roll(upper, 1, axis=-1)  # never exactly zero
 
 
-def _head(body: Body, at: dict[str, Floats], neck: Floats, chest: Floats) -> Floats:
+def _head(body: ArticulatedBody, at: dict[str, Floats], neck: Floats, chest: Floats) -> Floats:
     """Return the rotation of the head in the world, (T, 3, 3), from its joints by the Kabsch algorithm."""
     number = body.index("Neck")
     rows = [k for k, carrier in enumerate(body.carriers) if carrier == number and not body.centres[k]]

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from mvpose.arrays import Floats
-from mvpose.skeleton_fit.body import Body
+from mvpose.skeleton_fit.body import ArticulatedBody
 from mvpose.skeleton_fit.kinematics import Freedom, Pose
 from mvpose.skeleton_fit.rotations import to_matrices, to_vectors
 
@@ -37,7 +37,7 @@ _LEAST_DAMPING, _MOST_DAMPING = 1e-6, 1e6
 
 
 @dataclass(frozen=True)
-class Target:
+class JointTargets:
     """Joints that poses should reach.
 
     Attributes:
@@ -52,7 +52,7 @@ class Target:
     whitening: Floats
 
 
-def reach(pose: Pose, target: Target, *, steps: int) -> Pose:
+def reach(pose: Pose, target: JointTargets, *, steps: int) -> Pose:
     """Return the likeliest poses near given ones, with all rotations within their ranges of motion.
 
     Args:
@@ -98,7 +98,7 @@ class _State:
 
 
 class _Search:
-    def __init__(self, body: Body, target: Target) -> None:
+    def __init__(self, body: ArticulatedBody, target: JointTargets) -> None:
         self._target, self._free = target, Freedom.of_body(body)
         segments = [body.segments[k] for k in self._free.segments]
         self._spreads = np.radians([each.spread for each in segments])

@@ -28,7 +28,7 @@ class Limit(Protocol):
 
 
 @dataclass(frozen=True)
-class Hinge:
+class HingeLimit:
     """Range of a joint with one axis.
 
     Attributes:
@@ -160,5 +160,5 @@ GIRDLES = {"left": _GIRDLE, "right": _mirrored(_GIRDLE)}
 HANDS = {"left": _HAND, "right": _mirrored(_HAND)}
 FEET = {"left": _FOOT, "right": _mirrored(_FOOT)}
 SHOULDERS = {"left": Shoulder(1), "right": Shoulder(-1)}
-ELBOWS = {"left": Hinge((0.0, 0.0, -1.0), -10.0, 150.0), "right": Hinge((0.0, 0.0, 1.0), -10.0, 150.0)}
-KNEE = Hinge((0.0, 1.0, 0.0), -10.0, 150.0)
+ELBOWS = {"left": HingeLimit((0.0, 0.0, -1.0), -10.0, 150.0), "right": HingeLimit((0.0, 0.0, 1.0), -10.0, 150.0)}
+KNEE = HingeLimit((0.0, 1.0, 0.0), -10.0, 150.0)

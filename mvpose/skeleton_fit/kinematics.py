@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from mvpose.arrays import Floats, Integers
-from mvpose.skeleton_fit.body import Body
+from mvpose.skeleton_fit.body import ArticulatedBody
 from mvpose.skeleton_fit.rotations import to_matrices
 
 
@@ -23,7 +23,7 @@ class Pose:
             world.
     """
 
-    body: Body
+    body: ArticulatedBody
     root: Floats
     rotations: Floats
 
@@ -57,12 +57,12 @@ class Freedom:
         axes: the axes in the frames of their segments, (D, 3).
     """
 
-    body: Body
+    body: ArticulatedBody
     segments: Integers
     axes: Floats
 
     @classmethod
-    def of_body(cls, body: Body) -> Freedom:
+    def of_body(cls, body: ArticulatedBody) -> Freedom:
         """Return all axes of a body."""
         pairs = [(k, axis) for k, segment in enumerate(body.segments) for axis in segment.axes]
         return cls(body, np.array([k for k, _ in pairs]), np.array([axis for _, axis in pairs]))

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.skeleton_fit.body import LENGTHS, STATURE, Body
+from mvpose.skeleton_fit.body import LENGTHS, STATURE, ArticulatedBody
 from mvpose.skeleton_fit.kinematics import Pose
 
 _FEWEST = 3  # frames in which a bone must be seen
@@ -39,7 +39,7 @@ _SPANS = {
 _HALVES = ("hip", "shoulder")  # whose span is twice the length
 
 
-def first_lengths(body: Body, joints: Floats) -> dict[str, float]:
+def first_lengths(body: ArticulatedBody, joints: Floats) -> dict[str, float]:
     """Return lengths from the distances between joints (T, M, 3).
 
     A length that is never seen follows from the others by the average proportions of adults.
@@ -52,7 +52,7 @@ def first_lengths(body: Body, joints: Floats) -> dict[str, float]:
     )
 
 
-def fitted_body(pose: Pose, joints: Floats) -> Body:
+def fitted_body(pose: Pose, joints: Floats) -> ArticulatedBody:
     """Return the body with lengths and places of joints as fitted poses show them.
 
     Args:
@@ -96,7 +96,7 @@ def _places(pose: Pose, joints: Floats) -> Floats:
     return places
 
 
-def _spans(body: Body, joints: Floats, name: str) -> Floats:
+def _spans(body: ArticulatedBody, joints: Floats, name: str) -> Floats:
     """Return the vectors from start to end of a length in all frames, (k, T, 3); NaN where absent."""
 
     def middle(names: tuple[str, ...]) -> Floats:

@@ -8,13 +8,13 @@ from mvpose.arrays import Floats, Integers
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.ordering import number_views
-from mvpose.pipeline import Pipeline, enter
+from mvpose.pipeline import Pipeline, prepare_rays
 from mvpose.rays import Rays
 from mvpose.reconstruction.poses import Poses
 from mvpose.tracking.bones import BonePrior
 from mvpose.tracking.frame_kernels import repeats
 from mvpose.tracking.looks import learn_looks, scale_of
-from mvpose.tracking.motion import JointMotion, Motion
+from mvpose.tracking.motion import JointMotion, MotionModel
 from mvpose.tracking.population import Population
 from mvpose.tracking.reappearance import Reappearance
 from mvpose.tracking.recent_pictures import RecentPictures
@@ -41,7 +41,7 @@ class Births:
         pipeline: Pipeline,
         *,
         returns: Reappearance,
-        motion: Motion,
+        motion: MotionModel,
         of_joints: JointMotion,
         newcomers: Floats,
         bones: BonePrior,
@@ -138,7 +138,7 @@ class Births:
             return alone, alone
         both = recent.beside(detections.select(alone), detections.skeleton)
         moved_for = float(np.abs(np.concatenate([lead[alone], recent.rows["time"] - now])).max())
-        chosen, both, rays = enter(rig, both, self._pipeline.duplicates)
+        chosen, both, rays = prepare_rays(rig, both, self._pipeline.duplicates)
         labels = self._pipeline.matching(self._pipeline.affinity(rig, both, rays), number_views(both.view)).labels
         present = chosen < len(alone)
         people, fresh = np.unique(labels[present & (labels >= 0)]), np.full(len(labels), -1)

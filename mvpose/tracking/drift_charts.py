@@ -22,7 +22,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.kernels import njit
 from mvpose.tracking.line_of_sight import in_image
-from mvpose.tracking.picture_shift import TERMS, look, solve_shift
+from mvpose.tracking.picture_shift import TERMS, measure_shifts, solve_shift
 
 NUMBERS = TERMS + 1
 """The numbers of a shift, and the share of stray people."""
@@ -53,7 +53,7 @@ class Charts(NamedTuple):
         keypoints: number of keypoints of the batch, (V,).
         normal: normal equations of the batch, (V, 4, 5).
         people: people of the batch whom the camera found, and stray ones, (V, 2).
-        residual: sums over the latest seconds, (V, 3), see :func:`mvpose.tracking.picture_shift.look`.
+        residual: sums over the latest seconds, (V, 3), see :func:`mvpose.tracking.picture_shift.measure_shifts`.
         batches: number of batches so far, (V,).
         reference: mean numbers of the first minute, (V, 5).
         deviation: mean deviation from them in the latest seconds, (V, 5).
@@ -80,7 +80,7 @@ class Charts(NamedTuple):
     since: Floats
 
     @classmethod
-    def of(cls, cameras: int) -> Charts:
+    def empty(cls, cameras: int) -> Charts:
         """Return the charts of cameras that nobody has looked at."""
         V, nan = cameras, np.nan
         return cls(
@@ -102,7 +102,7 @@ class Charts(NamedTuple):
 
 
 @njit(cache=True)
-def watch(
+def update_charts(
     charts, now, since, pictures, reported, labels, groups, view, origins, directions, weights, pixel, lead, state,
     sigmas, cameras, sizes, smallest, floor, inflation, threshold,
 ):  # fmt: skip
@@ -113,7 +113,7 @@ def watch(
         now: time of the frame, seconds.
         since: time since the latest look at any camera, seconds.
         pictures: whether each camera gave a picture, (V,).
-        reported: as in :func:`mvpose.tracking.picture_shift.look`, and so the next eleven.
+        reported: as in :func:`mvpose.tracking.picture_shift.measure_shifts`, and so the next eleven.
         labels: the same.
         groups: the same.
         view: the same.
@@ -150,7 +150,7 @@ def watch(
         charts.looked[v] = now
         if np.isnan(charts.start[v]):
             charts.start[v] = now
-        charts.keypoints[v] += look(
+        charts.keypoints[v] += measure_shifts(
             v, charts.normal[v], charts.residual[v], age, trusted, reported, labels, groups, view, origins,
             directions, weights, pixel, lead, state, sigmas, cameras,
         )  # fmt: skip

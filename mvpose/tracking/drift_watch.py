@@ -17,7 +17,7 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Rig
 from mvpose.checks import check_numbers
 from mvpose.rays import Rays
-from mvpose.tracking.drift_charts import INTERVAL, NUMBERS, STRAY, Charts, watch
+from mvpose.tracking.drift_charts import INTERVAL, NUMBERS, STRAY, Charts, update_charts
 
 _OFF_CENTRE = math.tan(math.radians(20.0))  # people stand about as far from the image centre as 20 degrees
 _HOUR = 3600.0  # tests of each chart: one a second
@@ -114,7 +114,7 @@ class DriftWatch:
     """
 
     def __init__(self, model: DriftModel, cameras: int) -> None:
-        self.charts = Charts.of(cameras)
+        self.charts = Charts.empty(cameras)
         radians = math.radians(1.0) * np.array([1.0, 1.0, 1.0 / _OFF_CENTRE, 1.0 / _OFF_CENTRE])
         self._settings = model.smallest * radians, model.floor * radians, model.inflation, model.threshold(cameras)
         self._latest = -math.inf  # time of the latest look
@@ -152,7 +152,7 @@ class DriftWatch:
         """
         since = now - self._latest
         if self._enough and since >= INTERVAL / len(pictures):  # the cameras in turn, not all in every frame
-            looked = watch(
+            looked = update_charts(
                 self.charts, now, since, pictures, reported, labels, groups, rays.view, rays.origins,
                 rays.directions, rays.weights, rays.pixel, lead, state, sigmas, cameras, sizes, *self._settings,
             )  # fmt: skip

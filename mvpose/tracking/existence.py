@@ -243,7 +243,7 @@ def gather_evidence(
                 absent[t, v] += 0.0 if seen[t] else step
 
 
-class Clutter:
+class MeasuredClutter:
     """False detections that a tracker has met: how many there are in a picture of each view, and how many flash.
 
     Attributes:

@@ -40,7 +40,7 @@ class JointMotion(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Motion:
+class MotionModel:
     """Speeds and correlation times of the joints of moving people.
 
     The trunk moves as a whole, and the other joints move relative to it. People walk at 1.3 m/s (Bohannon, Age and
@@ -91,7 +91,7 @@ class Motion:
 
 
 @cache
-def _of_joints(motion: Motion, skeleton: Skeleton) -> JointMotion:
+def _of_joints(motion: MotionModel, skeleton: Skeleton) -> JointMotion:
     trunk = {"shoulder", "hip", "neck", "mid_hip"}
     rows = [
         motion.extremities if part in _EXTREMITIES else motion.trunk if part in trunk else motion.middle

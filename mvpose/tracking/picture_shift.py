@@ -26,7 +26,7 @@ _MEMORY = 10.0  # seconds that the mean residuals are over
 
 
 @njit(cache=True)
-def look(
+def measure_shifts(
     watched, normal, residual, since, trusted, reported, labels, groups, view, origins, directions, weights,
     pixel, lead, state, sigmas, cameras,
 ):  # fmt: skip

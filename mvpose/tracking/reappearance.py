@@ -11,7 +11,7 @@ from mvpose.affinity import AppearanceAffinity
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.checks import check_numbers
 from mvpose.tracking.looks import evidence_of_looks
-from mvpose.tracking.motion import Motion, transition
+from mvpose.tracking.motion import MotionModel, transition
 from mvpose.tracking.tracks import Tracks
 
 
@@ -72,7 +72,7 @@ class Reappearance:
         lost: Tracks,
         *,
         time: float,
-        motion: Motion,
+        motion: MotionModel,
         trunk: Bools,
         present: Tracks,
         witnesses: Integers,

@@ -194,7 +194,7 @@ def _check(arrays: Mapping[str, NDArray[Any]]) -> None:
     for name, (shape, kind) in _RECENT.items():
         sizes = {"V": cameras, "k": waiting, "J": joints, "D": descriptor}
         _of(arrays, f"recent.{name}", tuple(sizes.get(size, size) for size in shape), kind)
-    for name, expected in Charts.of(cameras)._asdict().items():
+    for name, expected in Charts.empty(cameras)._asdict().items():
         _of(arrays, f"drift.{name}", expected.shape)
     bones = _of(arrays, "tracks.length", (None, None)).shape[1]
     dimensions = _of(arrays, "tracks.looks", (None, None)).shape[1]

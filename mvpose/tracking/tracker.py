@@ -20,7 +20,7 @@ from mvpose.checks import seal
 from mvpose.detections import Detections
 from mvpose.estimate import Estimate, Matching
 from mvpose.ordering import number_views
-from mvpose.pipeline import Pipeline, enter
+from mvpose.pipeline import Pipeline, prepare_rays
 from mvpose.rays import Rays
 from mvpose.reconstruction.error_scale import SHARED
 from mvpose.reconstruction.poses import Poses
@@ -28,7 +28,7 @@ from mvpose.skeleton import Skeleton
 from mvpose.tracking.births import Births
 from mvpose.tracking.bones import BonePrior, bone_prior
 from mvpose.tracking.drift_watch import CameraResiduals, Drift, DriftWatch
-from mvpose.tracking.existence import Clutter
+from mvpose.tracking.existence import MeasuredClutter
 from mvpose.tracking.frame_kernels import judge_tracks, predict_tracks, report_tracks, update_tracks
 from mvpose.tracking.looks import learn_looks
 from mvpose.tracking.moment import Moment
@@ -142,7 +142,7 @@ class Tracker:
         """
         start = clock.perf_counter()
         first = not self._clock.started
-        frame = self._enter(rig, detections)
+        frame = self._prepare(rig, detections)
         times, ordered = frame.times, frame.ordered
         affinity = self.pipeline.affinity(rig, ordered, frame.rays)
         if ordered.descriptors is not None:
@@ -183,11 +183,11 @@ class Tracker:
         )
         return moment
 
-    def _enter(self, rig: Rig, detections: Detections) -> _Frame:
+    def _prepare(self, rig: Rig, detections: Detections) -> _Frame:
         """Return the detections that take part; refuse bad ones, and leave the tracker as it was then."""
-        chosen, ordered, rays = enter(rig, detections, self.pipeline.duplicates)
+        chosen, ordered, rays = prepare_rays(rig, detections, self.pipeline.duplicates)
         if rig is not self._rig or detections.skeleton is not self._skeleton:
-            self._serve(rig, detections.skeleton)
+            self._bind(rig, detections.skeleton)
         times = self._clock.read(detections, len(rig))
         if times.too_old:
             kept = times.pictures[ordered.view]
@@ -214,7 +214,7 @@ class Tracker:
         model, people, times, ordered, lead = self.model, self._people, frame.times, frame.ordered, frame.lead
         tracks, noise, m = people.tracks, model.noise, len(ordered)
         labels, groups = labels[:m], labels[m:]
-        rays = self._at_once(ordered, frame.rays, labels, groups)
+        rays = self._undo_rolling_shutter(ordered, frame.rays, labels, groups)
         self._watch.take(
             rays, labels, groups, lead, now=times.now, pictures=times.pictures,
             reported=tracks.reported, state=tracks.state, sigmas=self._sigmas, cameras=rig.packed, sizes=self._sizes,
@@ -300,11 +300,11 @@ class Tracker:
         """
         if self._layout is None:
             raise ValueError("a tracker has no state before its first frame")
-        watch, clutter, people = self._clock, self._clutter, self._people
+        now, clutter, people = self._clock, self._clutter, self._people
         return TrackerState(
             {
                 **self._layout,
-                "clock": np.array([watch.interval, watch.time, watch.pictured]),
+                "clock": np.array([now.interval, now.time, now.pictured]),
                 "born": np.array([people.born]),
                 "density": clutter.density,
                 "watched": clutter.watched,
@@ -329,7 +329,7 @@ class Tracker:
         tracker, arrays = cls(pipeline, model=model), state.arrays
         tracker._layout = {name: arrays[name] for name in arrays if name.startswith(("version", "rig.", "skeleton."))}
         tracker._clock = FrameClock(tracker.model.period, *map(float, arrays["clock"]))
-        tracker._clutter = Clutter(tracker.model.existence, len(arrays["density"]))
+        tracker._clutter = MeasuredClutter(tracker.model.existence, len(arrays["density"]))
         tracker._clutter.density, tracker._clutter.counts = arrays["density"].copy(), arrays["clutter"].copy()
         tracker._clutter.watched = arrays["watched"].copy()
         tracker._people = Population(state.group("tracks"), state.group("lost"), int(arrays["born"][0]))
@@ -337,12 +337,12 @@ class Tracker:
         tracker._watch = DriftWatch.restored(tracker.model.drift, state.drift)
         return tracker
 
-    def _serve(self, rig: Rig, skeleton: Skeleton) -> None:
+    def _bind(self, rig: Rig, skeleton: Skeleton) -> None:
         """Start with a rig and a skeleton; refuse others in later frames."""
         bones = bone_prior(skeleton)
         if self._layout is None:
             self._layout = layout(rig, skeleton)
-            self._clutter = Clutter(self.model.existence, len(rig))
+            self._clutter = MeasuredClutter(self.model.existence, len(rig))
             self._recent = RecentPictures(len(rig), len(skeleton))
             self._watch = DriftWatch(self.model.drift, len(rig))
             nobody = Tracks.none(joints=len(skeleton), bones=len(bones.length), cameras=len(rig))
@@ -360,7 +360,7 @@ class Tracker:
             of_joints=self.motion, newcomers=self.model.motion.of_newcomers(skeleton), bones=bones, cameras=len(rig),
         )  # fmt: skip
 
-    def _at_once(self, ordered: Detections, rays: Rays, labels: Integers, groups: Integers) -> Rays:
+    def _undo_rolling_shutter(self, ordered: Detections, rays: Rays, labels: Integers, groups: Integers) -> Rays:
         """Return viewing rays as if all rows of a picture were exposed at once."""
         if self._readout is None:
             return rays

@@ -10,7 +10,7 @@ from mvpose.reconstruction.likelihood import Noise
 from mvpose.tracking.association import TrackAffinity
 from mvpose.tracking.drift_watch import DriftModel
 from mvpose.tracking.existence import Existence
-from mvpose.tracking.motion import Motion
+from mvpose.tracking.motion import MotionModel
 from mvpose.tracking.reappearance import Reappearance
 
 
@@ -30,7 +30,7 @@ class TrackingModel:
         period: time between frames whose detections carry no time, seconds.
     """
 
-    motion: Motion = Motion()
+    motion: MotionModel = MotionModel()
     affinity: TrackAffinity = TrackAffinity()
     existence: Existence = Existence()
     reappearance: Reappearance = Reappearance()

@@ -5,8 +5,15 @@ with and without other joints. :func:`whole_body` wraps any estimator or tracker
 the pipeline know of it: detections are on a skeleton with more joints, and so are the estimates.
 """
 
-from mvpose.wholebody.detections import body_part, with_body_boxes
-from mvpose.wholebody.estimator import WholeBody, WholeBodyTracking, body_of, complete, whole_body
+from mvpose.wholebody.estimator import (
+    WholeBody,
+    WholeBodyTracking,
+    body_of,
+    body_part,
+    complete,
+    whole_body,
+    with_body_boxes,
+)
 from mvpose.wholebody.skeletons import SKELETONS, known_names, read_skeleton, register, skeleton_by_name
 
 __all__ = [

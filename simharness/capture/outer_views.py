@@ -14,7 +14,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.skeleton import Skeleton
-from mvpose.wholebody.detections import rows_of
+from mvpose.wholebody.estimator import rows_of
 from simharness.capture.camera_arrays import CameraArrays
 from simharness.capture.film import simultaneous_exposures
 from simharness.capture.joint_visibility import classify

@@ -25,7 +25,7 @@ from scipy.special import ndtri
 from mvpose import COCO17
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.skeleton import Skeleton
-from mvpose.wholebody.detections import rows_of
+from mvpose.wholebody.estimator import rows_of
 from simharness.detector.bias import pixel_offsets
 from simharness.detector.conditions import BOX_SHARE, OUTSIDE, VISIBLE, occlusion_classes
 from simharness.detector.detection_block import DetectionBlock, Origin

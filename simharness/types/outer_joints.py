@@ -13,7 +13,7 @@ from mvpose import Detections
 from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from mvpose.skeleton import Skeleton
-from mvpose.wholebody.detections import rows_of
+from mvpose.wholebody.estimator import rows_of
 
 
 @dataclass(frozen=True)

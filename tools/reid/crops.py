@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.camera import Camera
-from mvpose.networks.crops import cut, stretched
+from mvpose.networks.crops import crop_images, stretched
 from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.joint_visibility import label_joints
 from simharness.capture.rendering.raster import RasterRenderer
@@ -239,4 +239,4 @@ def jitter_boxes(framed: Floats, rng: np.random.Generator, recipe: Recipe) -> Fl
 def crops_of_boxes(picture: Rgb, framed: Floats) -> Rgb:
     """Return the crops of boxes x, y, width, height (n, 4) of a picture, resized for the network, (n, 128, 64, 3)."""
     size = SIZE[::-1]
-    return cut([picture], np.zeros(len(framed), np.int64), stretched(framed, size), size, fill=FILL)
+    return crop_images([picture], np.zeros(len(framed), np.int64), stretched(framed, size), size, fill=FILL)

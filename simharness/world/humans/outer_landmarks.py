@@ -19,7 +19,7 @@ import numpy as np
 
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.skeleton import COCO17, Skeleton
-from mvpose.wholebody.detections import rows_of
+from mvpose.wholebody.estimator import rows_of
 from simharness.world.humans.body import Body, body_model
 
 DATA = Path(__file__).parent / "data" / "hands_and_feet.npz"

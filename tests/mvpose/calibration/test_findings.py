@@ -12,7 +12,7 @@ from mvpose.calibration.findings import KINDS, Diagnosis, Finding, camera_names
 
 
 def diagnosis(*findings):
-    return Diagnosis.of(findings, evidence=["e"], cameras=["a", "b"], residuals=np.array([1.0, np.nan]))
+    return Diagnosis.of_findings(findings, evidence=["e"], cameras=["a", "b"], residuals=np.array([1.0, np.nan]))
 
 
 def test_findings_are_in_the_same_order_however_they_come():

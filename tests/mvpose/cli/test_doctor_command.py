@@ -26,7 +26,7 @@ def call(tmp_path, monkeypatch):
     def run(findings, *options):
         def diagnose(rig, frames, *, period):
             got.update(rig=rig, frames=frames, period=period)
-            return Diagnosis.of(findings, evidence=["3 frames"], cameras=NAMES, residuals=np.full(4, 2.5))
+            return Diagnosis.of_findings(findings, evidence=["3 frames"], cameras=NAMES, residuals=np.full(4, 2.5))
 
         monkeypatch.setattr("mvpose.calibration.diagnose", diagnose)
         arguments = ["doctor", tmp_path / "Calib.toml", tmp_path / "openpose", *options]

@@ -74,7 +74,9 @@ class TestCommand:
 
     def test_faults_are_named_with_what_to_do(self, lab, monkeypatch):
         fault = Finding("moved-camera", "cam2 moved by 4 degrees", "alarm", 0.99, view=2, camera="cam2", mend="turn it")
-        found = Diagnosis.of([fault], evidence=[], cameras=("cam0", "cam1", "cam2", "cam3"), residuals=np.ones(4))
+        found = Diagnosis.of_findings(
+            [fault], evidence=[], cameras=("cam0", "cam1", "cam2", "cam3"), residuals=np.ones(4)
+        )
         monkeypatch.setattr("mvpose.calibration.diagnose", lambda *_, **__: found)
         (line,) = verdicts(estimate(lab, "--no-page"))
         assert line.endswith("frames: Camera cam2 moved by 4 degrees. `mvpose doctor` says what mends it")

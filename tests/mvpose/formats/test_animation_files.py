@@ -15,7 +15,7 @@ from mvpose.formats.detections.openpose import read_detections
 from mvpose.formats.joint_names import canonical
 from mvpose.formats.people import FORMATS, Export, Options
 from mvpose.recording import People
-from mvpose.skeleton_fit.body import Body
+from mvpose.skeleton_fit.body import ArticulatedBody
 from mvpose.skeleton_fit.kinematics import Pose
 from mvpose.skeleton_fit.rotations import to_matrices
 
@@ -34,7 +34,7 @@ def people():
     """Somebody who walks along x and swings arms and legs, with identity 7, in frames 5 to 34 of 40."""
     times = np.arange(40) / 20.0
     swing = 0.5 * np.sin(6.0 * times)
-    body = Body.of_skeleton(COCO17)
+    body = ArticulatedBody.of_skeleton(COCO17)
     vectors = np.zeros((40, len(body.segments), 3))
     for side, sign in (("Left", 1.0), ("Right", -1.0)):
         vectors[:, body.index(f"{side}UpLeg"), 1] = -sign * swing

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from mvpose.networks.crops import Placement, check_images, cut, in_view, padded, stretched
+from mvpose.networks.crops import Placement, check_images, crop_images, in_view, padded, stretched
 
 SIZE = (640, 480)
 BLACK = (0, 0, 0)
@@ -16,7 +16,7 @@ def noise(size=(97, 61)):
 
 def crop(image, box, size, fill=BLACK):
     placement = stretched(np.array([box], float), size)
-    return cut([image], np.zeros(1, int), placement, size, fill=fill)[0]
+    return crop_images([image], np.zeros(1, int), placement, size, fill=fill)[0]
 
 
 @given(
@@ -49,7 +49,7 @@ def test_crop_pixels_follow_the_placement(stride_x, stride_y, along, below):
     reach = np.array([stride_x, stride_y]) * (np.array(size) - 1)
     origin = 6 + np.array([along, below]) * (243 - reach)
     placement = Placement(origin[None], np.array([[stride_x, stride_y]]))
-    result = cut([image], np.zeros(1, int), placement, size, fill=BLACK)[0]
+    result = crop_images([image], np.zeros(1, int), placement, size, fill=BLACK)[0]
     np.testing.assert_allclose(result[0, :, 0], origin[0] + stride_x * np.arange(20), atol=0.51)
     np.testing.assert_allclose(result[:, 0, 1], origin[1] + stride_y * np.arange(30), atol=0.51)
 
@@ -67,7 +67,7 @@ def test_a_mirrored_placement_gives_the_mirrored_crop(middle):
     image = noise()
     placement = stretched(np.array([[20.3, 11.1, 50.2, 40.7]]), (32, 24))
     both = (placement, placement.mirrored(middle))
-    straight, mirrored = (cut([image], np.zeros(1, int), each, (32, 24), fill=BLACK)[0] for each in both)
+    straight, mirrored = (crop_images([image], np.zeros(1, int), each, (32, 24), fill=BLACK)[0] for each in both)
     start = int(2 * middle)
     np.testing.assert_array_equal(mirrored[:, : start + 1], straight[:, start::-1])
 
@@ -118,7 +118,7 @@ def test_crops_of_several_views_equal_those_of_single_views():
     images = [noise(), noise((40, 50))[::-1], noise((200, 30))]  # the second is not contiguous
     view = np.array([2, 0, 1, 0])
     boxes = np.array([[5, 5, 20, 20], [30, 2, 9, 50], [-5, 3, 20, 30], [0, 0, 90, 60]], float)
-    together = cut(images, view, stretched(boxes, (16, 32)), (16, 32), fill=BLACK)
+    together = crop_images(images, view, stretched(boxes, (16, 32)), (16, 32), fill=BLACK)
     for k, box, result in zip(view, boxes, together, strict=True):
         np.testing.assert_array_equal(result, crop(images[k], box, (16, 32)))
 

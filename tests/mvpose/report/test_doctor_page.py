@@ -192,7 +192,9 @@ def finding(**changes):
 
 
 def page_of(folder, rig, sightings, findings, repair=None):
-    diagnosis = Diagnosis.of(findings, evidence=["a line"], cameras=[c.name for c in rig], residuals=np.zeros(len(rig)))
+    diagnosis = Diagnosis.of_findings(
+        findings, evidence=["a line"], cameras=[c.name for c in rig], residuals=np.zeros(len(rig))
+    )
     given = dict(diagnosis=diagnosis, repair=repair, files=("a.json", "b"))
     path = write_doctor_page(folder, name="a rig", rig=rig, frames=[], sightings=sightings, **given)
     page = path.read_text(encoding="utf-8")
@@ -284,6 +286,6 @@ def test_findings_are_sentences(text, name, expected):
 def test_sightings_are_matched_where_none_are_given(tmp_path):
     rig = ring(4)
     frames = [detect(rig, crowd(1) + k * np.array([0.05, 0, 0]), noise=1.0, seed=k)[0] for k in range(20)]
-    diagnosis = Diagnosis.of([], evidence=[], cameras=[c.name for c in rig], residuals=np.zeros(4))
+    diagnosis = Diagnosis.of_findings([], evidence=[], cameras=[c.name for c in rig], residuals=np.zeros(4))
     path = write_doctor_page(tmp_path, name="a rig", rig=rig, frames=frames, diagnosis=diagnosis)
     assert 'class="line before"' in path.read_text(encoding="utf-8")

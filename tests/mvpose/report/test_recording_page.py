@@ -118,7 +118,7 @@ def test_the_verdict_stands_in_plain_words(tmp_path):
     moved = Finding(
         "moved-camera", "camera cam2 has moved by 5 cm", camera="cam2", view=2, size={"degrees": 1.1, "metres": 0.05}
     )
-    diagnosis = Diagnosis.of([moved], evidence=["rays miss by 4 px"], cameras=["a"], residuals=np.array([4.0]))
+    diagnosis = Diagnosis.of_findings([moved], evidence=["rays miss by 4 px"], cameras=["a"], residuals=np.array([4.0]))
     page, numbers = page_of(tmp_path, *recording(1), diagnosis=diagnosis, doctor_page="doctor.html")
     assert "Camera cam2 has moved by 5 cm." in page
     assert 'href="doctor.html"' in page
@@ -133,7 +133,7 @@ def test_without_frames_there_is_no_page(tmp_path):
 
 def test_a_verdict_that_is_open_says_why(tmp_path):
     short = Finding("cannot-tell", "cannot tell: people were seen for 2 s only", "unknown", 1.0, mend="record more")
-    diagnosis = Diagnosis.of([short], evidence=["90 joints"], cameras=["a"], residuals=np.array([4.0]))
+    diagnosis = Diagnosis.of_findings([short], evidence=["90 joints"], cameras=["a"], residuals=np.array([4.0]))
     page, _ = page_of(tmp_path, *recording(1), diagnosis=diagnosis)
     assert "does not determine whether the cameras are right" in page
     assert "<li>Cannot tell: people were seen for 2 s only.</li>" in page

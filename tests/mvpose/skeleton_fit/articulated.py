@@ -6,7 +6,7 @@ import numpy as np
 
 from mvpose import COCO17
 from mvpose.recording import People
-from mvpose.skeleton_fit.body import LENGTHS, Body
+from mvpose.skeleton_fit.body import LENGTHS, ArticulatedBody
 from mvpose.skeleton_fit.inverse_kinematics import within_limits
 from mvpose.skeleton_fit.kinematics import Pose
 from mvpose.skeleton_fit.rotations import to_matrices
@@ -17,7 +17,7 @@ TRUE_LENGTHS = {name: share * 1.82 * (1.06 if name == "thigh" else 0.97) for nam
 def moving(frames=60, *, seed=0, rate=25.0, skeleton=COCO17):
     """Smooth random motion within the ranges of all joints: the pose and the time of each frame."""
     rng = np.random.default_rng(seed)
-    body = Body.of_skeleton(skeleton).resized(TRUE_LENGTHS)
+    body = ArticulatedBody.of_skeleton(skeleton).resized(TRUE_LENGTHS)
     body = replace(body, places=body.places * 1.1)
     times = np.arange(frames) / rate
     rotations = np.broadcast_to(np.eye(3), (frames, len(body.segments), 3, 3)).copy()

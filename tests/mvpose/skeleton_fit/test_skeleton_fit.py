@@ -9,7 +9,7 @@ from articulated import TRUE_LENGTHS, distances, moving, recorded
 from mvpose import COCO17, SHELF14, Skeleton
 from mvpose.recording import People
 from mvpose.skeleton_fit import fit_bodies
-from mvpose.skeleton_fit.body import SEGMENTS, Body
+from mvpose.skeleton_fit.body import SEGMENTS, ArticulatedBody
 from mvpose.skeleton_fit.inverse_kinematics import within_limits
 from mvpose.skeleton_fit.joint_limits import ELBOWS, GIRDLES, HIPS, KNEE, NECK, SHOULDERS, SPINE
 from mvpose.skeleton_fit.kinematics import Freedom, Pose
@@ -127,7 +127,7 @@ class TestKinematics:
             np.testing.assert_allclose(got[..., axis], (ahead.joints - behind.joints) / (2 * step), atol=1e-8)
 
     def test_the_t_pose(self):
-        body = Body.of_skeleton(COCO17)
+        body = ArticulatedBody.of_skeleton(COCO17)
         pose = Pose(body, np.zeros((1, 3)), np.broadcast_to(np.eye(3), (1, len(SEGMENTS), 3, 3)))
         at = dict(zip(body.joints, pose.joints[0], strict=True))
         np.testing.assert_allclose(at["left_wrist"] - at["left_shoulder"], [0, 1.7 * (0.186 + 0.146), 0], atol=1e-12)

@@ -13,7 +13,7 @@ from mvpose.reconstruction.likelihood import Noise
 from mvpose.skeleton import COCO17
 from mvpose.tracking import DriftModel, Tracker, TrackerState, TrackingModel
 from mvpose.tracking.drift_watch import DriftWatch
-from mvpose.tracking.picture_shift import TERMS, look, solve_shift
+from mvpose.tracking.picture_shift import TERMS, measure_shifts, solve_shift
 
 RIG = ring(5)
 SIGMAS = Noise().sigmas(COCO17)
@@ -62,7 +62,7 @@ def looked_at(rig: Rig, really: Rig, view: int, *, noise: float = 0.0, time: flo
     state = np.concatenate([joints + 0.02, np.zeros_like(joints)], axis=2)  # the prediction is beside the truth
     normal, residual = np.zeros((TERMS, TERMS + 1)), np.zeros(3)
     labels = np.tile(np.arange(count), len(rig))
-    added = look(
+    added = measure_shifts(
         view, normal, residual, 1.0, np.ones(len(rig), bool), np.ones(count, bool), labels, np.arange(count), rays.view,
         rays.origins, rays.directions, rays.weights, rays.pixel, np.zeros(len(labels)), state, SIGMAS, rig.packed,
     )  # fmt: skip

@@ -10,7 +10,7 @@ from walking_people import film, identities
 from mvpose import Detections, preset
 from mvpose.tracking import Tracker, track
 from mvpose.tracking.displacement import note_displacement, staying
-from mvpose.tracking.existence import Clutter, Existence, log_odds
+from mvpose.tracking.existence import Existence, MeasuredClutter, log_odds
 from mvpose.tracking.frame_kernels import repeats
 
 RIG = ring(5)
@@ -116,7 +116,7 @@ def test_a_body_with_the_legs_of_another_is_not_a_person_of_its_own():
 
 
 def test_the_first_picture_says_how_many_false_detections_there_are():
-    clutter = Clutter(Existence(), 2)
+    clutter = MeasuredClutter(Existence(), 2)
     first = np.full(2, np.inf)
     clutter.count(np.array([4.0, 0.0]), np.ones(2, bool), first, 0.0)
     assert clutter.density[0] == pytest.approx(4.0 * (1.0 - np.exp(-0.5)), rel=0.02)  # beside the prior of one picture

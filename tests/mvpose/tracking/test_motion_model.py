@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mvpose import COCO17, PANOPTIC19, SHELF14
-from mvpose.tracking.motion import Motion, carry, condition, predict, transition
+from mvpose.tracking.motion import MotionModel, carry, condition, predict, transition
 
 TRUNK = np.array([True])
 SPANS = st.floats(1e-4, 5.0)
@@ -81,7 +81,7 @@ def test_conditioning_on_a_measured_position_is_the_kalman_update():
 
 @pytest.mark.parametrize("skeleton", [COCO17, SHELF14, PANOPTIC19])
 def test_both_sides_move_alike(skeleton):
-    speed, time, trunk = Motion().of_joints(skeleton)
+    speed, time, trunk = MotionModel().of_joints(skeleton)
     np.testing.assert_array_equal(speed, speed[list(skeleton.mirror)])
     np.testing.assert_array_equal(time, time[list(skeleton.mirror)])
     np.testing.assert_array_equal(trunk, trunk[list(skeleton.mirror)])
@@ -91,7 +91,7 @@ def test_both_sides_move_alike(skeleton):
 @pytest.mark.parametrize("skeleton", [COCO17, SHELF14, PANOPTIC19])
 def test_joints_are_carried_along_by_the_trunk(skeleton):
     """Independent velocities of the trunk and of a joint relative to it: their variances add up."""
-    motion = Motion(newcomer=1.7)
+    motion = MotionModel(newcomer=1.7)
     joints = motion.of_joints(skeleton)
     expected = np.sqrt(np.where(joints.trunk, 0.0, joints.speed**2) + 1.7**2)
     np.testing.assert_allclose(motion.of_newcomers(skeleton), expected)
@@ -99,9 +99,9 @@ def test_joints_are_carried_along_by_the_trunk(skeleton):
 
 def test_bad_settings_are_refused():
     with pytest.raises(ValueError, match="trunk"):
-        Motion(trunk=(0.0, 0.8))
+        MotionModel(trunk=(0.0, 0.8))
     with pytest.raises(ValueError, match="newcomer of the motion model must be above 0"):
-        Motion(newcomer=0.0)
+        MotionModel(newcomer=0.0)
 
 
 @given(st.floats(-0.5, 0.5), st.integers(0, 1000))
@@ -119,7 +119,7 @@ def test_carrying_joints_is_linear_and_can_be_undone(lead, seed):
 
 def test_limbs_come_to_move_with_the_trunk():
     """A person who walks on unseen for two seconds stays whole: wrists do not stay behind, nor fly on."""
-    speed, time, trunk = Motion().of_joints(COCO17)
+    speed, time, trunk = MotionModel().of_joints(COCO17)
     state, covariance = np.zeros((17, 6)), np.tile(np.eye(6), (17, 1, 1))
     state[:, 3] = 1.3
     state[9, 3] = 4.0  # a wrist that swings forward

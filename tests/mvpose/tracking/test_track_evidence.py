@@ -9,7 +9,7 @@ from mvpose import Detections, Rig, preset
 from mvpose.rays import viewing_rays
 from mvpose.tracking import Tracker, TrackingModel
 from mvpose.tracking.association import TrackAffinity
-from mvpose.tracking.existence import Clutter, Existence, log_odds
+from mvpose.tracking.existence import Existence, MeasuredClutter, log_odds
 
 RATE = 25.0
 
@@ -26,7 +26,7 @@ def test_lasting_false_detections_agree_anew_as_rarely_as_people_come():
 
 
 def test_a_scene_full_of_false_detections_is_known_after_a_second():
-    clutter = Clutter(Existence(), 2)
+    clutter = MeasuredClutter(Existence(), 2)
     every, step = np.ones(2, np.bool_), np.full(2, 0.1)
     for _ in range(10):
         clutter.count(np.array([4.0, 0.0]), every, step, 0.1)
