@@ -1,4 +1,4 @@
-"""Estimators of the body made into estimators of the whole body; the body is the 17 joints of COCO in the detections."""
+"""Estimators of the whole body, made of estimators of the body: of the 17 joints of COCO in the detections."""
 
 from __future__ import annotations
 
