@@ -102,8 +102,7 @@ def check(
 def _write(result: GateResult, reports: Mapping[str, Path]) -> bool:
     """Write the reports independently of each other; return whether one could not be written, after a message."""
     from simharness.gate.baseline import write_text
-    from simharness.gate.junit import junit
-    from simharness.gate.markdown import markdown
+    from simharness.gate.gate_reports import junit, markdown
 
     unwritten = False
     for option, path in reports.items():
@@ -143,7 +142,7 @@ def _print(check: GateResult, console: Console) -> None:
     """Print the result of a check."""
     from rich.text import Text
 
-    from simharness.gate.change_text import sentence
+    from simharness.gate.gate_reports import sentence
 
     def write(text: str | Text) -> None:
         console.print(text, soft_wrap=True, highlight=False, markup=False)
@@ -172,7 +171,7 @@ def _table(check: GateResult, variant: str) -> Table:
     from rich.table import Table
     from rich.text import Text
 
-    from simharness.gate.change_text import allowed, difference, number, title
+    from simharness.gate.gate_reports import allowed, difference, number, title
 
     table = Table(
         title=variant,

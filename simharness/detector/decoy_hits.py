@@ -14,8 +14,15 @@ from mvpose.camera import Rig
 from simharness.detector.conditions import BOX_SHARE
 from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import KeyedDraws
-from simharness.detector.false_positives import MIN_JOINTS, bounding_box, false_positive_block, keypoint_scores
-from simharness.detector.phantom_poses import NORMALS, postures, project_upright
+from simharness.detector.false_positives import (
+    MIN_JOINTS,
+    NORMALS,
+    bounding_box,
+    false_positive_block,
+    keypoint_scores,
+    postures,
+    project_upright,
+)
 from simharness.detector.steps import Context, StepStage, step
 from simharness.scenario.sections.detector_section import DecoyHitsSection
 from simharness.types.views import Views

@@ -2,7 +2,12 @@
 
 Whether an error occurs is drawn as a latent standard normal number and compared with the quantile of its probability.
 So it occurs with exactly that probability, however much of the number views or joints share and however long it is
-held. Changing a correlation or a mean life changes no other draw.
+held. Changing a correlation or a mean life changes no other draw. Each error of joints has a separate stream
+(:class:`ErrorDraws`), and all errors of a person have the same lives.
+
+Bottom-up detectors join a joint to its person along the limb that leads to it: a wrist hangs on the elbow, the elbow on
+the shoulder; an ankle on the knee, the knee on the hip. In every set of detections of OpenPose and RTPose looked at, no
+joint is reported whose parent is not. The joints of the face are found independently of each other.
 """
 
 from __future__ import annotations
@@ -12,9 +17,11 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtri
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from mvpose.kernels import njit
+from simharness.scenario.sections.detector_section import CorrelationSection
 from simharness.types.random_streams import stream
 
 Key = str | int
@@ -22,6 +29,15 @@ Key = str | int
 LIMB_OF_JOINT = np.repeat([0, 1, 2], [5, 6, 6])
 """Limb of each COCO-17 joint, (17,): 0 the face, 1 both arms, 2 both legs."""
 _GROUPS = 3
+
+GROSS = frozenset({"miss", "stray", "inversion", "swap", "guess"})
+"""Errors that ``correlation.gross_views`` correlates over the views; of the others it is ``correlation.views``."""
+
+PARENT = np.array([-1, -1, -1, -1, -1, -1, -1, 5, 6, 7, 8, -1, -1, 11, 12, 13, 14])
+"""Parent of each COCO-17 joint in the tree of parts, (17,); -1 without a parent. Parents come before children."""
+
+IN_TREE = np.arange(len(PARENT)) >= 5
+"""Which COCO-17 joints belong to the tree, (17,): those of the limbs."""
 
 
 @dataclass(frozen=True)
@@ -161,3 +177,50 @@ def logistic(usual: ArrayLike, spread: ArrayLike) -> Floats:
     usual, spread = np.broadcast_arrays(np.asarray(usual, float), np.asarray(spread, float))
     odds = np.exp(np.clip(spread, -40, 40))
     return usual * odds / (usual * odds + (1 - usual))
+
+
+@dataclass(frozen=True)
+class ErrorDraws:
+    """Draws of the errors of people's joints, (T, V, 17) for one person.
+
+    Attributes:
+        draws: draws of the sequence.
+        correlation: correlation in time, over the views and within limbs.
+        tree: whether joints are dropped along the tree of parts.
+    """
+
+    draws: KeyedDraws
+    correlation: CorrelationSection
+    tree: bool
+
+    def occurs(self, what: str, person: int, share: Floats | float) -> Bools:
+        """Draw which joints of a person an error takes with probability ``share``, (T, V, 17)."""
+        share = np.minimum(share, 1.0)
+        most = share.max(initial=0.0)
+        if most == 0.0:
+            return np.zeros((len(self.draws.time), self.draws.views, len(LIMB_OF_JOINT)), bool)
+        views = self.correlation.gross_views if what in GROSS else self.correlation.views
+        state = self._state(what, person, views=views, limb=self.correlation.limb)
+        if self.tree and what == "drop":  # within limbs, drops depend on each other by the tree alone
+            state = np.where(IN_TREE, self._state(what, person, views=views), state)
+        occurs = state < ndtri(most)
+        if share.ndim and share.min() < most:  # quantiles are expensive: only where needed
+            where = np.nonzero(occurs)
+            occurs[where] = state[where] < ndtri(np.broadcast_to(share, state.shape)[where])
+        return occurs
+
+    def normal(self, what: str, person: int) -> Floats:
+        """Draw standard normal numbers that last as long as the errors, independent by joint and view, (T, V, 17)."""
+        return self._state(what, person)
+
+    def _state(self, what: str, person: int, *, views: float = 0.0, limb: float = 0.0) -> Floats:
+        lives, life = ("lives", person), self.correlation.life
+        return self.draws.joint_states(what, person, lives=lives, life=life, shared=views, limb=limb)
+
+
+def with_parents(reported: Bools) -> Bools:
+    """Return which of the reported joints (..., 17) remain when each needs its parent, (..., 17)."""
+    result = reported.copy()
+    for joint in np.flatnonzero(PARENT >= 0):
+        result[..., joint] &= result[..., PARENT[joint]]
+    return result

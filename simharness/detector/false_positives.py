@@ -1,9 +1,15 @@
-"""False positives of every kind: their scores, their boxes and their place in a block of detections."""
+"""False positives of every kind: their postures, scores and boxes, and their place in a block of detections.
+
+Postures are upright people in space, each from a few standard normal numbers. They stand for what a detector sees in
+shadows and coats, so they need not be exact. Lengths are shares of stature (Drillis & Contini, Body segment parameters,
+1966).
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Rig
@@ -14,6 +20,18 @@ MIN_JOINTS = 6
 """Fewest joints in a picture that a detector takes for a person."""
 
 _COMMON = np.sqrt(0.5)  # half the variance of scores lasts as long as the detection, half is drawn for each joint
+
+NORMALS = 20
+"""Number of standard normal numbers that determine one posture."""
+
+_SEATED = 0.15  # share of half-seated postures
+_THIGH, _SHANK, _ANKLE = 0.245, 0.246, 0.039
+_UPPER_ARM, _FOREARM, _TRUNK = 0.186, 0.146, 0.288
+_HIP, _SHOULDER = 0.050, 0.115  # half the distance between the centres of the two joints
+# Nose, eyes and ears relative to the middle of the shoulders, of a person who looks along x.
+_FACE = np.array(
+    [(0.062, 0.0, 0.100), (0.052, 0.018, 0.118), (0.052, -0.018, 0.118), (0.0, 0.043, 0.110), (0.0, -0.043, 0.110)]
+)
 
 
 def keypoint_scores(usual: float, deviation: float, common: Floats, separate: Floats) -> Floats:
@@ -80,3 +98,78 @@ def false_positive_block(
     block.boxes[where] = np.where(count[:, None] > 0, np.concatenate([low, high - low], axis=-1), 0.0)
     block.box_scores[where] = scores.sum(axis=-1) / np.maximum(count, 1)
     return block
+
+
+def postures(normals: Floats) -> Floats:
+    """Return COCO-17 joints (n, 17, 3), metres, from standard normal numbers (n, NORMALS).
+
+    The people stand on z = 0 at the origin and face along x: upright or half seated, arms hanging, bent or raised.
+    """
+    stature = np.clip(1.70 + 0.10 * normals[:, 0], 1.45, 1.95)
+    seated = (ndtr(normals[:, 1]) < _SEATED)[:, None]
+    legs, arms = normals[:, 6:12].reshape(-1, 2, 3), normals[:, 12:18].reshape(-1, 2, 3)
+    side = np.array([1.0, -1.0])
+
+    hips = _points(0.0, _HIP * side, 0.0, shape=legs.shape[:2])
+    flexed = np.where(seated, 1.2, 0.10) + 0.15 * legs[..., 0]
+    bent = np.where(seated, 1.3, 0.08) + 0.15 * np.abs(legs[..., 1])
+    abducted = 0.06 + 0.05 * np.abs(legs[..., 2])
+    knees = hips + _THIGH * _limb_directions(flexed, side * abducted)
+    ankles = knees + _SHANK * _limb_directions(flexed - bent, side * abducted)
+
+    pitch = 0.05 + 0.08 * normals[:, 2] + 0.1 * seated[:, 0]
+    roll = 0.05 * normals[:, 3]
+    chest = _TRUNK * np.stack([np.sin(pitch), np.sin(roll), np.cos(pitch) * np.cos(roll)], axis=-1)
+    shoulders = chest[:, None] + _points(0.0, _SHOULDER * side, 0.0, shape=arms.shape[:2])
+    raised = 0.1 + 0.45 * arms[..., 0]
+    apart = 0.12 + 0.25 * np.abs(arms[..., 1])
+    elbows = shoulders + _UPPER_ARM * _limb_directions(raised, side * apart)
+    folded = np.minimum(0.25 + 0.6 * np.abs(arms[..., 2]), 2.3)
+    wrists = elbows + _FOREARM * _limb_directions(raised + folded, side * apart * 0.5)
+
+    face = rotate_about_z(np.broadcast_to(_FACE, (len(normals), 5, 3)), 0.35 * normals[:, 4])
+    face = chest[:, None] + _nod(face, normals)
+    joints = np.concatenate([face, shoulders, elbows, wrists, hips, knees, ankles], axis=1)
+    joints[..., 2] += _ANKLE - ankles[..., 2].min(axis=1, keepdims=True)
+    return joints * stature[:, None, None]
+
+
+def rotate_about_z(points: Floats, yaw: Floats) -> Floats:
+    """Rotate points (n, k, 3) about the z axis by yaw (n,), radians."""
+    c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
+    x, y, z = np.moveaxis(points, -1, 0)
+    return np.stack([c * x - s * y, s * x + c * y, z], axis=-1)
+
+
+def project_upright(points: Floats, yaw: Floats, tilt: Floats) -> Floats:
+    """Project points (n, k, 3) orthographically, x to the right and y down, into boxes of height 1 centred at 0.
+
+    Args:
+        points: people who face along x.
+        yaw: rotation of each person away from the camera, (n,), radians.
+        tilt: angle by which the camera looks down, (n,), radians.
+
+    Returns:
+        Points in the picture, (n, k, 2), in units of the height of the box.
+    """
+    x, y, z = np.moveaxis(rotate_about_z(points, yaw), -1, 0)
+    flat = np.stack([y, x * np.sin(tilt)[:, None] - z * np.cos(tilt)[:, None]], axis=-1)
+    low, high = flat.min(axis=1, keepdims=True), flat.max(axis=1, keepdims=True)
+    return (flat - (low + high) / 2) / (high - low)[..., 1:]
+
+
+def _nod(face: Floats, normals: Floats) -> Floats:
+    """Return faces (n, 5, 3) pitched by the angles that the normal numbers (n, NORMALS) determine."""
+    c, s = np.cos(0.12 * normals[:, 5])[:, None], np.sin(0.12 * normals[:, 5])[:, None]
+    x, y, z = np.moveaxis(face, -1, 0)
+    return np.stack([c * x - s * z, y, s * x + c * z], axis=-1)
+
+
+def _limb_directions(forward: Floats, outward: Floats) -> Floats:
+    """Return unit vectors (n, 2, 3) of limbs that point down, rotated forward and then outward by angles (n, 2)."""
+    return np.stack([np.sin(forward) * np.cos(outward), np.sin(outward), -np.cos(forward) * np.cos(outward)], axis=-1)
+
+
+def _points(x: float, y: Floats, z: float, *, shape: tuple[int, int]) -> Floats:
+    """Return points (*shape, 3) with the coordinates x, y and z; ``y`` has one value for each side of the body."""
+    return np.stack(np.broadcast_arrays(np.full(shape, x), y, z), axis=-1)

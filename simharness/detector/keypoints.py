@@ -22,11 +22,9 @@ from mvpose.camera import Rig
 from simharness.detector.bias import pixel_offsets
 from simharness.detector.conditions import OCCLUDED, OUTSIDE, SELF_OCCLUDED, VISIBLE, Conditions
 from simharness.detector.detection_block import DetectionBlock
-from simharness.detector.draws import KeyedDraws
-from simharness.detector.error_classes import MIRROR, PAIRED
-from simharness.detector.error_draws import ErrorDraws
+from simharness.detector.draws import ErrorDraws, KeyedDraws
+from simharness.detector.error_classes import MIRROR, PAIRED, jitter_distance
 from simharness.detector.guesses import guess_places, pixels_per_metre
-from simharness.detector.jitter_distance import jitter_distance
 from simharness.detector.reported import ReportedJoints, last_pixels
 from simharness.detector.scatter import Scatter
 from simharness.detector.steps import Context, StepStage, step

@@ -15,8 +15,16 @@ from mvpose.camera import Rig
 from simharness.detector.birth_death import BirthDeathProcess, assign_slots, frame_noise, frames_alive
 from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import KeyedDraws
-from simharness.detector.false_positives import MIN_JOINTS, bounding_box, false_positive_block, keypoint_scores
-from simharness.detector.phantom_poses import NORMALS, postures, project_upright, rotate_about_z
+from simharness.detector.false_positives import (
+    MIN_JOINTS,
+    NORMALS,
+    bounding_box,
+    false_positive_block,
+    keypoint_scores,
+    postures,
+    project_upright,
+    rotate_about_z,
+)
 from simharness.detector.steps import Context, StepStage, step
 from simharness.scenario.sections.detector_section import PhantomsSection
 from simharness.types.views import Views, Visibility

@@ -1,19 +1,26 @@
-"""Which joints a detector reports, and which of them it guesses."""
+"""Which joints a detector reports, by occlusion and for the face by the bearing of the camera, and which it guesses."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
-from simharness.detector.conditions import OUTSIDE, Conditions
-from simharness.detector.drops import drop_shares
-from simharness.detector.error_draws import ErrorDraws
-from simharness.detector.part_tree import with_parents
+from simharness.detector.bias import SIDE
+from simharness.detector.conditions import OCCLUDED, OUTSIDE, VISIBLE, Conditions
+from simharness.detector.draws import ErrorDraws, with_parents
 from simharness.detector.view_geometry import head_bearings
-from simharness.scenario.sections.detector_section import FaceSection, KeypointsSection
+from simharness.scenario.sections.detector_section import (
+    BEARINGS,
+    KIND_OF_JOINT,
+    KINDS,
+    DropSection,
+    FaceSection,
+    KeypointsSection,
+)
 
 
 @dataclass(frozen=True)
@@ -89,3 +96,30 @@ class ReportedJoints:
 def last_pixels(rig: Rig) -> Floats:
     """Return the last column and row of the images of V cameras, (V, 1, 2) pixels."""
     return np.array([camera.size for camera in rig], float)[:, None] - 1
+
+
+def drop_shares(drop: DropSection, face: FaceSection, occlusion: NDArray[np.int8], bearings: Floats | None) -> Floats:
+    """Return the share of each joint that is not reported, (T, V, P, 17); for joints outside the image any value.
+
+    Args:
+        drop: shares by occlusion.
+        face: shares of the face by bearing.
+        occlusion: occlusion classes of the joints, (T, V, P, 17).
+        bearings: bearings of the cameras from the heads, (T, V, P), radians to the left of straight ahead; None if
+            ``face`` has no shares.
+    """
+    table = np.array([shares.by_joint() for shares in (drop.visible, drop.self_occluded, drop.occluded)])
+    result = table[np.where(occlusion == OUTSIDE, VISIBLE, occlusion), np.arange(occlusion.shape[-1])]
+    if bearings is None:
+        return result
+    for joint, kind in enumerate(KIND_OF_JOINT):
+        shares = getattr(face, KINDS[kind], None)
+        if shares is not None:
+            unhidden = occlusion[..., joint] != OCCLUDED
+            result[..., joint] = np.where(unhidden, _by_bearing(shares, SIDE[joint] * bearings), result[..., joint])
+    return result
+
+
+def _by_bearing(shares: tuple[float, ...], bearings: Floats) -> Floats:
+    """Return shares interpolated at bearings (...), radians."""
+    return np.interp(bearings, np.deg2rad(BEARINGS), shares, period=2 * np.pi)

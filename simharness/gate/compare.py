@@ -32,8 +32,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from simharness.gate.baseline import GATED, TIME, Measurement
-from simharness.gate.pairs import Pairs, pairs_of
-from simharness.gate.score_tests import Tested, test_of
+from simharness.gate.score_tests import Pairs, Tested, pairs_of, test_of
 from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.scoring.catalogue import SCORES

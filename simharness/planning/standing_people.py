@@ -41,7 +41,7 @@ class PosePool:
     """Poses of a few bodies, each standing over the origin and facing +x: K poses, C capsules.
 
     Attributes:
-        landmarks: positions of ``simharness.types.landmarks.LANDMARKS``, (K, L, 3), metres.
+        landmarks: positions of ``simharness.types.sequence.LANDMARKS``, (K, L, 3), metres.
         capsules: ends of the axes of the capsules that hide, (K, C, 2, 3), metres.
         radii: radii of the capsules, (K, C), metres.
         depths: largest distance of the skin in front of each COCO-17 joint, (K, 17), metres.

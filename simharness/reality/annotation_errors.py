@@ -23,9 +23,8 @@ from simharness.reality.detector_fit.consensus import Consensus
 from simharness.reality.detector_fit.frame_sums import lags
 from simharness.reality.detector_fit.tetrachoric import fit_noisy_life
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, SMOOTHING, TrackedPeople
-from simharness.scenario.sections.annotation import AnnotationSection
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS
-from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.sections.scenario import AnnotationSection, Scenario
 from simharness.types.random_streams import stream
 from simharness.types.sequence import Sequence
 

@@ -26,8 +26,7 @@ from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import Simulation, capture_trial
-from simharness.types.landmarks import LANDMARKS
-from simharness.types.sequence import Sequence
+from simharness.types.sequence import LANDMARKS, Sequence
 from simharness.types.views import Views, Visibility
 from simharness.world.motion.mocap.joint_tracks import tracks_file
 from simharness.world.motion.presence import held

@@ -1,8 +1,20 @@
-"""Sequence: true landmarks of all people in all frames."""
+"""Sequence: true landmarks of all people in all frames.
+
+Landmarks define the true joints: the 17 of COCO, then additional joints of other skeletons. All are anatomical points
+of the body model; head and neck are not computed from COCO joints:
+
+- the 17 of COCO: centres of joints and features of the face, as anny regresses them from its vertices;
+- ``head_bottom``: on the axis of the neck at the level of the chin, halfway up the bone ``Neck`` (C7 to C4);
+  "bottom head" in Shelf and Campus;
+- ``head_top``: the crown, the highest point of the skull without hair; "top head" in Shelf and Campus;
+- ``neck``: the root of the neck, at the vertebra C7, where the bone ``Neck`` begins; "Neck" in Panoptic;
+- ``mid_hip``: midway between the centres of the hip joints; "BodyCenter" in Panoptic.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +22,9 @@ from numpy.typing import NDArray
 from mvpose.arrays import Bools, Floats
 from mvpose.checks import as_array
 from mvpose.skeleton import COCO17, Skeleton
-from simharness.types.landmarks import LANDMARKS, of_skeleton
+
+LANDMARKS: tuple[str, ...] = (*COCO17.joints, "head_bottom", "head_top", "neck", "mid_hip")
+"""Names of the landmarks in the order of all landmark arrays; the joints of COCO17 come first, in its order."""
 
 
 @dataclass(frozen=True)
@@ -18,7 +32,7 @@ class Sequence:
     """Ground truth of T frames with P people; P may be 0.
 
     Attributes:
-        landmarks: positions of ``simharness.types.landmarks.LANDMARKS`` in the world, (T, P, L, 3), metres; finite in
+        landmarks: positions of ``simharness.types.sequence.LANDMARKS`` in the world, (T, P, L, 3), metres; finite in
             all frames: an absent person waits somewhere outside of the scene.
         ids: numbers of the people, (P,) int.
         time: times of the frames, (T,), seconds.
@@ -61,3 +75,21 @@ class Sequence:
             ValueError: the skeleton has a joint for which the body has no landmark.
         """
         return np.where(self.present[..., None, None], self.landmarks[:, :, of_skeleton(skeleton)], np.nan)
+
+
+@cache
+def of_skeleton(skeleton: Skeleton) -> NDArray[np.intp]:
+    """Return the landmark index of each joint of a skeleton, (J,).
+
+    Raises:
+        ValueError: the skeleton has a joint for which the body has no landmark.
+    """
+    unknown = [joint for joint in skeleton.joints if joint not in LANDMARKS]
+    if unknown:
+        raise ValueError(
+            f"skeleton {skeleton.name!r} has joints for which the body has no landmark: {', '.join(unknown)}; "
+            f"expected joints among {', '.join(LANDMARKS)}"
+        )
+    indices = np.array([LANDMARKS.index(joint) for joint in skeleton.joints])
+    indices.flags.writeable = False
+    return indices

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Bools, Floats
 from simharness.detector.conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
-from simharness.detector.draws import LIMB_OF_JOINT
+from simharness.detector.draws import GROSS, LIMB_OF_JOINT
 from simharness.detector.error_classes import MIRROR
-from simharness.detector.error_draws import GROSS
 from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints
 from simharness.reality.detector_fit.tetrachoric import correlation_grid, joint_probability
 from simharness.reality.people_tracks import LIMB_JOINTS

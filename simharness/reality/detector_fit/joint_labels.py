@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from mvpose import Rig
 from mvpose.arrays import Bools, Floats
 from simharness.detector.conditions import OUTSIDE, OVERLAP_MIN, VISIBLE, oks_units, overlaps
+from simharness.detector.draws import PARENT
 from simharness.detector.error_classes import MIRROR, classify, distinguishable, opposite_hits
-from simharness.detector.part_tree import PARENT
 from simharness.detector.view_geometry import head_bearings, image_axes
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.association import Association, associate

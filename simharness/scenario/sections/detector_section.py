@@ -1,4 +1,4 @@
-"""[detector]: errors of the simulated 2D detector.
+"""[detector] and [appearance]: errors of the simulated 2D detector, and descriptors of its detections.
 
 With all parameters at their defaults the detector is perfect: it reports exactly what is in the picture. Realistic
 errors are in detector profiles, ``scenarios/detectors/*.toml``: ``profile = "typical"`` in a scenario's [detector]
@@ -373,3 +373,17 @@ class DetectorSection(Section):
                 "leave skeleton or onnx out"
             )
         return self
+
+
+class AppearanceSection(Section):
+    """Source of the descriptors of detections, the second cue of the method (paper, section 3.2)."""
+
+    source: Literal["none", "pictures", "drawn"] = Field(
+        "none",
+        description="none: detections carry no descriptors; pictures: a network computes them from the rendered "
+        "pictures; drawn: drawn from a model of the network's distances, without pictures",
+    )
+    network: str = Field(
+        "",
+        description="ONNX file of a re-ID network, relative to the scenario file; empty: the one shipped with mvpose",
+    )

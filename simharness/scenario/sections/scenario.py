@@ -11,14 +11,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from simharness.scenario.sections.annotation import AnnotationSection
-from simharness.scenario.sections.appearance import AppearanceSection
 from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection, SensorSection
-from simharness.scenario.sections.detector_section import DetectorSection
+from simharness.scenario.sections.detector_section import AppearanceSection, DetectorSection
 from simharness.scenario.sections.method_section import NAME, MethodSection
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
-from simharness.scenario.sections.section import Section
+from simharness.scenario.sections.section import Section, Share, Span, Spread
 
 FILE_KEYS: tuple[tuple[str, ...], ...] = (
     ("people", "motion", "file"),
@@ -29,6 +27,30 @@ FILE_KEYS: tuple[tuple[str, ...], ...] = (
 )
 """Keys whose values name files: recorded motion, calibration, networks. All code that handles such files uses this
 list: the paths are relative to the scenario file, and the contents count in the identity of results."""
+
+
+class AnnotationSection(Section):
+    """Errors of an annotated truth, as published data sets have them; the default is the exact truth.
+
+    The truth of recordings is clicked by people. These errors change only the truth by which a recording is scored:
+    that of ``simharness export`` and of ``simharness evaluate seeds``.
+    """
+
+    shift: Spread = Field(
+        0.0,
+        description="constant offset of each joint of each person from the true one: its standard deviation along each "
+        "axis of the body, metres",
+    )
+    random: Spread = Field(
+        0.0, description="standard deviation along each axis of the error that changes over time, metres"
+    )
+    life: Span = Field(0.0, description="correlation time of that error, seconds; 0: drawn anew in every frame")
+    noise: Share = Field(0.0, description="share of the variance of that error that is drawn anew in every frame")
+    people: Literal["all", "whole"] = Field(
+        "all",
+        description="whole: people are annotated only where all cameras but one have all of their limb joints in the "
+        "picture",
+    )
 
 
 class RenderingSection(Section):

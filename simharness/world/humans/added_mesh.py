@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
-from simharness.types.landmarks import LANDMARKS
+from simharness.types.sequence import LANDMARKS
 from simharness.world.humans.body import Body, FacePart
 
 

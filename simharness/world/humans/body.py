@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats, Integers
 from mvpose.skeleton import COCO17, Skeleton
-from simharness.types.landmarks import LANDMARKS, of_skeleton
+from simharness.types.sequence import LANDMARKS, of_skeleton
 from simharness.world.humans.anatomy import segments_of_faces
 from simharness.world.humans.limb_lengths import LIMBS, limb_stretches, stretch_vertices
 from simharness.world.humans.shape import Shape
@@ -228,7 +228,7 @@ class Body:
         bones: names of the bones, parents before children.
         weight_bones, weights: bone indices and weights of the skinning, (n, 4).
         keypoints: L landmarks as linear functions of the bone transforms, (L, B, 4), in the order of
-            ``simharness.types.landmarks.LANDMARKS``, COCO-17 first. A landmark is the sum over bones of
+            ``simharness.types.sequence.LANDMARKS``, COCO-17 first. A landmark is the sum over bones of
             ``transform @ keypoints[landmark, bone]``. This is exact, because skinning and regression are linear.
         depths: depth of the landmarks under the surface, (L,) metres: twice the distance to the nearest skin, because
             limbs are not round and clothes have thickness; at least 15 mm.

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from mvpose.arrays import Bools, Floats
 from mvpose.skeleton import COCO17
-from simharness.types.landmarks import LANDMARKS
-from simharness.types.sequence import Sequence
+from simharness.types.sequence import LANDMARKS, Sequence
 from simharness.world.humans.body import body_model
 from simharness.world.humans.mujoco_model import bone_transforms
 from simharness.world.motion.poses.kinematics import Addresses
@@ -29,7 +28,7 @@ class PlaybackState:
 
     Attributes:
         time: time in seconds.
-        landmarks: positions of ``simharness.types.landmarks.LANDMARKS`` in the world, (P, L, 3), metres.
+        landmarks: positions of ``simharness.types.sequence.LANDMARKS`` in the world, (P, L, 3), metres.
         bones: skinning transforms from rest pose to world, (P, B, 3, 4); those of an absent person take the whole body
             to one point under the floor, where it stops no ray.
         placements: poses of the moving solids of the scene in their order, (M, 7): metres, quaternion w x y z.

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.detector.jitter_distance import jitter_distance
+from simharness.detector.error_classes import jitter_distance
 from simharness.types.truth import GOOD_BELOW, MISS_FROM
 
 SHARES = (np.arange(20_000) + 0.5) / 20_000  # the mean over them is the integral

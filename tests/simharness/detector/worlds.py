@@ -10,8 +10,7 @@ from simharness.detector.conditions import Conditions
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.keypoints import find_keypoints
 from simharness.scenario.sections.detector_section import CorrelationSection, KeypointsSection
-from simharness.types.landmarks import LANDMARKS
-from simharness.types.sequence import Sequence
+from simharness.types.sequence import LANDMARKS, Sequence
 from simharness.types.views import Views, Visibility
 
 RATE = 10.0  # Hz

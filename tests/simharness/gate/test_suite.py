@@ -11,9 +11,8 @@ from trials import Recorder
 from mvpose.presets import TRACKING
 from simharness.gate import frame_times, suite
 from simharness.gate.baseline import FRAMES, GATED, KEPT, TIME
-from simharness.gate.frame_times import relative_times
+from simharness.gate.frame_times import reference_work, relative_times
 from simharness.gate.gate_check import baseline_of
-from simharness.gate.reference_kernel import reference_work
 from simharness.gate.required_seeds import least_corrected_p
 from simharness.gate.suite import fingerprint, run_suite
 from simharness.runtime.errors import RunError

@@ -12,8 +12,8 @@ from simharness.reality.detector_fit.fit import fit
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.sample import sample_of
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, track_people
-from simharness.scenario.sections.annotation import AnnotationSection
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS
+from simharness.scenario.sections.scenario import AnnotationSection
 
 LIMBS = slice(0, 12)  # of SHELF14
 STEP = 0.04

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simharness.detector.part_tree import PARENT
+from simharness.detector.draws import PARENT
 from simharness.reality.annotation_errors import fit_annotation
 from simharness.reality.detector_fit.detector_measurement import point_estimates
 from simharness.reality.detector_fit.joint_labels import label_joints

@@ -4,7 +4,7 @@ import pytest
 
 from mvpose import COCO17, PANOPTIC19, SHELF14, Skeleton
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.types.landmarks import LANDMARKS, of_skeleton
+from simharness.types.sequence import LANDMARKS, of_skeleton
 from simharness.world.humans.body import make_body
 from simharness.world.humans.mujoco_model import bone_transforms, person_spec
 from simharness.world.humans.shape import Shape

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from simharness.types.landmarks import LANDMARKS
-from simharness.types.sequence import Sequence
+from simharness.types.sequence import LANDMARKS, Sequence
 
 
 def arrays(frames: int, people: int) -> dict[str, np.ndarray]:

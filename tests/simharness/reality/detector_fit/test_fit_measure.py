@@ -8,7 +8,7 @@ import pytest
 from filmed_people import narrowed
 
 from mvpose import Detections
-from simharness.detector.part_tree import PARENT
+from simharness.detector.draws import PARENT
 from simharness.detector.view_geometry import head_bearings
 from simharness.reality.detector_fit.detector_measurement import (
     MeasuredValue,
