@@ -33,8 +33,8 @@ from pathlib import Path
 from statistics import fmean
 
 from mvpose import Estimate
+from mvpose.commands.errors import RunError
 from simharness.gate.trial_command import TrialKey, command_of, setting_name
-from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study, load_study

@@ -11,9 +11,9 @@ import numpy as np
 from benchmarks.doctor.recordings import BenchRecording
 from mvpose import Rig
 from mvpose.arrays import Floats
+from mvpose.commands.progress import Silence, Stages
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.reality.recording_file import read_recording
-from simharness.runtime.progress import Silence, Stages
 from simharness.scenario.load import load
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import capture_trial, detect_trial

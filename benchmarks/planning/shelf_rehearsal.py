@@ -15,13 +15,13 @@ from pathlib import Path
 
 from benchmarks.planning.shelf_subsets import SubsetFigures, annotated_people, real_pcp
 from mvpose import Rig
+from mvpose.commands.progress import reporter
 from simharness.planning import Volume
 from simharness.planning.rehearsal_scene import ACTIVITIES, SceneSettings
 from simharness.planning.scene_results import Condition, interval_of
 from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
 from simharness.reality.recording_file import read_recording
 from simharness.reality.validation.subsets import FILLED, camera_subsets
-from simharness.runtime.progress import reporter
 from simharness.scenario.presets import read_profile
 
 _PEOPLE = 4  # on Shelf

@@ -14,8 +14,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
+from mvpose.commands.progress import Stages
 from mvpose.files.atomic_files import write_atomic
-from simharness.runtime.progress import Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial import run_trial
 from simharness.trial.stages.simulation import DetectedSequence, Simulation, detect_trial

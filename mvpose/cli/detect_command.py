@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mvpose.cli.estimate_command import Wanted, estimate_into
-from mvpose.cli.exit_codes import exit_on_error, note
 from mvpose.cli.inputs import Calibration, Choices
-from mvpose.cli.option_groups import grouped
+from mvpose.cli.program import PROGRAM
+from mvpose.commands.option_groups import grouped
+from mvpose.commands.program import note
 
 if TYPE_CHECKING:
     from mvpose.formats.pictures import PictureSource
@@ -79,7 +80,7 @@ def detect(
 
     An interrupted run continues where it stopped.
     """
-    with exit_on_error(left=_LEFT):
+    with PROGRAM.exit_on_error(left=_LEFT):
         from mvpose.cli.camera_pictures import open_videos
 
         _check_folder(out)
@@ -95,7 +96,7 @@ def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: N
     The detections are kept in FOLDER-detections, so that a second run does not
     detect again.
     """
-    with exit_on_error(left=_LEFT):
+    with PROGRAM.exit_on_error(left=_LEFT):
         from mvpose.cli.camera_pictures import assigned, check_lengths, check_sizes, common_rate, open_videos
         from mvpose.formats.calibration.calibration_formats import read_calibration
         from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
@@ -120,8 +121,8 @@ def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: N
 
 
 def _check_folder(folder: Path) -> None:
-    from mvpose.cli.output_folder import check_writable
     from mvpose.cli.video_detection import MARK
+    from mvpose.commands.output_files import check_writable
 
     check_writable(folder, holds=MARK)
 

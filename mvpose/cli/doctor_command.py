@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mvpose.cli.exit_codes import FAULTS, exit_on_error
 from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
-from mvpose.cli.option_groups import grouped
+from mvpose.cli.program import PROGRAM
+from mvpose.commands.option_groups import grouped
+from mvpose.commands.program import FOUND
 
 if TYPE_CHECKING:
     from mvpose.calibration import Diagnosis
@@ -40,13 +41,13 @@ def doctor(
 
     Prints a verdict and what mends each fault. Exit code 1 where there are faults.
     """
-    with exit_on_error():
-        from mvpose.cli.output_folder import check_writable
+    with PROGRAM.exit_on_error():
+        from mvpose.commands.output_files import check_writable
 
         if out is not None:
             check_writable(out, holds="doctor.json")
         from mvpose.calibration import diagnose
-        from mvpose.cli.exit_codes import failing
+        from mvpose.commands.errors import failing
 
         inputs = read_inputs(calibration, detections, choices, examined=True)
         with failing("the diagnosis"):
@@ -55,11 +56,11 @@ def doctor(
             _write_page(out, inputs, diagnosis, (str(calibration), " ".join(map(str, detections))))
     typer.echo(json.dumps(diagnosis.to_json(), indent=1) if as_json else "\n".join(_lines(diagnosis)))
     if diagnosis.verdict == "faults":
-        raise typer.Exit(FAULTS)
+        raise typer.Exit(FOUND)
 
 
 def _write_page(folder: Path, inputs: Inputs, diagnosis: Diagnosis, files: tuple[str, str]) -> None:
-    from mvpose.cli.exit_codes import failing
+    from mvpose.commands.errors import failing
     from mvpose.files.atomic_files import atomic_folder
     from mvpose.report.doctor_page import write_doctor_page
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mvpose.cli.exit_codes import command_line, exit_on_error
 from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
-from mvpose.cli.option_groups import grouped
+from mvpose.cli.program import PROGRAM
+from mvpose.commands.option_groups import grouped
 
 if TYPE_CHECKING:
     from mvpose.formats.pictures import PictureSource
@@ -84,8 +84,8 @@ class Wanted:
         Raises:
             ValueError: an option that cannot be, or a folder that cannot be written.
         """
-        from mvpose.cli.output_folder import check_writable
         from mvpose.cli.results import formats_of, options_of
+        from mvpose.commands.output_files import check_writable
 
         check_writable(self.out)
         formats_of(self.formats)
@@ -98,7 +98,7 @@ class Wanted:
 @grouped()
 def estimate(calibration: Calibration, detections: DetectionPaths, *, wanted: Wanted, choices: Choices) -> None:
     """Make tracked people in 3D of a calibration and 2D detections, in files for other programs."""
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
         estimate_into(calibration, detections, choices, wanted)
 
 
@@ -149,7 +149,7 @@ def estimate_into(
         inputs,
         formats=formats_of(wanted.formats),
         options=options_of(wanted.files_up, together=wanted.together),
-        command=command_line(),
+        command=PROGRAM.command_line(),
         page=wanted.page,
         views=views,
         films=wanted.films,

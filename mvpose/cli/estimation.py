@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 from mvpose.cli.agreement import agreement, check
-from mvpose.cli.exit_codes import failing, note
 from mvpose.cli.inputs import Inputs
-from mvpose.cli.progress import bar
+from mvpose.commands.errors import failing
+from mvpose.commands.program import note
+from mvpose.commands.progress import single_stage
 from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS, preset
 from mvpose.recording import People
@@ -55,7 +56,7 @@ def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -
     estimates = []
     method = whole_body(method) if inputs.skeleton != COCO17 else method
     tracks = isinstance(method, SequenceEstimator)
-    with bar("estimate", len(inputs.frames)) as advance, failing("estimation"):
+    with single_stage("estimate", len(inputs.frames)) as advance, failing("estimation"):
         results = (
             method.track(inputs.rig, inputs.frames)
             if isinstance(method, SequenceEstimator)

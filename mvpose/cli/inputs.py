@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mvpose.cli.exit_codes import note
+from mvpose.commands.program import note
 
 if TYPE_CHECKING:
     import numpy as np
@@ -129,7 +129,7 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     Raises:
         ValueError: anything wrong with a file or an option.
     """
-    from mvpose.cli.progress import bar
+    from mvpose.commands.progress import single_stage
     from mvpose.formats.calibration.calibration_formats import read_calibration
     from mvpose.formats.detections import plausibility
     from mvpose.formats.detections.recorded_frames import read_recording
@@ -144,7 +144,7 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     skeleton = _skeleton(choices.skeleton) if choices.skeleton else None
     rig = read_calibration(calibration, size=plausibility.UNKNOWN_SIZE, only=choices.only, key="--cameras")
     names = [camera.name for camera in rig]
-    with bar("read", len(rig)) as advance:
+    with single_stage("read", len(rig)) as advance:
         recorded = read_recording(
             names, detections, skeleton=skeleton, all_joints=choices.joints == "all", frames=frames, progress=advance
         )

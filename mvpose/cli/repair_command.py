@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mvpose.cli.exit_codes import exit_on_error, note
 from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
-from mvpose.cli.option_groups import grouped
+from mvpose.cli.program import PROGRAM
+from mvpose.commands.option_groups import grouped
+from mvpose.commands.program import note
 
 if TYPE_CHECKING:
     from mvpose import Rig
@@ -51,15 +52,15 @@ def repair(
     choices: Choices,
 ) -> None:
     """Correct a calibration from the people in the pictures, and write it in the format of the old one."""
-    with exit_on_error():
-        from mvpose.cli.output_folder import check_new
+    with PROGRAM.exit_on_error():
+        from mvpose.commands.output_files import check_new
 
         check_new(out)
         if new_times is not None:
             check_new(new_times, option="--new-times")
         freedoms, decides = _freedoms(free), _size(rig_size)
         from mvpose.calibration import repair as mend
-        from mvpose.cli.exit_codes import failing
+        from mvpose.commands.errors import failing
 
         inputs = read_inputs(calibration, detections, choices, examined=True)
         with failing("the repair"):

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mvpose.cli.exit_codes import failing
 from mvpose.cli.inputs import Inputs
-from mvpose.cli.output_folder import RESULTS
-from mvpose.cli.progress import bar
+from mvpose.commands.errors import failing
+from mvpose.commands.output_files import RESULTS
+from mvpose.commands.progress import single_stage
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.formats.people import Options, check_formats, write_people
 from mvpose.recording import People
@@ -113,7 +113,7 @@ def _write_page(
         return iter(()) if views is None else views[view].some(inputs.numbers[frames].tolist())
 
     count = 0 if views is None or not films else len(views) * len(compared_frames(people.frames))
-    with bar("films", count) as advance, failing("the page"):
+    with single_stage("films", count) as advance, failing("the page"):
         write_page(
             folder,
             name=name,

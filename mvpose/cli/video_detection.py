@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from mvpose.cli.exit_codes import failing
-from mvpose.cli.progress import bar
+from mvpose.commands.errors import failing
+from mvpose.commands.progress import single_stage
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import parse_json, read_bytes
 from mvpose.formats.pictures import PictureSource
@@ -46,7 +46,7 @@ def detect_videos(
     folder.mkdir(parents=True, exist_ok=True)
     (folder / MARK).write_text("mvpose detect\n", encoding="utf-8")
     files = []
-    with bar("detect", sum(source.count for source in sources)) as advance:
+    with single_stage("detect", sum(source.count for source in sources)) as advance:
         for source in sources:
             files.append(folder / f"{source.name}.json")
             partial = folder / f".{source.name}.partial.jsonl"

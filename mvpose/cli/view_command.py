@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mvpose.cli.exit_codes import exit_on_error
+from mvpose.cli.program import PROGRAM
 
 _PAGES = ("recording.html", "doctor.html")
 
@@ -24,7 +24,7 @@ def view(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
 ) -> None:
     """Open the page of a result in a browser, and print its path."""
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
         page = next((folder / name for name in _PAGES if (folder / name).is_file()), None)
         if page is None:
             raise ValueError(f"{folder}: has no {_PAGES[0]}; expected a folder that `mvpose estimate ... --out` made")

@@ -20,10 +20,11 @@ from simharness.cli import (
     study_command,
     validate_command,
 )
-from simharness.cli.app import app
+from simharness.cli.program import PROGRAM
 
 __all__ = ["app", "main"]
 
+app = PROGRAM.app()
 run_command.add_to(app)
 export_command.add_to(app)
 scenarios_command.add_to(app)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import exit_on_error, write_json
+from mvpose.commands.output_files import write_json
 from simharness.cli.options import JsonFile, Overrides, ScenarioFile, Seed
+from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:
     from simharness.study.causes.cause_shares import Blame
@@ -52,8 +53,8 @@ def blame(
     and together: errors of the detector, what hides people, calibration,
     clocks, matching, and one camera too few. Each gets its share of the loss.
     """
-    with exit_on_error():
-        from simharness.runtime.progress import reporter
+    with PROGRAM.exit_on_error():
+        from mvpose.commands.progress import reporter
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import BAD_INPUT, REGRESSION, exit_on_error, run_errors_only
+from mvpose.commands.errors import failing
+from mvpose.commands.program import BAD_INPUT, FOUND
+from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -66,8 +68,8 @@ def check(
     until it is accepted, because the suite may have become easier. Trials that
     could not be run also fail the check.
     """
-    with exit_on_error():
-        from simharness.gate.baseline import check_place
+    with PROGRAM.exit_on_error():
+        from mvpose.commands.output_files import check_place
         from simharness.scenario.study_definition import load_study
 
         reports = {option: path for option, path in (("--junit", junit), ("--summary", summary)) if path is not None}
@@ -84,17 +86,17 @@ def check(
         if update:
             _update(study, baseline, workers)
             return
+        from mvpose.commands.progress import reporter
         from simharness.gate.gate_check import baseline_of
         from simharness.gate.gate_check import check as check_suite
-        from simharness.runtime.progress import reporter
 
         before = baseline_of(study, baseline)
-        with run_errors_only(), reporter() as bars:
+        with failing(), reporter() as bars:
             result = check_suite(study, before, workers=workers, accept_better=accept_better, reporter=bars)
         _print(result, Console())
         unwritten = _write(result, reports)
     if not result.passed:
-        raise typer.Exit(REGRESSION)
+        raise typer.Exit(FOUND)
     if unwritten:
         raise typer.Exit(BAD_INPUT)
 
@@ -116,18 +118,18 @@ def _write(result: GateResult, reports: Mapping[str, Path]) -> bool:
 
 def _update(study: Study, path: Path, workers: int) -> None:
     """Measure a suite and write its scores as the baseline."""
+    from mvpose.commands.progress import reporter
     from simharness.gate.baseline import write_baseline
     from simharness.gate.required_seeds import require_seeds
     from simharness.gate.suite import run_suite
-    from simharness.runtime.progress import reporter
 
     require_seeds(study)
-    with run_errors_only(), reporter() as bars:
+    with failing(), reporter() as bars:
         done = run_suite(study, workers=workers, reporter=bars)
     if done.failed:
         message = f"{_list_failed(done.failed)}\n{path} was not written, because it would lack these trials"
         Console(stderr=True).print(message, soft_wrap=True, highlight=False, markup=False)
-        raise typer.Exit(REGRESSION)
+        raise typer.Exit(FOUND)
     measured = done.measurement(study)
     write_baseline(measured, path)
     Console().print(

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import exit_on_error, run_errors_only, write_json
-from simharness.cli.options import JsonFile, Overrides, RecordingFile, RecordingFolder, ScenarioFile, command_line
+from mvpose.commands.errors import failing
+from mvpose.commands.output_files import write_json
+from simharness.cli.options import JsonFile, Overrides, RecordingFile, RecordingFolder, ScenarioFile
+from simharness.cli.program import PROGRAM
 from simharness.cli.recording_group import recording_group
 
 if TYPE_CHECKING:
@@ -62,13 +64,13 @@ def evaluate_recording(
     ] = 0.2,
 ) -> None:
     """Score methods on a recording; the word [cyan]recording[/] may be left out."""
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
         start = perf_counter()
+        from mvpose.commands.progress import reporter
         from mvpose.presets import NEED_DESCRIPTORS, without_repair
         from simharness.cli.evaluation_tables import print_evaluation
         from simharness.reality.evaluation import evaluate
         from simharness.reality.recording_file import read_recording
-        from simharness.runtime.progress import reporter
 
         names = method or ["full"]
         if blind := [name for name in names if without_repair(name) in NEED_DESCRIPTORS]:
@@ -81,7 +83,7 @@ def evaluate_recording(
         data = read_recording(recording, folder, head=head.value)
         pipelines = {name: _estimator(name, lag=lag, period=1.0 / data.rate) for name in names}
         with (
-            run_errors_only(),
+            failing(),
             reporter() as bars,
             bars.stage("evaluate", len(data) * len(pipelines)) as advance,
         ):
@@ -114,7 +116,7 @@ def evaluate_poses(
     ] = None,
 ) -> None:
     """Score the results of [cyan]mvpose estimate[/] or [cyan]mvpose run[/] against the truth of a recording."""
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
         start = perf_counter()
         from mvpose.formats.people_table import read_people
         from simharness.cli.evaluation_tables import print_evaluation
@@ -141,14 +143,14 @@ def twin(
     json_file: JsonFile = None,
 ) -> None:
     """Compare a recording with simulated copies of it (twins): PCP of four variants, with intervals."""
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
         start = perf_counter()
+        from mvpose.commands.progress import reporter
         from simharness.cli.evaluation_tables import print_twin_comparison
         from simharness.reality.detector_fit.fit import fit
         from simharness.reality.recording_file import read_recording
         from simharness.reality.twin import TwinModel, simulate_twins
         from simharness.reality.twin_comparison import compare
-        from simharness.runtime.progress import reporter
 
         recorded = read_recording(recording, folder)
         with reporter() as bars:
@@ -168,11 +170,11 @@ def evaluate_seeds(
     json_file: JsonFile = None,
 ) -> None:
     """Score a scenario at many seeds by the protocol of the data sets: PCP of all people and of each person."""
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
         start = perf_counter()
+        from mvpose.commands.progress import reporter
         from simharness.cli.evaluation_tables import print_seed_evaluation
         from simharness.reality.seed_evaluation import evaluate_seeds as evaluate_at_seeds
-        from simharness.runtime.progress import reporter
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or ())
@@ -198,5 +200,5 @@ def _write(summary: dict[str, Any], path: Path, *, seeds: Iterable[int], variant
     from simharness.trial.provenance import provenance
 
     seconds = perf_counter() - start
-    made = provenance(command=command_line(), seeds=seeds, variants=variants, seconds=seconds)
+    made = provenance(command=PROGRAM.command_line(), seeds=seeds, variants=variants, seconds=seconds)
     write_json({**made, **summary}, path)

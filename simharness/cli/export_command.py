@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from simharness.cli.exit_codes import exit_on_error
-from simharness.cli.options import Overrides, ScenarioFile, Seed, command_line
+from simharness.cli.options import Overrides, ScenarioFile, Seed
+from simharness.cli.program import PROGRAM
 
 
 def add_to(app: typer.Typer) -> None:
@@ -34,8 +34,8 @@ def export(
     The detections are OpenPose files. The sequence appears in FOLDER/NAME when
     it is complete, and replaces an earlier export; manifest.json describes it.
     """
-    with exit_on_error():
-        from simharness.runtime.progress import reporter
+    with PROGRAM.exit_on_error():
+        from mvpose.commands.progress import reporter
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)
@@ -43,7 +43,7 @@ def export(
 
         plan = ExportPlan(folder / loaded.name, every=every, pictures=pictures)
         with reporter() as bars:
-            made = export_sequence(loaded, plan, reporter=bars, command=command_line())
+            made = export_sequence(loaded, plan, reporter=bars, command=PROGRAM.command_line())
     files = [file for file in made.rglob("*") if file.is_file()]
     megabytes = sum(file.stat().st_size for file in files) / 1e6
     typer.echo(f"{len(files)} files, {megabytes:.1f} MB, in {made}")

@@ -8,8 +8,10 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import exit_on_error, run_errors_only, write_json
+from mvpose.commands.errors import failing
+from mvpose.commands.output_files import write_json
 from simharness.cli.options import RecordingFile, RecordingFolder
+from simharness.cli.program import PROGRAM
 
 
 def add_to(app: typer.Typer) -> None:
@@ -35,13 +37,13 @@ def fit_detector(
     ] = None,
 ) -> None:
     """Measure the errors of the detector of a recording, and write a detector profile with them."""
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
+        from mvpose.commands.progress import reporter
         from simharness.reality.detector_fit.fit import fit, write_profile
         from simharness.reality.detector_fit.fit_plot import plot_comparison
         from simharness.reality.detector_fit.fit_table import print_agreement, print_annotation, print_measurement
         from simharness.reality.recording_file import read_recording
         from simharness.reality.twin import TwinModel, simulate_twins
-        from simharness.runtime.progress import reporter
 
         recorded = read_recording(recording, folder)
         with reporter() as bars, bars.stage("fit", 1):
@@ -54,7 +56,7 @@ def fit_detector(
         print_annotation(fitted.annotation, console)
         summary = {"real": fitted.real.summary(), "annotation": fitted.annotation.summary()}
         if figure is not None:
-            with run_errors_only(), reporter() as bars:
+            with failing(), reporter() as bars:
                 (twin,) = simulate_twins(TwinModel.of(recorded, fitted), count=1, reporter=bars)
                 simulated = fit(twin).real
             plot_comparison([fitted.real, simulated], figure)

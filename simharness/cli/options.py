@@ -1,9 +1,7 @@
-"""Arguments and options that several commands share, and the command line as text."""
+"""Arguments and options that several commands share."""
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -51,8 +49,3 @@ JsonFile = Annotated[
     Path | None,
     typer.Option("--json", metavar="FILE", help="Write all results to this file as well.", dir_okay=False),
 ]
-
-
-def command_line() -> str:
-    """Return the command line of this process, for reproduction."""
-    return shlex.join(["simharness", *sys.argv[1:]])

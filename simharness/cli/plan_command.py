@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import exit_on_error
-from simharness.cli.options import command_line
+from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:
     from simharness.planning.plan_result import RigPlan
@@ -77,9 +76,9 @@ def plan(
     rehearse), plan.html for people, and plan.json for programs. An interrupted
     plan continues where it stopped.
     """
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
+        from mvpose.commands.progress import reporter
         from simharness.planning.room_file import read_room
-        from simharness.runtime.progress import reporter
 
         changes = {
             ("people", "count"): people,
@@ -108,7 +107,7 @@ def plan(
         except KeyboardInterrupt:
             typer.echo("interrupted; the same command goes on where this one stopped", err=True)
             raise typer.Exit(INTERRUPTED) from None
-        page = write_plan(planned, folder, command=command_line())
+        page = write_plan(planned, folder, command=PROGRAM.command_line())
     _show(planned)
     typer.echo(f"rig: {folder / 'planned.toml'}")
     typer.echo(f"report: {page}")

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import exit_on_error, write_json
-from simharness.cli.options import command_line
-from simharness.cli.result_files import make_folder, write_page
+from mvpose.commands.output_files import make_folder, write_json, write_text
+from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:
     from simharness.planning.visibility import Obstacle
@@ -106,8 +105,9 @@ def rehearse(
     A fast approximation makes the maps and compares cameras; simulated scenes
     show how well the method estimates people who walk there.
     """
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
         start = perf_counter()
+        from mvpose.commands.progress import reporter
         from simharness.cli.rehearse_values import (
             clutter_of,
             obstacle_of,
@@ -119,7 +119,6 @@ def rehearse(
         from simharness.outputs.planning.rehearsal_page import render_rehearsal
         from simharness.planning.rehearse_rig import RehearsalEffort, rehearse_rig
         from simharness.planning.rig_file import read_rig
-        from simharness.runtime.progress import reporter
         from simharness.scenario.presets import read_profile
         from simharness.trial.provenance import provenance
 
@@ -159,12 +158,12 @@ def rehearse(
                 reporter=bars,
             )
         made = provenance(
-            command=command_line(),
+            command=PROGRAM.command_line(),
             seeds=range(seed, seed + scenes),
             variants=("full",),
             seconds=perf_counter() - start,
         )
-        write_page(render_rehearsal(rehearsal, provenance=made), place / "rehearsal.html")
+        write_text(render_rehearsal(rehearsal, provenance=made), place / "rehearsal.html")
         write_json({**made, **rehearsal.to_json()}, place / "rehearsal.json")
     console = Console()
     for sentence in rehearsal.sentences:

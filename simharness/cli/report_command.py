@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simharness.cli.exit_codes import exit_on_error, run_errors_only
+from mvpose.commands.errors import failing
 from simharness.cli.options import BlameSeeds
+from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:
     from simharness.outputs.study.worst_frames import WorstFrame
@@ -66,7 +67,7 @@ def report(
 
     The trials of the worst frames are run again to make their pictures.
     """
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
         if trial is not None and rerun is None:
             raise ValueError("--trial: chooses the trial that --rerun writes; add --rerun FILE, or remove --trial")
         if rerun is not None and digest is not None:
@@ -86,9 +87,9 @@ def report(
             _write_rerun(results, trial, rerun)
             typer.echo(f"recording: {rerun}")
             return
+        from mvpose.commands.progress import reporter
         from simharness.outputs.study.page import THRESHOLDS, check_thresholds, write_report
         from simharness.outputs.study.worst_frames import SHOWN
-        from simharness.runtime.progress import reporter
 
         check_thresholds(thresholds)
         if digest is not None:
@@ -129,7 +130,7 @@ def _write_rerun(results: Results, trial: str | None, path: Path) -> None:
     require_sdk()
     frame = _choose_frame(results, trial)
     scenario = results.scenario_of(frame.trial)
-    with run_errors_only():
+    with failing():
         again = replay(scenario, frame.variant)
     write_rerun(again, path)
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import exit_on_error
-from simharness.cli.options import BlameSeeds, Overrides, ScenarioFile, Seed, command_line
+from simharness.cli.options import BlameSeeds, Overrides, ScenarioFile, Seed
+from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:
     from simharness.cli.score_tables import ScoreTable
@@ -43,8 +43,8 @@ def run(
     Prints a table of scores and the path of the report, a page for the
     browser. Files for programs are beside it.
     """
-    with exit_on_error():
-        from simharness.runtime.progress import reporter
+    with PROGRAM.exit_on_error():
+        from mvpose.commands.progress import reporter
         from simharness.scenario.load import load
 
         loaded = load(
@@ -52,7 +52,7 @@ def run(
         )  # before slow imports: mistakes are reported at once
         from simharness.outputs.run.result_folder import run as run_scenario
 
-        command = command_line()
+        command = PROGRAM.command_line()
         with reporter() as bars:
             folder = run_scenario(loaded, out=out, workers=workers, reporter=bars, command=command, blame_seeds=blame)
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
@@ -99,8 +99,8 @@ def render(
     The files appear in FOLDER/NAME when they are complete: CAMERA/0000.png, ...
     or CAMERA.mp4, and a mosaic of all cameras.
     """
-    with exit_on_error():
-        from simharness.runtime.progress import reporter
+    with PROGRAM.exit_on_error():
+        from mvpose.commands.progress import reporter
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import exit_on_error
 from simharness.cli.options import Overrides, ScenarioFile, Seed
+from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -27,7 +27,7 @@ def add_to(app: typer.Typer) -> None:
 
 def scenarios() -> None:
     """List the shipped scenarios, and the rigs and the sensor and detector profiles for your own."""
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
         from simharness.scenario.presets import PROFILES, RIGS, SENSORS, summary_of
         from simharness.scenario.resolution import read_plan
         from simharness.scenario.shipped import shipped_folder
@@ -57,7 +57,7 @@ def show(
     seed: Seed = None,
 ) -> None:
     """Print a scenario with all keys, defaults and descriptions, and what it needs; of a study also its trials."""
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
         from simharness.scenario.outline import outline
         from simharness.scenario.size import MOST_TRIALS
         from simharness.scenario.study_definition import StudyTooLarge, load_study, read_plan
@@ -94,7 +94,7 @@ def schema(
     ] = None,
 ) -> None:
     """Print the JSON schema of scenario files, with which editors complete and validate them."""
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
         from simharness.scenario.schema import dumps
 
         if out is None:

@@ -12,8 +12,10 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
-from simharness.cli.exit_codes import FAILED, exit_on_error, run_errors_only
-from simharness.cli.options import BlameSeeds, Overrides, ScenarioFile, command_line
+from mvpose.commands.errors import failing
+from mvpose.commands.program import FAILED
+from simharness.cli.options import BlameSeeds, Overrides, ScenarioFile
+from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:
     import polars as pl
@@ -81,13 +83,13 @@ def study(
     resumes where it stopped. The results appear, when all trials are finished,
     in a folder NAME: report.html for people, Parquet tables for programs.
     """
-    with exit_on_error(), _stopping():
+    with PROGRAM.exit_on_error(), _stopping():
         from simharness.scenario.study_definition import LIMIT, load_study
 
         limits = None if yes else LIMIT
         loaded = load_study(file, overrides=overrides or (), seeds=seeds, variants=variant or None, limit=limits)
         part = _part(shard)
-        from simharness.runtime.progress import reporter
+        from mvpose.commands.progress import reporter
         from simharness.study.study_run import run_shard, run_study
 
         if part is not None:
@@ -99,7 +101,7 @@ def study(
             _write(f"store: {kept_in}")
             _write("after all parts: simharness merge STORE... --into STORE, then the same study without --shard")
         else:
-            command = command_line()
+            command = PROGRAM.command_line()
             with reporter() as bars:
                 results = run_study(
                     loaded, out=out, store=store, workers=workers, scheduler=scheduler, reporter=bars, command=command
@@ -119,7 +121,7 @@ def merge(
     into: Annotated[Path, typer.Option(metavar="STORE", help="The store to which they are copied.", file_okay=False)],
 ) -> None:
     """Merge the stores of a study that ran in parts (study --shard) on several machines."""
-    with exit_on_error(), _stopping():
+    with PROGRAM.exit_on_error(), _stopping():
         from simharness.study.trial_store import merge as merge_stores
 
         merged = merge_stores(stores, into)
@@ -133,7 +135,7 @@ def merge(
 @contextlib.contextmanager
 def _stopping() -> Iterator[None]:
     """Report in one message why a study stopped early."""
-    from simharness.runtime.errors import RunError
+    from mvpose.commands.errors import RunError
 
     try:
         yield
@@ -284,20 +286,20 @@ def _report(results: Results, *, blame: int, workers: int) -> None:
         return
     if blame:
         blame_results(results, seeds=blame, workers=workers)
+    from mvpose.commands.progress import reporter
     from simharness.outputs.study.page import write_report
     from simharness.outputs.study.worst_frames import SHOWN
-    from simharness.runtime.progress import reporter
 
-    with run_errors_only(), reporter() as bars, bars.stage("report", SHOWN) as advance:
+    with failing(), reporter() as bars, bars.stage("report", SHOWN) as advance:
         page = write_report(results, progress=advance)
     _write(f"report: {page}")
 
 
 def blame_results(results: Results, *, seeds: int, workers: int = 1) -> None:
     """Find what cost a study its score, write it into its folder, and print it."""
+    from mvpose.commands.progress import reporter
     from simharness.cli.blame_command import print_blame
     from simharness.outputs.study.blame_study import blame_study
-    from simharness.runtime.progress import reporter
     from simharness.study.causes.blame_file import write_blame
 
     with reporter() as bars:

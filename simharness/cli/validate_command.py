@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import REGRESSION, exit_on_error, run_errors_only, write_json
-from simharness.cli.options import JsonFile, RecordingFile, RecordingFolder, command_line
-from simharness.cli.result_files import make_folder, write_page
+from mvpose.commands.errors import failing
+from mvpose.commands.output_files import make_folder, write_json, write_text
+from mvpose.commands.program import FOUND
+from simharness.cli.options import JsonFile, RecordingFile, RecordingFolder
+from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -65,10 +67,10 @@ def validate(
     and scores the method on both: all cameras and all subsets of them, with and
     without added errors, by both rules for the head.
     """
-    with exit_on_error():
+    with PROGRAM.exit_on_error():
         start = perf_counter()
+        from mvpose.commands.progress import reporter
         from simharness.reality.recording_file import read_recording
-        from simharness.runtime.progress import reporter
 
         recorded = read_recording(recording, folder)
         other = None if fit_on is None else read_recording(fit_on)
@@ -85,14 +87,14 @@ def validate(
         count = twins or (_QUICK_TWINS if quick else _TWINS)
         with reporter() as bars:
             simulated = simulate_predictions(recorded, count=count, fitted_on=other, reporter=bars)
-            with run_errors_only():
+            with failing():
                 validation = compare(recorded, simulated, plan=plan, reporter=bars)
             halves = predict_halves(recorded, count=count, plan=plan, reporter=bars) if split_half else []
         validation = replace(
             validation, verdicts=[*validation.verdicts, *(verdict for half in halves for verdict in half.verdicts)]
         )
         made = provenance(
-            command=command_line(), seeds=range(count), variants=plan.variants, seconds=perf_counter() - start
+            command=PROGRAM.command_line(), seeds=range(count), variants=plan.variants, seconds=perf_counter() - start
         )
         summary: dict[str, Any] = {
             # The variants of the provenance are names; those of the summary are their scores.
@@ -102,14 +104,14 @@ def validate(
             "split_half": summarize_halves(halves),
         }
         page = render_validation(validation, provenance=made, fitted_on="" if other is None else other.name)
-        write_page(page, place / "validation.html")
+        write_text(page, place / "validation.html")
         for path in filter(None, (place / "validation.json", json_file)):
             write_json(summary, path)
     console = Console()
     _print_verdicts(validation.verdicts, recorded.name, console)
     console.print(f"report: {place / 'validation.html'}", soft_wrap=True, highlight=False, markup=False)
     if validation.failed:
-        raise typer.Exit(REGRESSION)
+        raise typer.Exit(FOUND)
 
 
 def _print_verdicts(verdicts: Sequence[BoundVerdict], name: str, console: Console) -> None:

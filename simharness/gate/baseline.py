@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mvpose.files.atomic_files import write_atomic
+from mvpose.commands.output_files import write_text
 from mvpose.files.input_files import MIB, parse_json, read_bytes
 from mvpose.files.message_text import one_line, shown
 from simharness.gate.trial_command import TrialKey
@@ -79,38 +78,6 @@ def write_baseline(measurement: Measurement, path: Path) -> None:
     rows = [f"    {json.dumps(trial._asdict() | dict(scores))}" for trial, scores in measurement.scores.items()]
     text = "\n".join(["{", *head, '  "trials": [', ",\n".join(rows), "  ]", "}"])
     write_text(text + "\n", path, option="--baseline")
-
-
-def write_text(text: str, path: Path, *, option: str) -> None:
-    """Write a text file, and its folder where it is missing. The file appears only when it is complete.
-
-    Args:
-        text: the text.
-        path: the file.
-        option: command line option that names the file, for the message.
-
-    Raises:
-        ValueError: the file cannot be written.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomic(path, text.encode())
-    except OSError as error:
-        raise ValueError(f"{option} {path}: cannot be written: {error.strerror}") from None
-
-
-def check_place(path: Path, *, option: str) -> None:
-    """Check before a run that :func:`write_text` can write a file; create its folder.
-
-    Raises:
-        ValueError: the file cannot be written.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path.parent):
-            pass
-    except OSError as error:
-        raise ValueError(f"{option} {path}: cannot be written: {error.strerror}") from None
 
 
 def read_baseline(path: Path) -> Measurement:

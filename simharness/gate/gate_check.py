@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from mvpose.commands.progress import Reporter
 from simharness.gate.baseline import Measurement, read_baseline
 from simharness.gate.compare import Comparison, compare
 from simharness.gate.gate_result import GateResult
 from simharness.gate.required_seeds import require_seeds
 from simharness.gate.suite import SuiteRun, fingerprint, run_suite
 from simharness.gate.trial_command import TrialKey, command_of, setting_name, settings_at_seeds
-from simharness.runtime.progress import Reporter
 from simharness.scenario.study_definition import Study
 
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from numba.core.registry import cpu_target
 from threadpoolctl import threadpool_limits
 
+from mvpose.commands.progress import Reporter, Silence
 from mvpose.presets import TRACKING, without_repair
 from simharness.gate.baseline import FRAMES, TIME, Measurement
 from simharness.gate.frame_times import relative_times
 from simharness.gate.gate_result import FailedCase
 from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
-from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.version import code_version
 from simharness.scenario.sections.method_section import MethodSection
 from simharness.scenario.sections.scenario import Scenario

@@ -23,6 +23,7 @@ import numpy as np
 
 from mvpose import Rig
 from mvpose.arrays import Floats
+from mvpose.commands.progress import Reporter, Silence
 from simharness.planning.candidates import Candidate, alike, around, candidates_in
 from simharness.planning.fast_layer import FastLayer, Prediction
 from simharness.planning.limits import Limits
@@ -34,7 +35,6 @@ from simharness.planning.room_file import read_room
 from simharness.planning.scene_results import interval_of
 from simharness.planning.search import CandidateSet, Ledger, exchange_search, refine
 from simharness.planning.value_fit import VARIANT, fit_value, layer_of
-from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.version import code_version
 
 _MOST_CANDIDATES = 1200

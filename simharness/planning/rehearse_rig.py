@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from mvpose import Camera, Rig
+from mvpose.commands.progress import Reporter, Silence
 from simharness.planning.extra_camera import candidate_cameras
 from simharness.planning.fast_layer import CameraTerms, FastLayer, Prediction
 from simharness.planning.floor_coverage import coverage, covered_rectangle
@@ -31,7 +32,6 @@ from simharness.planning.tolerance import fault_conditions, tolerances
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.reality.validation.subsets import camera_subsets
-from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.statistics.intervals import Interval

@@ -9,6 +9,7 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from mvpose.arrays import Floats
+from mvpose.commands.progress import Reporter, Silence
 from simharness.planning.candidates import Candidate, candidate, places_in
 from simharness.planning.rehearsal_scene import SceneSettings
 from simharness.planning.room import Room
@@ -16,7 +17,6 @@ from simharness.planning.scene_results import Condition, SceneResult
 from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
 from simharness.planning.value_fit import VARIANT, obstacles_of
 from simharness.planning.volume import Volume
-from simharness.runtime.progress import Reporter, Silence
 from simharness.types.random_streams import stream
 
 _SPACING = (0.25, 0.3)  # metres between the places that are tried: on the mount and in height

@@ -17,11 +17,11 @@ import numpy as np
 
 from mvpose import COCO17, Detections, Rig
 from mvpose.arrays import Bools, Floats
+from mvpose.commands.progress import Silence, Stages
 from mvpose.formats.calibration.opencv import write_calibration
 from simharness.detector.detect import detect
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.people_tracks import TrackedPeople
-from simharness.runtime.progress import Silence, Stages
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.build_trial import build_trial

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from mvpose.arrays import Floats
+from mvpose.commands.progress import Reporter, Silence
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import annotate_simulation
 from simharness.reality.evaluation import Evaluation, score_estimates
-from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.pcp import Part
 from simharness.scoring.score_summary import VariantScores

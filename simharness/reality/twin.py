@@ -12,13 +12,13 @@ from typing import Self
 import numpy as np
 
 from mvpose import COCO17
+from mvpose.commands.progress import Reporter, Silence
 from simharness.detector.bias import world_offsets
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationModel
 from simharness.reality.detector_fit.fit import DetectorFit
 from simharness.reality.people_tracks import TrackedPeople
 from simharness.reality.reenactment import Film, cut_takes, film
-from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.detector_section import DetectorSection
 
 MOST_FILMS = 3

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from mvpose import preset
+from mvpose.commands.progress import Reporter, Silence
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.evaluation import evaluate
 from simharness.reality.seed_evaluation import PcpInterval, pcp_interval
-from simharness.runtime.progress import Reporter, Silence
 from simharness.scoring.score_summary import VariantScores
 
 VARIANTS = ("full", "fast", "no-3dps", "no-matching")

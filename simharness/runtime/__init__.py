@@ -1,1 +1,1 @@
-"""Processes, progress, files and versions: tools of every long command, on which no result depends."""
+"""Processes, stages, tables and versions: tools of every long command, on which no result depends."""

@@ -21,7 +21,7 @@ from typing import Any, Protocol, TypeVar
 
 import threadpoolctl
 
-from simharness.runtime.errors import RunError
+from mvpose.commands.errors import RunError
 
 Result_co = TypeVar("Result_co", covariant=True)
 Result = TypeVar("Result")

@@ -26,12 +26,12 @@ from scipy.optimize import linear_sum_assignment
 
 from mvpose import COCO17, Detections, Estimate, Pipeline, Rig, Skeleton
 from mvpose.arrays import Integers
+from mvpose.commands.errors import naming_frame
 from mvpose.estimate import Matching
 from mvpose.estimators import Estimator
 from mvpose.pipeline import UnmatchedPipeline
 from mvpose.rays import Rays, viewing_rays
 from mvpose.reconstruction import Poses
-from simharness.runtime.errors import naming_frame
 from simharness.scoring.failure_classes import Failure, FailureKind, failures_of_frame
 from simharness.scoring.pairing import mean_distances
 from simharness.types.recording import Recording

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from simharness.runtime.errors import RunError
+from mvpose.commands.errors import RunError
 from simharness.runtime.frame_pool import worker_context
 from simharness.scenario.sections.scenario import Scenario
 from simharness.study.stored_trial import StoredTrial, TrialOutput

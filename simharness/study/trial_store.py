@@ -31,11 +31,11 @@ from typing import Any
 
 import polars as pl
 
+from mvpose.commands.errors import RunError
 from mvpose.files.archives import members_of
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import parse_json, read_bytes, read_json
 from mvpose.files.message_text import shown
-from simharness.runtime.errors import RunError
 from simharness.runtime.parquet_tables import table_of
 from simharness.trial.identity import code
 from simharness.trial.variant_result import VariantResult

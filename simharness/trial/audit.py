@@ -11,7 +11,7 @@ import numpy as np
 
 from mvpose import Camera
 from mvpose.arrays import Floats
-from simharness.runtime.errors import RunError
+from mvpose.commands.errors import RunError
 from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.capture import picture_source_of

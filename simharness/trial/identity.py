@@ -48,8 +48,8 @@ BORROWED = ("formats/calibration", "wholebody")
 """Folders of ``mvpose`` that simulations use: readers of rigs, skeletons with feet and hands and their estimates."""
 
 BESIDE_THE_METHOD = (
-    "cli", "files", "formats", "networks/detector.py", "networks/people.py", "recording.py", "report", "skeleton_fit",
-    "wholebody",
+    "cli", "commands", "files", "formats", "networks/detector.py", "networks/people.py", "recording.py", "report",
+    "skeleton_fit", "wholebody",
 )  # fmt: skip
 """Folders and modules of ``mvpose`` that make no estimates of bodies in trials: readers, writers, detection in videos,
 hands and faces, the command line, pages."""

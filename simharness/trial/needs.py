@@ -12,10 +12,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from mvpose.commands.progress import duration
 from mvpose.presets import without_repair
 from mvpose.skeleton import COCO17
 from mvpose.wholebody import skeleton_by_name
-from simharness.runtime.progress import duration
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.size import camera_count, oversized
 from simharness.trial.stages.build_trial import true_rig

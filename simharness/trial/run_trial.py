@@ -17,10 +17,10 @@ import polars as pl
 import threadpoolctl
 
 from mvpose import Estimate
+from mvpose.commands.progress import Reporter, Silence, Stages
 from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.presets import PRESETS
 from mvpose.wholebody import complete
-from simharness.runtime.progress import Reporter, Silence, Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import Assessment, assess
 from simharness.scoring.catalogue import SCORES

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from suites import SMALL, remember_scenes
 
+from mvpose.commands.errors import RunError
 from simharness import assert_robust
 from simharness.gate import suite
-from simharness.runtime.errors import RunError
 from simharness.scenario.toml_files import ScenarioError
 from simharness.trial import run_trial
 

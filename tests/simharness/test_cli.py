@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from mvpose.commands.errors import RunError
 from simharness.cli import app
 from simharness.reality.recording_file import read_recording
-from simharness.runtime.errors import RunError
 from simharness.scenario.presets import read_profile
 from simharness.trial.provenance import PROVENANCE
 
@@ -144,7 +144,7 @@ def test_an_internal_error_shows_its_traceback(simharness, monkeypatch, tmp_path
     result = simharness("run", QUICKSTART, *TINY)
     assert result.exit_code == 3
     assert "Traceback" in result.stderr
-    assert "the run failed: detect: " in result.stderr
+    assert "failed: detect: " in result.stderr
     assert not list(tmp_path.rglob("summary.json"))
 
 

@@ -15,11 +15,11 @@ from typer.testing import CliRunner
 import mvpose.matching
 import mvpose.pipeline
 from mvpose.affinity import GeometricAffinity
+from mvpose.commands.errors import RunError
 from mvpose.reconstruction.likelihood import Noise
 from simharness.cli import app
 from simharness.gate import suite
 from simharness.gate.baseline import GATED
-from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
 
 OF_IDENTITIES = 2  # of the gated scores: they do not apply to methods without memory

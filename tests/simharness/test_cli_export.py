@@ -76,5 +76,5 @@ def test_an_internal_error_shows_its_traceback(call, tmp_path, monkeypatch):
     result = call(QUICKSTART, "bench", *TINY)
     assert result.exit_code == 3
     assert "Traceback" in result.stderr
-    assert "the run failed: write: ValueError: wrong turn" in result.stderr
+    assert "failed: write: ValueError: wrong turn" in result.stderr
     assert not list((tmp_path / "bench").iterdir())

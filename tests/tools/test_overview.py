@@ -14,7 +14,6 @@ from mvpose import Detections
 from mvpose.report.palette import css, person_color
 from simharness.outputs.run.result_folder import run
 from simharness.outputs.study.replay import Replay
-from simharness.outputs.study.room_view import RoomView
 from simharness.scenario.load import load
 from simharness.scenario.shipped import shipped_folder
 from simharness.trial.run_folder import read_run
@@ -22,6 +21,7 @@ from simharness.trial.stages.build_trial import build_trial
 from tools.readme_picture import picture as module
 from tools.readme_picture.breaking_chart import VARIANTS, breaking_chart
 from tools.readme_picture.picture import Tile, joined, main, overview
+from tools.readme_picture.room_view import RoomView
 
 RESULTS = shipped_folder().parent / "results"
 DIGEST = json.loads((RESULTS / "crowd" / "digest.json").read_text(encoding="utf-8"))

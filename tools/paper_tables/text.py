@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from mvpose.commands.progress import duration
 from simharness.outputs.documents import markdown_table, provenance_sentence
 from simharness.runtime.number_text import fixed, signed
-from simharness.runtime.progress import duration
 
 _DATA = {"campus": "Campus", "shelf": "Shelf"}
 _OF = {

@@ -26,7 +26,6 @@ from mvpose.report.palette import TRUTH, css, person_color
 from simharness.outputs.documents import fill_template
 from simharness.outputs.run.pictures import Picture
 from simharness.outputs.study.replay import Replay
-from simharness.outputs.study.room_view import RoomView
 from simharness.trial.run_folder import Record, read_run
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import picture_source_of
@@ -34,6 +33,7 @@ from simharness.types.truth import KeypointError
 from simharness.types.views import Visibility
 from simharness.world.scene.playback import Playback
 from tools.readme_picture.breaking_chart import FACTOR, Point, breaking_chart, path
+from tools.readme_picture.room_view import RoomView
 
 _WIDTH, _HEIGHT = 1660, 872
 _MARGIN = 36

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import Detections, Rig
+from mvpose.commands.progress import Reporter, Silence, Stages
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.formats.detections.openpose import people_file
 from mvpose.skeleton import PANOPTIC19
@@ -22,7 +23,6 @@ from simharness.outputs.benchmark.cameras import hd_names, renamed, write_camera
 from simharness.outputs.benchmark.layout import Layout, check_place
 from simharness.outputs.benchmark.manifest import manifest
 from simharness.outputs.benchmark.recording_description import write_description
-from simharness.runtime.progress import Reporter, Silence, Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_files import dumps
 from simharness.trial.run_trial import run_trial

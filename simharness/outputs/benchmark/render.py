@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import Detections, Estimate
+from mvpose.commands.progress import Reporter, Silence
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.report.film_file import FilmFile
 from simharness.capture.picture import PictureSource
 from simharness.outputs.figures.mosaic import mosaic
 from simharness.outputs.run.pictures import annotate
-from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.run_trial import Goal, run_trial
 from simharness.trial.stages.build_trial import Trial, build_trial

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import polars as pl
 
-from simharness.runtime.progress import Reporter
+from mvpose.commands.progress import Reporter
 from simharness.study.causes.cause_shares import Blame, blame
 from simharness.study.study_folder import Results
 

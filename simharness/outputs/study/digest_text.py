@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from mvpose.commands.progress import duration
 from simharness.outputs.documents import markdown_table, provenance_sentence
 from simharness.outputs.study.factor_names import NAMES, axis_label
 from simharness.outputs.study.plots import mean_over, short
 from simharness.outputs.study.tables import OVER_TIME
 from simharness.runtime.number_text import fixed
-from simharness.runtime.progress import duration
 from simharness.scoring.catalogue import AP_MM, SCORES, ScoreInfo
 from simharness.scoring.failure_classes import FailureKind
 from simharness.scoring.stage_blame import Stage

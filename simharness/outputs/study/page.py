@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 from markupsafe import Markup
 
+from mvpose.commands.progress import duration
 from mvpose.files.atomic_files import write_atomic
 from simharness.outputs.documents import fill_template
 from simharness.outputs.figures.blame_section import blame_section
@@ -26,7 +27,6 @@ from simharness.outputs.study.curves import (
 from simharness.outputs.study.failure_section import failure_section
 from simharness.outputs.study.losses import LOST, Loss, finding, losses
 from simharness.outputs.study.worst_frames import WorstFramePictures, show, worst_frames
-from simharness.runtime.progress import duration
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scoring.catalogue import SCORES
 from simharness.study.causes.blame_file import read_blame

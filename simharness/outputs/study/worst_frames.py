@@ -10,10 +10,11 @@ from typing import Any
 
 import polars as pl
 
+from mvpose.report.view_3d import View3D
 from simharness.gate.trial_command import overrides
 from simharness.outputs.run.pictures import MAX_VIEWS, Picture, draw_frame
 from simharness.outputs.study.replay import Replay, replay
-from simharness.outputs.study.skeleton_view_3d import SkeletonView3D, skeleton_view_3d
+from simharness.outputs.study.skeleton_view_3d import skeleton_view_3d
 from simharness.scenario.named_files import relative_files
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study, load_study
@@ -62,7 +63,7 @@ class WorstFramePictures:
     """
 
     picture: Picture
-    view: SkeletonView3D
+    view: View3D
     setting: str
     trial: str
     command: str

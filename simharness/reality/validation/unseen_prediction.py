@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mvpose.commands.progress import Reporter
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.twin import TwinModel, simulate_twins
 from simharness.reality.validation.validation import Validation, ValidationPlan, validate
 from simharness.reality.validation.verdicts import PREDICTION_BOUNDS, BoundVerdict
-from simharness.runtime.progress import Reporter
 
 _HALVES = ("first half", "second half")
 _PREDICTED = ("pcp", "subsets")  # groups of verdicts that hold for other frames than those of the fit

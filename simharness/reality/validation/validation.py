@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mvpose.commands.progress import Reporter, Silence
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.validation.detection_figures import DetectionFigures, compare_detections, measure_detections
 from simharness.reality.validation.dose import DoseResponse, compare_responses
@@ -43,7 +44,6 @@ from simharness.reality.validation.verdicts import (
     judge_scores,
     judge_subsets,
 )
-from simharness.runtime.progress import Reporter, Silence
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.runtime.errors import RunError
+from mvpose.commands.errors import RunError
+from mvpose.commands.progress import Reporter, Silence, Stages
 from simharness.runtime.frame_pool import map_jobs
-from simharness.runtime.progress import Reporter, Silence, Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import SCALES, Interval, Scale, mean_interval

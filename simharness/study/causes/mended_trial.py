@@ -13,9 +13,9 @@ from functools import cached_property
 import numpy as np
 
 from mvpose import Estimate, Rig
+from mvpose.commands.errors import naming_frame
+from mvpose.commands.progress import Silence, Stages
 from mvpose.estimators import Estimator, SequenceEstimator
-from simharness.runtime.errors import naming_frame
-from simharness.runtime.progress import Silence, Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import assess
 from simharness.scoring.stage_blame import true_labels, with_labels

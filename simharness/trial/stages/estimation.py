@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from mvpose import Detections, Estimate, Rig
+from mvpose.commands.errors import RunError, naming_frame
+from mvpose.commands.progress import Stages
 from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.presets import PRESETS, READ_HEATMAPS, without_repair
-from simharness.runtime.errors import RunError, naming_frame
 from simharness.runtime.frame_pool import chunks_of, map_jobs
-from simharness.runtime.progress import Stages
 
 if TYPE_CHECKING:
     from simharness.detector.detect import Detected

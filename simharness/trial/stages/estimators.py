@@ -39,9 +39,9 @@ import numpy as np
 from mvpose import Detections, Estimate, Rig, preset
 from mvpose.affinity import AppearanceAffinity
 from mvpose.checks import as_array
+from mvpose.commands.errors import RunError
 from mvpose.estimators import Estimator
 from mvpose.skeleton import Skeleton
-from simharness.runtime.errors import RunError
 from simharness.scenario.sections.method_section import MethodSection, wrong_variants
 from simharness.trial.stages.estimation import track_frames
 

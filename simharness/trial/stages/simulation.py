@@ -8,11 +8,11 @@ from functools import cached_property
 
 from mvpose import Rig
 from mvpose.arrays import Floats
+from mvpose.commands.progress import Stages
 from mvpose.skeleton import COCO17
 from mvpose.wholebody import skeleton_by_name
 from simharness.detector.detect import Detected, detect
 from simharness.runtime.frame_pool import map_frames
-from simharness.runtime.progress import Stages
 from simharness.trial.stages.build_trial import Trial
 from simharness.trial.stages.capture import CaptureFrames, FilmOuterJoints
 from simharness.trial.stages.networks import ReadFrames

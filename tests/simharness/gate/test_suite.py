@@ -8,6 +8,7 @@ import pytest
 from suites import SMALL, remember_scenes
 from trials import Recorder
 
+from mvpose.commands.errors import RunError
 from mvpose.presets import TRACKING
 from simharness.gate import frame_times, suite
 from simharness.gate.baseline import FRAMES, GATED, KEPT, TIME
@@ -15,7 +16,6 @@ from simharness.gate.frame_times import reference_work, relative_times
 from simharness.gate.gate_check import baseline_of
 from simharness.gate.required_seeds import least_corrected_p
 from simharness.gate.suite import fingerprint, run_suite
-from simharness.runtime.errors import RunError
 from simharness.scenario.study_definition import load_study
 from simharness.scoring.catalogue import SCORES
 from simharness.trial.run_trial import run_trial

@@ -6,7 +6,7 @@ import pytest
 from mvpose.report.limbs import COCO17_LIMBS, plain_face
 from mvpose.report.palette import INK, OUTLINE, PAPER, TRUTH, UNMATCHED, css, person_color
 from mvpose.skeleton import COCO17
-from simharness.outputs.figures.mosaic import legend, mosaic
+from simharness.outputs.figures.mosaic import legend, mosaic, rooms_in_grid
 from simharness.outputs.figures.overlay import BoxTag, Overlay, readable_on, text_mask
 
 BLACK = np.zeros((600, 800, 3), np.uint8)
@@ -153,6 +153,14 @@ def test_mosaic_columns():
     tile = np.zeros((60, 80, 3), np.uint8)
     assert mosaic([tile] * 3, ["a", "b", "c"], columns=3).shape[1] > 240
     assert mosaic([tile] * 3, ["a", "b", "c"], columns=1).shape[1] < 100
+
+
+@pytest.mark.parametrize("count", range(1, 13))
+def test_the_rooms_of_a_grid_are_those_of_the_mosaic(count):
+    tile = np.zeros((60, 80, 3), np.uint8)
+    size = mosaic([tile] * count, [""] * count).shape
+    full = rooms_in_grid(count)
+    assert mosaic([tile] * full, [""] * full, columns=int(np.ceil(np.sqrt(count)))).shape == size
 
 
 def test_mosaic_fits_smaller_pictures_into_its_tiles_without_stretching_them():

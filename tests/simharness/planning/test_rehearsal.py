@@ -122,7 +122,7 @@ addEventListener("load", () => {
   const main = [...document.querySelectorAll("main *")];
   const wide = main.filter((each) => !each.closest("svg") && !each.closest(".scroll")
     && each.getBoundingClientRect().right > innerWidth + 1);
-  const canvas = document.querySelector(".rig-3d canvas"), first = canvas.toDataURL();
+  const canvas = document.querySelector(".view-3d canvas"), first = canvas.toDataURL();
   canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft" }));
   const turns = canvas.toDataURL() !== first;
   canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight" }));

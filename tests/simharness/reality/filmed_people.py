@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mvpose import Detections, Rig
+from mvpose.commands.progress import Silence, Stages
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
@@ -12,7 +13,6 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.sample import Sample
 from simharness.reality.people_tracks import TrackedPeople
 from simharness.reality.reenactment import Film
-from simharness.runtime.progress import Silence, Stages
 from simharness.scenario.load import load
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.trial.stages.build_trial import build_trial

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import threadpoolctl
 
-from simharness.runtime.errors import RunError
+from mvpose.commands.errors import RunError
 from simharness.runtime.frame_pool import map_frames
 
 

@@ -10,8 +10,8 @@ import pytest
 from fakes import made_up, study_of
 from trials import Recorder
 
+from mvpose.commands.errors import RunError
 from simharness.gate import suite
-from simharness.runtime.errors import RunError
 from simharness.study.scheduler import ATTEMPTS, TrialFailure, TrialSuccess, Unit, run_units
 from simharness.study.stored_trial import TrialOutput
 from simharness.study.study_plan import plan

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mvpose.commands.progress import Silence, Stages
 from mvpose.skeleton import SHELF14
 from simharness import load_scenario
 from simharness.capture.ray_casting import RayCaster
 from simharness.reality.annotation_errors import annotate_simulation
-from simharness.runtime.progress import Silence, Stages
 from simharness.trial.archive import pack_detected, unpack_detected
 from simharness.trial.audit import AuditError, audit
 from simharness.trial.stages.build_trial import build_trial

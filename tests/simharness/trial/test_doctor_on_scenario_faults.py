@@ -3,7 +3,7 @@
 import pytest
 
 from mvpose.calibration import diagnose
-from simharness.runtime.progress import Silence, Stages
+from mvpose.commands.progress import Silence, Stages
 from simharness.scenario.load import load
 from simharness.scenario.sections.cameras_section import FaultsSection
 from simharness.trial.stages.build_trial import build_trial

@@ -16,6 +16,7 @@ from trials import simulated
 
 import mvpose
 from mvpose import Pipeline
+from mvpose.commands.errors import RunError
 from mvpose.presets import PRESETS
 from simharness import assert_robust
 from simharness.outputs.run.result_folder import run
@@ -23,7 +24,6 @@ from simharness.outputs.study.digest import write_digest
 from simharness.outputs.study.page import write_report
 from simharness.outputs.study.replay import replay
 from simharness.outputs.study.worst_frames import _command
-from simharness.runtime.errors import RunError
 from simharness.runtime.frame_pool import map_frames
 from simharness.scenario.load import load
 from simharness.scenario.sections.method_section import EstimatorsSection, MethodSection

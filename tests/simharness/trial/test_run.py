@@ -8,10 +8,10 @@ import numpy as np
 import polars as pl
 import pytest
 
+from mvpose.commands.errors import RunError
 from simharness.outputs.run import result_folder as running
 from simharness.outputs.run.pictures import frame_costs
 from simharness.outputs.run.result_folder import run
-from simharness.runtime.errors import RunError
 from simharness.scenario.load import fingerprint
 from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.cameras_section import CamerasSection

@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 from trials import measured as measure
 
-from simharness.runtime.errors import RunError
+from mvpose.commands.errors import RunError
 from simharness.scenario.load import load
 from simharness.scenario.study_definition import load_study
 from simharness.scoring import stage_blame

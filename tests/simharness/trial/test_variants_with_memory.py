@@ -7,7 +7,7 @@ import pytest
 from moments import crowd, moment, ring
 
 from mvpose import SHELF14, Detections, Estimate, preset
-from simharness.runtime.errors import RunError
+from mvpose.commands.errors import RunError
 from simharness.scenario.load import load
 from simharness.trial.archive import pack_detected, pack_estimates, unpack_detected, unpack_estimates
 from simharness.trial.run_trial import run_trial

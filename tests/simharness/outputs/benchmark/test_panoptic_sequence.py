@@ -14,11 +14,11 @@ import pytest
 from trials import simulated
 
 from mvpose import COCO17
+from mvpose.commands.errors import RunError
 from mvpose.formats.calibration.panoptic import read_calibration
 from mvpose.formats.detections.openpose import read_frame
 from mvpose.skeleton import PANOPTIC19
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
-from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
 from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
 from simharness.scenario.sections.people_section import PeopleSection

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mvpose import Camera
 from mvpose.arrays import Floats
+from mvpose.report.view_3d import camera_pyramid
 from simharness.capture.picture import antialiased, meshes_at, scaled
 from simharness.outputs.run.pictures import Picture
 from simharness.outputs.study.replay import Replay
@@ -81,13 +82,5 @@ class RoomView:
     def cameras(self) -> Floats:
         """Pixels of each camera's centre and of the four base corners of its pyramid, (V, 5, 2)."""
         return self.eye.project(
-            np.stack([camera_pyramid(camera) for camera in self.replay.trial.exposures.believed_rig])
+            np.stack([camera_pyramid(camera, _PYRAMID) for camera in self.replay.trial.exposures.believed_rig])
         )
-
-
-def camera_pyramid(camera: Camera) -> Floats:
-    """Return the centre of a camera and a point on the ray of each picture corner, (5, 3) metres in the world."""
-    width, height = camera.size
-    pixels = np.array([[0, 0], [width, 0], [width, height], [0, height]]) - 0.5
-    local = np.column_stack([pixels, np.ones(4)]) @ np.linalg.inv(camera.K).T * _PYRAMID
-    return np.vstack([camera.center, camera.center + local @ camera.R])

@@ -12,7 +12,7 @@ from typing import Protocol
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from simharness.runtime.errors import RunError
+from mvpose.commands.errors import RunError
 
 _LINE_SECONDS = 10.0  # seconds between two lines where stderr is not a terminal
 _UNSETTLED = 2  # first steps include compilation: a rate that counts them gives many times the remaining time
@@ -195,6 +195,13 @@ def reporter() -> Iterator[Reporter]:
         return
     with Bars(console) as bars:
         yield bars
+
+
+@contextlib.contextmanager
+def single_stage(name: str, total: int) -> Iterator[Advance]:
+    """Report a command of one stage on stderr; one without steps is not shown."""
+    with reporter() if total else contextlib.nullcontext(Silence()) as shown, shown.stage(name, total) as advance:
+        yield advance
 
 
 def duration(seconds: float) -> str:

@@ -5,8 +5,8 @@ import io
 import pytest
 from rich.console import Console
 
-from simharness.runtime import progress
-from simharness.runtime.progress import Lines, Pace, duration, reporter
+from mvpose.commands import progress
+from mvpose.commands.progress import Lines, Pace, duration, reporter
 
 
 class Clock:

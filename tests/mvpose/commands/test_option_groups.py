@@ -10,7 +10,7 @@ import typer
 from typer.testing import CliRunner
 
 from mvpose.cli.app import app
-from mvpose.cli.option_groups import grouped
+from mvpose.commands.option_groups import grouped
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,15 @@
-"""The folder of a command's results: writable before anything runs, and complete when it appears."""
+"""Files and folders of a command's results: writable before anything runs, and complete when they appear."""
 
 from __future__ import annotations
 
+import json
 import os
 import secrets
+import tempfile
 from pathlib import Path
+from typing import Any
+
+from mvpose.files.atomic_files import write_atomic
 
 RESULTS = "inputs.json"
 """A file that every folder of results holds, and by which one is recognised."""
@@ -41,6 +46,59 @@ def check_new(path: Path, *, option: str = "--out") -> None:
     if path.exists():
         raise ValueError(f"{option} {path}: exists, and is not replaced; give another name")
     _check_above(path, option)
+
+
+def make_folder(folder: Path, *, option: str = "--out") -> None:
+    """Create a folder for results, before minutes or hours of work.
+
+    Raises:
+        ValueError: it cannot be created.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"{option} {folder}: cannot be created: {error.strerror}") from None
+
+
+def check_place(path: Path, *, option: str) -> None:
+    """Check before a run that :func:`write_text` can write a file; create its folder.
+
+    Raises:
+        ValueError: the file cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise ValueError(f"{option} {path}: cannot be written: {error.strerror}") from None
+
+
+def write_text(text: str, path: Path, *, option: str = "--out") -> None:
+    """Write a text file, and its folder where it is missing. The file appears only when it is complete.
+
+    Args:
+        text: the text.
+        path: the file.
+        option: option that names the file, for the message.
+
+    Raises:
+        ValueError: the file cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomic(path, text.encode())
+    except OSError as error:
+        raise ValueError(f"{option} {path}: cannot be written: {error.strerror}") from None
+
+
+def write_json(values: dict[str, Any], path: Path) -> None:
+    """Write the results of a command to the file of its option ``--json``.
+
+    Raises:
+        ValueError: the file cannot be written.
+    """
+    write_text(json.dumps(values, indent=2, allow_nan=False) + "\n", path, option="--json")
 
 
 def _check_above(path: Path, option: str) -> None:

@@ -1,0 +1,19 @@
+"""The program ``mvpose``."""
+
+from __future__ import annotations
+
+from mvpose.commands.program import Program
+
+
+def _version() -> str:
+    from mvpose.report.documents import program_version
+
+    return program_version()
+
+
+PROGRAM = Program(
+    "mvpose",
+    "Make 3D poses of several people from recordings of calibrated cameras, and check the calibration.",
+    version=_version,
+    left="nothing was written",
+)
