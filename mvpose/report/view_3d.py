@@ -21,7 +21,7 @@ from mvpose.camera import Camera
 _YAW, _PITCH = math.radians(-58), math.radians(25)  # first viewing direction
 _DISTANCE = 3.0  # from the eye to the middle, in radii of what is shown
 _LEAST_RADIUS = 1.5  # metres
-_SIZE = (720, 450)  # of the still drawing, pixels; the aspect ratio of the canvas
+_SIZE = (720, 540)  # of the still drawing, pixels; the aspect ratio of the canvas
 _EDGE = 8.0  # pixels around what is shown
 _TURNS = np.radians(np.arange(0.0, 360.0, 15.0))  # from which the view is to show everything at first
 _RIM = 0.72  # width of the middle of a round body, as a share of the whole

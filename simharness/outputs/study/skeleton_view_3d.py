@@ -64,13 +64,14 @@ def scene_of(replay: Replay, frame: int) -> Scene3D:
     frames = _frames_around(frame, len(replay.time))
     rig, joints = replay.trial.exposures.believed_rig, replay.truth[frame].joints.reshape(-1, 3)
     pyramids = [camera_pyramid(camera, _PYRAMID) for camera in rig]
+    floor = _floor(replay.trial.scenario.room.size[:2])
     objects = [solid.hull.corners for solid in replay.trial.scene.solids if solid.kind != "room"]
     return Scene3D(
         label="People in 3D: estimates as bodies, truth as thin lines, cameras as pyramids",
         center=_center(np.concatenate([replay.truth[each].joints.reshape(-1, 3) for each in frames]), rig.centers),
-        fitted=np.concatenate([joints, *pyramids]),
+        fitted=np.concatenate([joints, *pyramids, *floor]),
         fixed=[
-            Piece3D.of_lines(_floor(replay.trial.scenario.room.size[:2]), _GRID),
+            Piece3D.of_lines(floor, _GRID),
             *(Piece3D(corners, _HULL, _OBJECT) for corners in objects),
             *(Piece3D(pyramid, PYRAMID, _CAMERA) for pyramid in pyramids),
         ],

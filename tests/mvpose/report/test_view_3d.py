@@ -52,7 +52,7 @@ def test_everything_fits_into_the_still_drawing_and_touches_its_edge_from_some_s
     (path,) = still(scene(Piece3D(points, balls, Style3D("--ink")))).iter("path")
     at = corners(path)
     assert (at >= 7.9).all()
-    assert (at <= [712.1, 442.1]).all()
+    assert (at <= [712.1, 532.1]).all()
     assert np.ptp(at[:, 0]) > 250
 
 
