@@ -15,9 +15,9 @@ from simharness.detector.bias import body_axes
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
+from simharness.world.motion.activity_registry import Activity, activities_in_place
 from simharness.world.motion.paths import Loop, Spot, Track, draw_loop
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.registry import Activity, activities_in_place
 from simharness.world.motion.trajectory import motion_clock
 
 _DURATION = 6.0  # seconds of every motion

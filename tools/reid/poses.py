@@ -16,9 +16,9 @@ from mvpose.arrays import Floats
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.shape import Shape
+from simharness.world.motion.activity_registry import Activity, activities_in_place
 from simharness.world.motion.paths import Loop, Spot, Track, draw_loop
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.registry import Activity, activities_in_place
 from simharness.world.motion.trajectory import motion_clock
 
 _DURATION = 4.0  # duration of every motion, seconds

@@ -1,8 +1,9 @@
-"""Motion of one person: pelvis pose and joint angles over time."""
+"""Motion of one person (pelvis pose and joint angles over time), and motions and props of one activity."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +11,8 @@ from numpy.typing import ArrayLike
 from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from simharness.world.humans.anatomy import DOFS
-from simharness.world.motion.trajectory import check_poses, check_times, interpolate, interpolate_poses
+from simharness.world.motion.presence import ALWAYS, Presence
+from simharness.world.motion.trajectory import Trajectory, check_poses, check_times, interpolate, interpolate_poses
 
 
 @dataclass(frozen=True)
@@ -53,3 +55,38 @@ class Motion:
     def read(self, time: ArrayLike) -> tuple[Floats, Floats]:
         """Return root (..., 7) and angles (..., D) at any times (...)."""
         return interpolate_poses(self.time, self.root, time), interpolate(self.time, self.angles, time)
+
+
+PropKind = Literal["chair", "table", "box", "step", "bottle", "booth", "door"]
+
+
+@dataclass(frozen=True)
+class Prop:
+    """Object that an activity uses; ``simharness.world.scene.objects.props`` gives it a shape.
+
+    Attributes:
+        kind: kind of object.
+        size: extent in metres along its x (depth), y (width) and z (height) axes; z of a chair is the height of the
+            seat, z of a table the height of the top.
+        trajectory: pose over time. The origin is the centre of the underside; a chair faces +x.
+    """
+
+    kind: PropKind
+    size: tuple[float, float, float]
+    trajectory: Trajectory
+
+
+@dataclass(frozen=True)
+class Performance:
+    """Motions of the performers of one activity, in their order, and the props that they use.
+
+    ``presence`` are the times at which each performer is in the scene; by default all times.
+    """
+
+    motions: tuple[Motion, ...]
+    props: tuple[Prop, ...] = ()
+    presence: tuple[Presence, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.presence:
+            object.__setattr__(self, "presence", (ALWAYS,) * len(self.motions))

@@ -12,7 +12,7 @@ from mvpose.arrays import Bools, Floats
 from simharness.scenario.sections.people_section import TrafficSection
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
-from simharness.world.motion.performance import Prop
+from simharness.world.motion.motion import Prop
 from simharness.world.motion.presence import Presence
 from simharness.world.motion.routes import Itinerary, Route, turning_time, walking_time
 from simharness.world.motion.trajectory import Trajectory

@@ -1,1 +1,1 @@
-"""Activities of one person; ``simharness.world.motion.registry`` explains how to add one."""
+"""Activities of one person; ``simharness.world.motion.activity_registry`` explains how to add one."""

@@ -8,9 +8,9 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.motion import Motion
+from simharness.world.motion.activity_registry import activity
+from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Spot, Track
-from simharness.world.motion.performance import Performance, Prop
 from simharness.world.motion.poses.foot_placement import (
     Footprint,
     foot_path,
@@ -30,7 +30,6 @@ from simharness.world.motion.poses.inverse_kinematics import (
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import Curves, blend, limbs, relaxed_posture
 from simharness.world.motion.poses.timing import cycle_time, minimum_jerk
-from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
 _GRIP, _NEARER = (

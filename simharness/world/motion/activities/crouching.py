@@ -6,6 +6,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import PEELING, foot_path, hip_position, pelvis_from_hips, stance
@@ -13,7 +14,6 @@ from simharness.world.motion.poses.inverse_kinematics import pose_angles, solve_
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import Curves, blend, limb, limbs, relaxed_posture
 from simharness.world.motion.poses.timing import cycle_time, minimum_jerk, smooth_noise
-from simharness.world.motion.registry import solo_activity
 
 _ON_TOES, _TIPPED = np.radians(
     [-88.0, -94.5]

@@ -6,6 +6,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import Footprint, foot_path, spot_to_world, stance
@@ -13,7 +14,6 @@ from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import blend, limb, relaxed_posture
 from simharness.world.motion.poses.timing import minimum_jerk, smooth_noise
-from simharness.world.motion.registry import solo_activity
 
 _BAR = 4  # beats per bar: step, touch, step back, touch
 _STRAIGHTEST = np.radians(16.0)  # smallest knee flexion

@@ -11,6 +11,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import foot_path, spot_to_world, stance
@@ -18,7 +19,6 @@ from simharness.world.motion.poses.inverse_kinematics import Pelvis, pose_angles
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import Curves, blend, draw_side, limb, relaxed_posture
 from simharness.world.motion.poses.timing import gesture_envelope, smooth_noise
-from simharness.world.motion.registry import solo_activity
 
 _STRAIGHTEST = np.radians(8.0)  # smallest knee flexion
 _FURTHEST = 0.034  # metres: largest offset of the pelvis from the spot along either axis

@@ -11,11 +11,11 @@ import numpy as np
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.activities.route_walking import LOOKAHEAD, walk_route
+from simharness.world.motion.activity_registry import Activity, activity
+from simharness.world.motion.motion import Performance, Prop
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.performance import Performance, Prop
 from simharness.world.motion.poses.foot_placement import spot_to_world
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.registry import Activity, activity
 from simharness.world.motion.routes import Itinerary, turning_time
 from simharness.world.motion.trajectory import Trajectory
 

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import (
@@ -22,7 +23,6 @@ from simharness.world.motion.poses.inverse_kinematics import arm_angles, pose_an
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import Curves, blend, limbs, relaxed_posture
 from simharness.world.motion.poses.timing import cycle_time, ease, minimum_jerk, smooth_noise
-from simharness.world.motion.registry import solo_activity
 
 _SITTING = 0.68  # distance from ankles to hips when sitting on the floor with bent knees, in leg lengths
 _BACK = 0.05  # additional distance when lying, in leg lengths

@@ -6,6 +6,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import (
@@ -19,7 +20,6 @@ from simharness.world.motion.poses.inverse_kinematics import arm_angles, pose_an
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import blend, draw_side, limb, relaxed_posture
 from simharness.world.motion.poses.timing import cycle_time, minimum_jerk, smooth_noise
-from simharness.world.motion.registry import solo_activity
 
 
 @solo_activity("reach", clearance=0.2)

@@ -2,27 +2,36 @@
 
 The gait is that of ``walking.py``. Its amplitudes follow the speed, so that a person who stops ends in quiet standing,
 while the cadence is kept: a slow step is a short one. Steps are in proportion to the legs. The height of the pelvis
-follows the feet: it is that of straight legs when a person stands.
+follows the feet: high over a standing person, lower while steps are long. A footprint lies where the pelvis passes over
+it; a foot is lifted only in a stride that moves its footprint.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy.interpolate import BSpline
+from scipy.ndimage import minimum_filter1d
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.activities.gait import make_gait, similar_walk_ratio
-from simharness.world.motion.activities.gait_posture import walking_posture
-from simharness.world.motion.activities.route_steps import RouteSteps, briskness
+from simharness.world.motion.activities.footprints import Footprints
+from simharness.world.motion.activities.gait import Gait, make_gait, similar_walk_ratio, walking_posture
 from simharness.world.motion.motion import Motion
-from simharness.world.motion.poses.heel_rise import follow_shank
-from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_legs
+from simharness.world.motion.poses.inverse_kinematics import (
+    Foot,
+    Pelvis,
+    follow_shank,
+    pelvis_height,
+    pose_angles,
+    solve_legs,
+)
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.pelvis_height import following_height
 from simharness.world.motion.poses.posture import blend, limbs, relaxed_posture
+from simharness.world.motion.poses.timing import smoothstep
 from simharness.world.motion.routes import Route
 
 LOOKAHEAD = 3.0
@@ -100,3 +109,125 @@ def walk_route(
         foot = partial(each.foot, time)
         feet[side] = foot(follow_shank(kinematics, side, pelvis, height, each.pitch(time), foot))
     return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+
+
+_TOE_OUT = np.radians(7.0)
+_FULL_STEP = 0.12  # metres: a shorter step is lifted less
+_FLAT_LIFT = 0.01  # metres
+_TURNED = 0.25  # metres per radian: step that counts for a turn of a foot
+_RECENT = (0.45, 0.15)  # seconds before and after a moment
+
+
+def briskness(route: Route, time: Floats) -> Floats:
+    """Return the speed at times (T,) relative to the usual one, 0 to 1."""
+    return np.minimum(np.linalg.norm(route.velocity(time), axis=-1) / route.speed, 1.0)
+
+
+def recent_briskness(route: Route, time: Floats) -> Floats:
+    """Return the mean speed around times (T,), mostly before them, relative to the usual one, 0 to 1.
+
+    A foot rolls by how far the pelvis has moved over it, not by the speed at the moment: someone who stops between two
+    steps still has a foot behind.
+    """
+    before, after = _RECENT
+    moved = np.linalg.norm(route.position(time + after) - route.position(time - before), axis=-1)
+    return np.minimum(moved / ((before + after) * route.speed), 1.0)
+
+
+@dataclass(frozen=True)
+class RouteSteps:
+    """Steps of one foot along a route.
+
+    Attributes:
+        route: places, headings and speeds.
+        gait: motion of a foot during a stride.
+        side: side of the foot.
+        phase: function of times (n,) that returns the number of strides of the left foot so far, (n,).
+        facing: function of times (n,) that returns the direction in which the feet point, (n,) radians.
+        width: lateral distance of the footprints from the route, metres.
+        late: fraction of the stride by which the foot is later than the left one.
+    """
+
+    route: Route
+    gait: Gait
+    side: str
+    phase: Callable[[Floats], Floats]
+    facing: Callable[[Floats], Floats]
+    width: float
+    late: float
+
+    def pitch(self, time: Floats) -> Floats:
+        """Return the pitch of the foot at times (T,) of the usual gait, toes up positive, (T,) radians."""
+        pitch, _, _ = self.gait.foot(self.phase(time) - self.late)
+        return pitch * recent_briskness(self.route, time)
+
+    def foot(self, time: Floats, pitch: Floats) -> Foot:
+        """Return the motion of the foot from footprint to footprint at times (T,) with pitches (T,) in radians."""
+        phase = self.phase(time) - self.late
+        part = np.mod(phase, 1.0)
+        struck = time - part / self.gait.frequency
+        prints, following = self._prints(struck), self._prints(struck + 1.0 / self.gait.frequency)
+        step = np.linalg.norm(following.ankle - prints.ankle, axis=-1)
+        step = step + _TURNED * np.abs(following.bearing - prints.bearing)
+        lift = self._lift(part, step, pitch, time)
+        _, _, progress = self.gait.foot(phase)
+        return prints.to(following, progress=progress, pitch=pitch, lift=lift, rolling=self.gait.rolling)
+
+    def _prints(self, when: Floats) -> Footprints:
+        """Return the footprint of a landing at times (T,).
+
+        The pelvis passes over it. While the person turns, the foot points where the pelvis does in the middle of the
+        stance, so that the hip rotates as far inward before as outward after it.
+        """
+        gait, outward = self.gait, 1.0 if self.side == "left" else -1.0
+        place = self.route.position(when + gait.lead / self.route.speed)
+        middle = self.facing(when + gait.foot_off / 2 / gait.frequency)
+        return Footprints.beside(place, middle, left=outward * self.width, toes_left=outward * _TOE_OUT)
+
+    def _lift(self, part: Floats, step: Floats, pitch: Floats, time: Floats) -> Floats:
+        """Return the height of the lowest point of a foot above the floor, (T,) metres, 0 in stance."""
+        gait = self.gait
+        along = np.maximum(part - gait.foot_off, 0.0) / (1 - gait.foot_off)
+        raised = smoothstep((1 - along) / 0.3)
+        rounded = smoothstep(along / 0.25) * raised * gait.rolling.spare(pitch)
+        # A foot that does not roll off its toes is raised sooner and higher.
+        flat = _FLAT_LIFT * (1.0 - briskness(self.route, time)) * smoothstep(along / 0.3) * raised
+        lift = rounded + smoothstep(step / _FULL_STEP) * (np.interp(part, gait.phase, gait.lift) + flat)
+        return np.where(part > gait.foot_off, lift, 0.0)
+
+
+_SAMPLES = 8  # from knot to knot of the spline
+
+Stances = Callable[[Floats], tuple[Pelvis, Mapping[str, Foot]]]
+"""Motion of pelvis and feet at times (T,) in seconds."""
+
+
+def following_height(
+    kinematics: Kinematics, stances: Stances, time: Floats, *, straightest: float, within: float
+) -> Floats:
+    """Return the greatest smooth height of the pelvis at which no knee flexes less than ``straightest``, (T,) metres.
+
+    A cubic B-spline is a mean of those of its coefficients whose knots are near. Each coefficient is the lowest height
+    that the legs allow near its knot, so the mean is nowhere higher than the legs allow. Where the legs allow the same
+    height once in every ``2 * within`` seconds, as at the steps of a walk, the height is constant. It depends on the
+    stances up to ``2 * within`` seconds away, and on no other times of ``time``.
+
+    Args:
+        kinematics: body.
+        stances: motion of pelvis and feet; the height is that without the ``bob`` of the pelvis.
+        time: times in seconds, (T,).
+        straightest: smallest flexion of a knee, radians.
+        within: time in which the height follows the legs, seconds.
+    """
+    if not len(time):
+        return np.zeros(0)
+    apart = within / 2  # between knots, of which the two on either side count
+    first, last = int(np.floor(time.min() / apart)) - 2, int(np.ceil(time.max() / apart)) + 2
+    reach = 2 * _SAMPLES
+    sampled: Floats = np.arange(first * _SAMPLES - reach, last * _SAMPLES + reach + 1, dtype=float) * (apart / _SAMPLES)
+    pelvis, feet = stances(sampled)
+    turn = pelvis.turn.as_matrix()
+    allowed = [pelvis_height(kinematics, side, pelvis.ground, turn, feet[side].ankle, straightest) for side in SIDES]
+    lowest = minimum_filter1d(np.min(allowed, axis=0) - pelvis.bob, 2 * reach + 1)[reach:-reach:_SAMPLES]
+    knots = np.arange(first - 2, last + 3) * apart
+    return np.asarray(BSpline(knots, lowest, 3)(time))

@@ -17,12 +17,12 @@ from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activities.footprints import leftward
 from simharness.world.motion.activities.gait import Gait, Knots, flatten_stance, periodic, pin_ends
 from simharness.world.motion.activities.walking import footsteps, laps
+from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
 from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease
-from simharness.world.motion.registry import solo_activity
 
 FOOT_OFF = 0.39  # fraction of the stride at toe-off; 0 is foot strike
 # Degrees at fractions of the stride.

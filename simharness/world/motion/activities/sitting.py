@@ -9,8 +9,9 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.activity_registry import activity
+from simharness.world.motion.motion import Performance, Prop
 from simharness.world.motion.paths import Spot, Track
-from simharness.world.motion.performance import Performance, Prop
 from simharness.world.motion.poses.foot_placement import (
     foot_path,
     hip_position,
@@ -22,7 +23,6 @@ from simharness.world.motion.poses.inverse_kinematics import pose_angles, reach_
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import blend, limbs, relaxed_posture
 from simharness.world.motion.poses.timing import cycle_time, ease, minimum_jerk
-from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
 _SHANK = np.radians(5.0)  # forward tilt of a seated shank

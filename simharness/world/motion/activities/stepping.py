@@ -9,9 +9,9 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activities.footprints import leftward
-from simharness.world.motion.motion import Motion
+from simharness.world.motion.activity_registry import activity, solo_activity
+from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Spot, Track
-from simharness.world.motion.performance import Performance, Prop
 from simharness.world.motion.poses.foot_placement import (
     Footprint,
     foot_path,
@@ -23,7 +23,6 @@ from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import blend, limb, relaxed_posture
 from simharness.world.motion.poses.timing import bump, cycle_time, minimum_jerk
-from simharness.world.motion.registry import activity, solo_activity
 from simharness.world.motion.trajectory import Trajectory
 
 Steps = Mapping[str, list[tuple[float, float, Footprint]]]  # by side: take-off time, landing time, footprint

@@ -8,9 +8,9 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.motion.activities.route_walking import walk_route
-from simharness.world.motion.performance import Performance
+from simharness.world.motion.activity_registry import activity
+from simharness.world.motion.motion import Performance
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.registry import activity
 from simharness.world.motion.routes import Route
 
 

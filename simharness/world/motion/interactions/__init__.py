@@ -1,1 +1,1 @@
-"""Activities of two people; ``simharness.world.motion.registry`` explains how to add one."""
+"""Activities of two people; ``simharness.world.motion.activity_registry`` explains how to add one."""

@@ -17,12 +17,12 @@ from mvpose.arrays import Floats
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.activities.route_walking import LOOKAHEAD, walk_route
+from simharness.world.motion.activity_registry import Activity, activity
+from simharness.world.motion.motion import Performance
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.performance import Performance
 from simharness.world.motion.poses.foot_placement import spot_to_world
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease
-from simharness.world.motion.registry import Activity, activity
 from simharness.world.motion.routes import Itinerary, Route, turning_time, walking_time
 
 _LENGTH = 3.0  # metres of a lane

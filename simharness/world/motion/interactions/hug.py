@@ -10,11 +10,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
+from simharness.world.motion.activity_registry import activity
 from simharness.world.motion.contact import ContactModel
 from simharness.world.motion.interactions.partners import blend_angles, face_to_face, lean_forward, offset_angles
-from simharness.world.motion.motion import Motion
+from simharness.world.motion.motion import Motion, Performance
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.performance import Performance
 from simharness.world.motion.poses.foot_placement import foot_path, spot_to_world, stance
 from simharness.world.motion.poses.inverse_kinematics import (
     Foot,
@@ -27,7 +27,6 @@ from simharness.world.motion.poses.inverse_kinematics import (
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import Curves, limbs, relaxed_posture
 from simharness.world.motion.poses.timing import bump, cycle_time, ease
-from simharness.world.motion.registry import activity
 
 Role = Literal["over", "under"]
 

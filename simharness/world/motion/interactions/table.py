@@ -12,6 +12,7 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activities.gestures import gesture
 from simharness.world.motion.activities.sitting import Seat, fit_seat
+from simharness.world.motion.activity_registry import activity
 from simharness.world.motion.interactions.partners import (
     arm_length,
     face_to_face,
@@ -19,15 +20,13 @@ from simharness.world.motion.interactions.partners import (
     look_ahead,
     offset_angles,
 )
-from simharness.world.motion.motion import Motion
+from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.performance import Performance, Prop
 from simharness.world.motion.poses.foot_placement import foot_path, pelvis_from_hips, spot_to_world, stance
 from simharness.world.motion.poses.inverse_kinematics import pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import blend, relaxed_posture
 from simharness.world.motion.poses.timing import gesture_envelope, smooth_noise
-from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
 _SEATED = 0.65  # probability that they sit

@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from simharness.types.random_streams import stream
-from simharness.world.motion.performance import Prop
+from simharness.world.motion.motion import Prop
 from simharness.world.scene.objects.assembly import Assembly
 from simharness.world.scene.objects.laboratory import BOX_COLORS, chair, table, taped
 from simharness.world.scene.objects.shapes import lathe

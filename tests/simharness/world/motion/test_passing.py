@@ -10,10 +10,10 @@ from casting import performer
 
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.types.random_streams import stream
+from simharness.world.motion.activity_registry import configured_activities
 from simharness.world.motion.choreography import assign_activities
 from simharness.world.motion.contact import penetration
 from simharness.world.motion.paths import SWAY, Spot
-from simharness.world.motion.registry import configured_activities
 
 TIME = np.arange(-1.0, 21.0, 1 / 60)
 SPOT = Spot(np.array([0.4, -0.3]), 0.8)

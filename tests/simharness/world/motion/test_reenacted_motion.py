@@ -14,13 +14,13 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.body_size import body_lengths
 from simharness.world.humans.population import draw_shape
+from simharness.world.motion.activity_registry import activities
 from simharness.world.motion.choreography import choreograph
 from simharness.world.motion.mocap import PeopleTracks, recorded_shape, reenact, tracks_file
 from simharness.world.motion.mocap.joint_directions import middle
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop, Spot, make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.registry import activities
 
 ACTIVITIES = ("walk", "reach", "squat", "turn", "talk", "dance")
 RATE, DURATION = 25.0, 3.0

@@ -9,10 +9,16 @@ from casting import performer
 from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.motion.activities.gait import make_gait, similar_walk_ratio
-from simharness.world.motion.activities.route_walking import walk_route
-from simharness.world.motion.poses.heel_rise import dorsiflexion, follow_shank
-from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pelvis_height, pose_angles, solve_legs
-from simharness.world.motion.poses.pelvis_height import following_height
+from simharness.world.motion.activities.route_walking import following_height, walk_route
+from simharness.world.motion.poses.inverse_kinematics import (
+    Foot,
+    Pelvis,
+    dorsiflexion,
+    follow_shank,
+    pelvis_height,
+    pose_angles,
+    solve_legs,
+)
 from simharness.world.motion.routes import Itinerary
 
 TIME = np.arange(-0.5, 11.0, 1 / 60)

@@ -36,9 +36,8 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.scenario.sections.people_section import ActivityName, PeopleSection
-from simharness.world.motion.motion import Motion
+from simharness.world.motion.motion import Motion, Performance
 from simharness.world.motion.paths import Loop, Spot, Track
-from simharness.world.motion.performance import Performance
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.routes import Route
 
