@@ -11,7 +11,6 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from mvpose.commands.progress import Reporter, Silence
-from simharness.planning.extra_camera import candidate_cameras
 from simharness.planning.fast_layer import CameraTerms, FastLayer, Prediction
 from simharness.planning.floor_coverage import coverage, covered_rectangle
 from simharness.planning.rehearsal_result import (
@@ -35,6 +34,7 @@ from simharness.reality.validation.subsets import camera_subsets
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.statistics.intervals import Interval
+from simharness.world.rigs.extra_camera import cameras_on_walls
 
 T = TypeVar("T")
 
@@ -257,7 +257,9 @@ class _Rehearsing:
         """Return what the fast layer says of other sets of cameras and numbers of people."""
         question, rig = self.question, self.question.rig
         sets = self._sets()
-        candidates = candidate_cameras(rig, question.volume, room=question.room, around=self.effort.around)
+        walls, ceiling = (None, np.inf) if question.room is None else (question.room.outline, question.room.height)
+        area, around = question.volume.outline, self.effort.around
+        candidates = cameras_on_walls(rig, area, walls=walls, ceiling=ceiling, around=around)
         numbers = range(1, self.effort.most + 1)
         with self.reporter.stage("compare", len(sets) + len(candidates) + len(numbers)) as advance:
             layer = self._layer(people=question.people, coarse=True)

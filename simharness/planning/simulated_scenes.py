@@ -14,11 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose import Rig, preset
+from mvpose import preset
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.estimators import Estimator
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.detector.detect import Detected, detect
 from simharness.planning.rehearsal_scene import (
     SceneFrame,
     SceneSettings,
@@ -34,10 +33,10 @@ from simharness.runtime.frame_pool import map_jobs
 from simharness.scenario.sections.cameras_section import FaultsSection
 from simharness.scoring.matching import count_groups
 from simharness.scoring.pcp import Part
-from simharness.trial.stages.capture import CaptureFrames
-from simharness.world.rigs.faults import schedule_exposures
+from simharness.trial.conditions import ConditionedTrial, estimate_frames
+from simharness.trial.stages.build_trial import Trial, exposures_of
+from simharness.trial.stages.simulation import DetectedSequence
 from simharness.world.scene.build import Scene
-from simharness.world.scene.playback import simulate
 
 _TAKES = 4  # of a scene, with other places of the people and other draws: building a scene takes most of the time
 
@@ -178,60 +177,43 @@ def _take(
     settings: SceneSettings, frame: SceneFrame, scene: Scene, conditions: Sequence[Condition], seed: int
 ) -> _Take:
     """Capture and detect one take, and estimate it under all conditions."""
-    rig = frame.rig(settings.rig)
-    scenario = scenario_of(settings, frame, 0)
-    sequence = simulate(scene)
-    truth = coco17_to_shelf14(sequence.joints, head=settings.head.mapping)
+    scenario = scenario_of(settings, frame, seed).model_copy(update={"detector": settings.detector})
+    exposures = exposures_of(scenario, frame.rig(settings.rig), scene.time)
+    draws = ConditionedTrial(Trial(scenario, scene, exposures, {}, None))
+    truth = coco17_to_shelf14(draws.sequence.joints, head=settings.head.mapping)
     pipeline, rule = preset(settings.variant), RULES.index(settings.head)
     scored: dict[Condition, _Scored] = {}
-    for clock in dict.fromkeys(_clock_fault(each) for each in conditions):
-        exposures = schedule_exposures(rig, clock, scene.time, seed=seed)
-        views = CaptureFrames(scenario, scene, exposures, frozenset())(range(scenario.frames))
-        detected = detect(sequence, views, rig, settings.detector, seed=seed)
-        for condition in (each for each in conditions if _clock_fault(each) == clock):
-            believed = schedule_exposures(rig, _calibration_fault(condition), scene.time, seed=seed).believed_rig
-            estimates, groups, mixed = _estimates(pipeline, believed, detected, condition.cameras)
-            scores = score_frames(truth, estimates)
-            found = scores.found[rule]
-            error = np.where(found, _mean(scores.errors[rule]), np.nan)
-            scored[condition] = _Scored(_share_correct(scores.parts[rule]), error, found, groups, mixed)
-    hips = sequence.joints[:, :, (11, 12), :2].mean(axis=2)
+    for condition in sorted(conditions, key=lambda each: (each.fault == "clock_offset", each.level)):
+        faults = FaultsSection.model_validate({condition.fault: condition.level} if condition.fault else {})
+        detected = draws.detected(scenario.model_copy(update={"faults": faults}))
+        estimates, groups, mixed = _estimates(pipeline, detected, condition.cameras)
+        scores = score_frames(truth, estimates)
+        found = scores.found[rule]
+        error = np.where(found, _mean(scores.errors[rule]), np.nan)
+        scored[condition] = _Scored(_share_correct(scores.parts[rule]), error, found, groups, mixed)
+    hips = draws.sequence.joints[:, :, (11, 12), :2].mean(axis=2)
     return _Take(frame.to_world(hips), scored)
 
 
 def _estimates(
-    pipeline: Estimator, rig: Rig, detected: Sequence[Detected], cameras: tuple[int, ...]
+    pipeline: Estimator, detected: DetectedSequence, cameras: tuple[int, ...]
 ) -> tuple[list[Floats], Integers, Integers]:
     """Return the joints of F frames by some cameras, F x (n, 17, 3), and the numbers of groups and mixed ones, (F,).
 
     One camera alone gives no joints in space.
     """
-    joints = [np.zeros((0, 17, 3)) for _ in detected]
-    groups, mixed = np.zeros(len(detected), np.int64), np.zeros(len(detected), np.int64)
+    size = len(detected.frames)
+    groups, mixed = np.zeros(size, np.int64), np.zeros(size, np.int64)
     if len(cameras) < 2:
-        return joints, groups, mixed
-    recording = AnnotatedRecording(
-        rig, np.zeros((len(detected), 0, 14, 3)), tuple(each.detections for each in detected), np.arange(len(detected))
-    ).subset(cameras)
-    for frame, detections in enumerate(recording.detections):
-        estimate = pipeline.estimate(recording.rig, detections)
-        joints[frame] = estimate.joints
-        person = detected[frame].truth.person[np.isin(detected[frame].detections.view, cameras)]
+        return [np.zeros((0, 17, 3)) for _ in detected.frames], groups, mixed
+    given = tuple(each.detections for each in detected.frames)
+    recording = AnnotatedRecording(detected.rig, np.zeros((size, 0, 14, 3)), given, np.arange(size)).subset(cameras)
+    estimates = estimate_frames(pipeline, recording.rig, recording.detections)
+    for frame, (detections, estimate) in enumerate(zip(recording.detections, estimates, strict=True)):
+        person = detected.frames[frame].truth.person[np.isin(given[frame].view, cameras)]
         counts = count_groups(detections.view, estimate.matching.labels_of(len(detections)), person)
         groups[frame], mixed[frame] = len(estimate.joints), counts.merged
-    return joints, groups, mixed
-
-
-def _clock_fault(condition: Condition) -> FaultsSection:
-    """Return the faults that change what the cameras record."""
-    return FaultsSection(clock_offset=condition.level) if condition.fault == "clock_offset" else FaultsSection()
-
-
-def _calibration_fault(condition: Condition) -> FaultsSection:
-    """Return the faults that change the calibration that the method is given."""
-    if condition.fault in ("rotation", "translation"):
-        return FaultsSection.model_validate({condition.fault: condition.level})
-    return FaultsSection()
+    return [each.joints for each in estimates], groups, mixed
 
 
 def _share_correct(parts: NDArray[np.int8]) -> Floats:

@@ -17,6 +17,7 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.validation.frame_scores import FrameScores, score_frames
 from simharness.reality.validation.tally import Tally
 from simharness.runtime.frame_pool import map_frames
+from simharness.trial.conditions import estimate_frames
 
 VARIANTS = ("full", "fast", "no-3dps", "no-matching")
 """Presets of :class:`mvpose.Pipeline` that a validation compares."""
@@ -70,9 +71,8 @@ def frame_scores(recording: AnnotatedRecording, variant: str) -> FrameScores:
     Raises:
         ValueError: an unknown preset.
     """
-    pipeline = preset(variant)
-    estimates = [pipeline.estimate(recording.rig, detections).joints for detections in recording.detections]
-    return score_frames(recording.truth, estimates)
+    estimates = estimate_frames(preset(variant), recording.rig, recording.detections)
+    return score_frames(recording.truth, [each.joints for each in estimates])
 
 
 def score_recordings(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from mvpose import Rig
 from mvpose.affinity import AppearanceAffinity
+from mvpose.arrays import Floats
 from mvpose.estimators import Estimator
 from mvpose.presets import NEED_DESCRIPTORS, without_repair
 from simharness.capture.rendering.renderer import Unavailable
@@ -58,11 +59,20 @@ def build_trial(scenario: Scenario) -> Trial:
             raise ValueError(f"rendering.renderer: {error}") from None
     rig = true_rig(scenario)
     scene = build(scenario, rig)
-    phases = camera_phases(scenario.cameras, len(rig), period=1.0 / scenario.rate, seed=scenario.seed)
-    exposures = schedule_exposures(
-        rig, scenario.faults, scene.time, seed=scenario.seed, phases=phases, every=scenario.cameras.every
-    )
-    return Trial(scenario, scene, exposures, pipelines, descriptors)
+    return Trial(scenario, scene, exposures_of(scenario, rig, scene.time), pipelines, descriptors)
+
+
+def exposures_of(scenario: Scenario, rig: Rig, time: Floats) -> ExposureSchedule:
+    """Return when and with which cameras the pictures of a scene are taken, with the faults of its scenario.
+
+    Args:
+        scenario: the resolved scenario at its seed.
+        rig: the true cameras.
+        time: times of the frames, (T,), seconds.
+    """
+    cameras = scenario.cameras
+    phases = camera_phases(cameras, len(rig), period=1.0 / scenario.rate, seed=scenario.seed)
+    return schedule_exposures(rig, scenario.faults, time, seed=scenario.seed, phases=phases, every=cameras.every)
 
 
 def build_variants(scenario: Scenario) -> dict[str, Estimator]:
