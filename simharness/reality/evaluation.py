@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from mvpose import Detections, Estimate, Matching
-from mvpose.estimators import Estimator, SequenceEstimator
+from mvpose.estimators import Estimator
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.scoring.frame import score_frame
 from simharness.scoring.matching import count_violations
 from simharness.scoring.score_summary import VariantScores, summarize
 from simharness.scoring.tracking.identity_figures import tracking_of_some
-from simharness.trial.stages.estimation import track_frames
+from simharness.trial.conditions import estimate_frames
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def evaluate(
     """Run methods on the frames of a recording and score them.
 
     Frames without annotation are run and timed, but not scored, because they may contain people. Methods with memory
-    get all frames in order, with their times. Each method first runs on the first frame or frames once more, so that
+    get all frames in order, with their times. Each method first runs on the first three frames once more, so that
     timings exclude compilation.
 
     Args:
@@ -98,13 +98,8 @@ def evaluate(
             if progress is not None:
                 progress(before + len(recording), len(estimators) * len(recording))
 
-        if isinstance(estimator, SequenceEstimator):
-            for _ in estimator.track(recording.rig, recording.timed_detections[:3]):
-                pass
-            estimates[name] = track_frames(estimator, recording.rig, frames())
-        else:
-            estimator.estimate(recording.rig, recording.detections[0])
-            estimates[name] = [estimator.estimate(recording.rig, detections) for detections in frames()]
+        estimate_frames(estimator, recording.rig, recording.timed_detections[:3])
+        estimates[name] = estimate_frames(estimator, recording.rig, frames())
     return score_estimates(recording, estimates, head=head)
 
 
