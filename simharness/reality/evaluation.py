@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mvpose import Detections, Estimate, Matching
-from mvpose.estimators import Estimator
+from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.scoring.frame import score_frame
@@ -72,7 +72,7 @@ def evaluate(
     """Run methods on the frames of a recording and score them.
 
     Frames without annotation are run and timed, but not scored, because they may contain people. Methods with memory
-    get all frames in order, with their times. Each method first runs on the first three frames once more, so that
+    get all frames in order, with their times. Each method first runs on the first frame or frames once more, so that
     timings exclude compilation.
 
     Args:
@@ -98,7 +98,8 @@ def evaluate(
             if progress is not None:
                 progress(before + len(recording), len(estimators) * len(recording))
 
-        estimate_frames(estimator, recording.rig, recording.timed_detections[:3])
+        first = 3 if isinstance(estimator, SequenceEstimator) else 1
+        estimate_frames(estimator, recording.rig, recording.timed_detections[:first])
         estimates[name] = estimate_frames(estimator, recording.rig, frames())
     return score_estimates(recording, estimates, head=head)
 
