@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.camera import Camera
-from simharness.capture.raw import BLACK, WHITE, is_ideal, raw_picture
-from simharness.capture.raw_kernels import look_up
+from simharness.capture.raw import BLACK, WHITE, is_ideal, look_up, raw_picture
 from simharness.scenario.sections.cameras_section import SensorSection
 from simharness.types.random_streams import stream
 from simharness.types.srgb import from_linear, linear_table, rounded, to_linear
