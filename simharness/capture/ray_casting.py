@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Camera
-from simharness.capture.ray_kernels import box_geoms, cast_views, place_capsules
+from mvpose.kernels import njit
 from simharness.capture.rendering.renderer import NEAR
 from simharness.world.humans.mujoco_model import SKIN_GROUP
 
@@ -158,3 +158,200 @@ def _ends(model: mujoco.MjModel, geom: int, head: Floats) -> tuple[Floats, Float
     mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
     reach = model.geom_size[geom, 1] * turn.reshape(3, 3)[:, 2]
     return head + model.geom_pos[geom] - reach, head + model.geom_pos[geom] + reach
+
+
+_ROUNDING = 1e-9  # metres: spheres that a ray must come near before the capsule in it is tested are this much larger
+_STEEPEST = 1e30  # 1/m: greatest inverse of a direction; finite, so that no product with it is undefined
+
+
+@njit(cache=True)
+def place_capsules(rest, bone, radii, first, bones, placed, around):
+    """Transform capsules (c, 2, 3) by their bones (P, B, 3, 4) and compute a bounding sphere of each person, (P, 4)."""
+    for person in range(len(bones)):
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for c in range(first[person], first[person + 1]):
+            transform = bones[person, bone[c]]
+            for end in range(2):
+                for k in range(3):
+                    at = transform[k, 3]
+                    for j in range(3):
+                        at += transform[k, j] * rest[c, end, j]
+                    placed[c, end, k] = at
+                    low[k], high[k] = min(low[k], at - radii[c]), max(high[k], at + radii[c])
+        around[person, :3] = (low + high) / 2
+        around[person, 3] = np.sqrt(((high - low) ** 2).sum()) / 2
+
+
+@njit(cache=True)
+def box_geoms(geoms, local, position, turn, margin, low, high):
+    """Write boxes along the axes of the world around MuJoCo geoms, (3, m) each.
+
+    Args:
+        geoms: their numbers, (m,).
+        local: centres and half sizes of their boxes in their own frames, (all, 6).
+        position: origins of these frames, (all, 3).
+        turn: their rotations to the world by rows, (all, 9).
+        margin: metres added on all sides.
+        low: output, lowest coordinates.
+        high: output, highest coordinates.
+    """
+    for b in range(len(geoms)):
+        g = geoms[b]
+        for k in range(3):
+            middle, reach = position[g, k], margin
+            for j in range(3):
+                middle += turn[g, 3 * k + j] * local[g, j]
+                reach += abs(turn[g, 3 * k + j]) * local[g, 3 + j]
+            low[k, b], high[k, b] = middle - reach, middle + reach
+
+
+@njit(cache=True)
+def cast_views(
+    centers, axes, targets, wanted, nearest, placed, radii, first, around, low, high, direction, length, near, owner,
+    distance, met,
+):  # fmt: skip
+    """Cast rays at people, and find those that may hit an object before their ends.
+
+    Args:
+        centers: camera centres, (V, 3).
+        axes: directions of the optical axes, (V, 3).
+        targets: ends of the rays, (V, n, 3).
+        wanted: which of them are cast, (V, n), r in all.
+        nearest: depth at which the rays start, metres.
+        placed: capsules, see :func:`place_capsules`.
+        radii: their radii, metres.
+        first: first capsule of each person, and the end, (P + 1,).
+        around: bounding spheres of the people, (P, 4).
+        low: lowest coordinates of boxes around objects, (3, m).
+        high: highest coordinates, (3, m).
+        direction: output, unit vectors, (r, 3).
+        length: output, distance of the targets from the centres, metres, (r,).
+        near: output, distance from the centres at which the rays start, metres, (r,).
+        owner: output, person hit first; unchanged without one, (r,).
+        distance: output, distance of the hit from the centre, metres; unchanged without one, (r,).
+        met: output, which rays meet a box, (r,) bool.
+
+    Returns:
+        Number of the first ray of each view, and the end, (V + 1,).
+    """
+    starts, count = np.zeros(len(centers) + 1, np.int64), 0
+    for v in range(len(centers)):
+        start, axis = centers[v], axes[v]
+        for i in range(targets.shape[1]):
+            if not wanted[v, i]:
+                continue
+            x, y, z = targets[v, i, 0] - start[0], targets[v, i, 1] - start[1], targets[v, i, 2] - start[2]
+            length[count] = np.sqrt(x * x + y * y + z * z)
+            x, y, z = x / length[count], y / length[count], z / length[count]
+            direction[count, 0], direction[count, 1], direction[count, 2] = x, y, z
+            near[count] = nearest / (x * axis[0] + y * axis[1] + z * axis[2])
+            count += 1
+        a, starts[v + 1] = starts[v], count
+        ways, ends = direction[a:count], length[a:count]
+        meet_boxes(start, ways, ends, low, high, met[a:count])
+        hit_people(start, ways, near[a:count], ends, placed, radii, first, around, owner[a:count], distance[a:count])
+    return starts
+
+
+@njit(cache=True)
+def meet_boxes(start, direction, length, low, high, met):
+    """Write which rays meet a box before their ends.
+
+    Args:
+        start: start of all rays, (3,).
+        direction: unit vectors, (n, 3).
+        length: metres, (n,).
+        low: lowest coordinates of boxes along the axes of the world, (3, m).
+        high: highest coordinates, (3, m).
+        met: output, (n,) bool.
+    """
+    for i in range(len(direction)):
+        u, v, w = _inverse(direction[i, 0]), _inverse(direction[i, 1]), _inverse(direction[i, 2])
+        end, any_met = length[i], 0
+        for b in range(low.shape[1]):  # branch-free, so that the compiler vectorises it
+            one, two = (low[0, b] - start[0]) * u, (high[0, b] - start[0]) * u
+            enter, leave = (one, two) if one < two else (two, one)
+            one, two = (low[1, b] - start[1]) * v, (high[1, b] - start[1]) * v
+            one, two = (one, two) if one < two else (two, one)
+            enter, leave = one if one > enter else enter, two if two < leave else leave
+            one, two = (low[2, b] - start[2]) * w, (high[2, b] - start[2]) * w
+            one, two = (one, two) if one < two else (two, one)
+            enter, leave = one if one > enter else enter, two if two < leave else leave
+            any_met |= (enter <= leave) & (leave >= 0.0) & (enter <= end)
+        met[i] = any_met != 0
+
+
+@njit(cache=True)
+def _inverse(share):
+    """Return the inverse of a coordinate of a direction, finite for 0."""
+    if abs(share) * _STEEPEST < 1.0:
+        return _STEEPEST if share >= 0.0 else -_STEEPEST
+    return 1.0 / share
+
+
+@njit(cache=True)
+def hit_people(start, direction, near, length, placed, radii, first, around, owner, distance):
+    """Write the first person hit by each ray between ``near`` and ``length``, and the distance; none: unchanged."""
+    spheres = np.empty((len(placed), 4))
+    for c in range(len(placed)):
+        square = 0.0
+        for k in range(3):
+            spheres[c, k] = (placed[c, 0, k] + placed[c, 1, k]) / 2
+            square += (placed[c, 1, k] - placed[c, 0, k]) ** 2
+        spheres[c, 3] = radii[c] + 0.5 * np.sqrt(square) + _ROUNDING
+    for i in range(len(direction)):
+        dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
+        x, y, z = start[0] + near[i] * dx, start[1] + near[i] * dy, start[2] + near[i] * dz
+        best = length[i] - near[i]
+        for person in range(len(around)):
+            cx, cy, cz = around[person, 0] - x, around[person, 1] - y, around[person, 2] - z
+            if _misses(cx, cy, cz, around[person, 3], dx, dy, dz, best):
+                continue
+            for c in range(first[person], first[person + 1]):
+                cx, cy, cz = spheres[c, 0] - x, spheres[c, 1] - y, spheres[c, 2] - z
+                if _misses(cx, cy, cz, spheres[c, 3], dx, dy, dz, best):
+                    continue
+                ax, ay, az = placed[c, 0, 0] - x, placed[c, 0, 1] - y, placed[c, 0, 2] - z
+                bx, by, bz = placed[c, 1, 0] - x, placed[c, 1, 1] - y, placed[c, 1, 2] - z
+                entry = _enter(ax, ay, az, bx, by, bz, radii[c], dx, dy, dz)
+                if entry < 0.0:  # the ray starts inside the capsule: it hits the far side, from inside
+                    entry = -_enter(ax, ay, az, bx, by, bz, radii[c], -dx, -dy, -dz)
+                if 0.0 <= entry < best:
+                    best = entry
+                    owner[i], distance[i] = person, entry + near[i]
+
+
+@njit(cache=True)
+def _misses(cx, cy, cz, radius, dx, dy, dz, best):
+    """Return whether a ray of length ``best`` from the origin misses a sphere."""
+    along = cx * dx + cy * dy + cz * dz
+    return along < -radius or along - radius > best or cx * cx + cy * cy + cz * cz - along * along > radius * radius
+
+
+@njit(cache=True)
+def _enter(ax, ay, az, bx, by, bz, radius, dx, dy, dz):
+    """Return where the line from the origin along (dx, dy, dz) enters a capsule from a to b; infinite if it misses."""
+    ux, uy, uz = bx - ax, by - ay, bz - az
+    square = ux * ux + uy * uy + uz * uz
+    aligned, begins = ux * dx + uy * dy + uz * dz, ux * ax + uy * ay + uz * az
+    seen, far = ax * dx + ay * dy + az * dz, ax * ax + ay * ay + az * az
+    # First the infinite cylinder, in units of the squared length of the axis.
+    p = square - aligned * aligned
+    q = square * seen - begins * aligned
+    r = square * far - begins * begins - radius * radius * square
+    cap_b = False
+    if p > 1e-12 * square:
+        inner = q * q - p * r
+        if inner < 0.0:
+            return np.inf
+        away = (q - np.sqrt(inner)) / p
+        height = away * aligned - begins
+        if 0.0 < height < square:
+            return away
+        cap_b = height >= square
+    else:
+        cap_b = aligned < 0.0  # parallel to the axis: the cap that is hit first
+    if cap_b:
+        seen, far = bx * dx + by * dy + bz * dz, bx * bx + by * by + bz * bz
+    inner = seen * seen - far + radius * radius
+    return seen - np.sqrt(inner) if inner >= 0.0 else np.inf

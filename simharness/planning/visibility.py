@@ -17,7 +17,7 @@ from mvpose.checks import as_array
 from mvpose.kernels import njit
 from simharness.capture.body_outlines import IN_FRONT, bounding_box, packed, project_vertex
 from simharness.capture.joint_visibility import classify
-from simharness.capture.ray_kernels import hit_people
+from simharness.capture.ray_casting import hit_people
 from simharness.capture.rendering.renderer import NEAR
 from simharness.planning.standing_people import StandingScenes
 from simharness.planning.volume import Volume
