@@ -15,11 +15,10 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.skeleton import Skeleton
 from mvpose.wholebody.estimator import rows_of
-from simharness.capture.camera_arrays import CameraArrays
 from simharness.capture.film import simultaneous_exposures
 from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import RayCaster
-from simharness.capture.ray_visibility import cast_bands
+from simharness.capture.ray_visibility import CameraArrays, cast_bands
 from simharness.capture.shutter import joints_at_exposure
 from simharness.types.outer_joints import OuterViews
 from simharness.types.views import Visibility

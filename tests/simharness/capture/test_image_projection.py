@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.capture.camera_arrays import CameraArrays
+from simharness.capture.ray_visibility import CameraArrays
 from simharness.types.random_streams import stream
 from simharness.world.rigs.layouts import intrinsics, look_at
 from simharness.world.rigs.projection import project_to_image
