@@ -27,7 +27,7 @@ from simharness.capture.rendering.room_light import RoomLight, last_light, room_
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.scene_topology import SceneTopology
 from simharness.capture.rendering.shadow_layer_kernels import BLOCK, cast, touched_blocks
-from simharness.capture.rendering.span_kernels import whole
+from simharness.capture.rendering.vertex_kernels import whole
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.types.srgb import LUMINANCE

@@ -26,8 +26,14 @@ from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.shading_kernels import shade
 from simharness.capture.rendering.shadow_kernels import shadow_places
 from simharness.capture.rendering.shadow_maps import NO_SHADOW, SHADOW_SIZE, ShadowMap
-from simharness.capture.rendering.span_kernels import covering_spans, lifted, put_back, resolve, whole
-from simharness.capture.rendering.vertex_kernels import project_vertices
+from simharness.capture.rendering.vertex_kernels import (
+    covering_spans,
+    lifted,
+    project_vertices,
+    put_back,
+    resolve,
+    whole,
+)
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.world.rigs.projection import projection_matrix

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from simharness.capture.rendering.dimming_kernels import dim, runs_below
-from simharness.capture.rendering.span_kernels import covering_spans, lifted, put_back
 from simharness.capture.rendering.tone import dimming
-from simharness.capture.rendering.vertex_kernels import project_vertices
+from simharness.capture.rendering.vertex_kernels import covering_spans, lifted, project_vertices, put_back
 
 HEIGHT, WIDTH = 60, 80
 P = np.array([[70.0, 0.0, 39.5, 0.0], [0.0, 70.0, 29.5, 0.0], [0.0, 0.0, 1.0, 0.0]])
