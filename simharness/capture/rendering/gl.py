@@ -22,11 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.camera import Camera
-from simharness.capture.rendering.face_kernels import normals
 from simharness.capture.rendering.lens import through_lens
 from simharness.capture.rendering.panoramas import fill_empty
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, Unavailable, check_count
-from simharness.capture.rendering.scene_geometry import SceneGeometry
+from simharness.capture.rendering.scene_geometry import SceneGeometry, normals
 from simharness.capture.rendering.scene_topology import pyramid
 from simharness.capture.rendering.shading_kernels import LEAST_COSINE
 from simharness.capture.rendering.shadow_maps import Shadows
