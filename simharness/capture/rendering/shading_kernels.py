@@ -29,7 +29,6 @@ from simharness.capture.rendering.surface_kernels import (
     memory,
 )
 
-BIAS = 2.5  # pixels of the shadow map, divided by the cosine: least lead in depth of a surface that casts a shadow
 LEAST_COSINE = 0.25
 _BRIGHTEST = 4.0
 _ZERO, _UNIT = np.float32(0.0), np.float32(1.0)

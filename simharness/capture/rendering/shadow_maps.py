@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simharness.capture.rendering.raster_kernels import NOTHING_DRAWN, rasterise
-from simharness.capture.rendering.shading_kernels import BIAS
 from simharness.capture.rendering.shadow_kernels import nearest_blocks
 from simharness.types.lighting import facing
 
 Floats = NDArray[np.float32]
 
 SHADOW_SIZE = 1024  # pixels
+BIAS = 2.5  # pixels of the shadow map, divided by the cosine: least lead in depth of a surface that casts a shadow
 _LIGHT_DISTANCE = 1000.0  # in radii of what the map covers: rays are almost parallel
 
 
