@@ -28,7 +28,7 @@ class LitBackground:
         light: what the shadow maps cover, or the light of the sources.
         rgb: picture without the shadows of anything that moves, (h, w, 3) uint8.
         shadow_place: place of each pixel in the shadow maps, (h, w) uint16: see
-            :func:`~simharness.capture.rendering.shadow_kernels.shadow_places`; empty with sources.
+            :func:`~simharness.capture.rendering.shadow_maps.shadow_places`; empty with sources.
         shadow_depth: inverse depth of each pixel from the light, (h, w) float32; empty with sources.
         runs: runs of pixels over the blocks of :class:`~simharness.capture.rendering.lit_scene.Grid`, (n, 5): see
             :func:`~simharness.capture.rendering.dimming_kernels.runs_below`; empty without sources.

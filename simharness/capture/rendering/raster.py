@@ -24,8 +24,7 @@ from simharness.capture.rendering.raster_kernels import LONGEST_SIDE, NOTHING_DR
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.shading_kernels import shade
-from simharness.capture.rendering.shadow_kernels import shadow_places
-from simharness.capture.rendering.shadow_maps import NO_SHADOW, SHADOW_SIZE, ShadowMap
+from simharness.capture.rendering.shadow_maps import NO_SHADOW, SHADOW_SIZE, ShadowMap, shadow_places
 from simharness.capture.rendering.vertex_kernels import (
     covering_spans,
     lifted,

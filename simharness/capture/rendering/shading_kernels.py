@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.shadow_kernels import darken
+from simharness.capture.rendering.shadow_maps import darken
 from simharness.capture.rendering.surface_kernels import (
     BLUE,
     GREEN,

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from mvpose.kernels import njit
 from simharness.capture.rendering.raster_kernels import NOTHING_DRAWN, rasterise
-from simharness.capture.rendering.shadow_kernels import nearest_blocks
 from simharness.types.lighting import facing
 
 Floats = NDArray[np.float32]
@@ -104,3 +104,130 @@ def shadow_map(light: LightView, vertices: Floats, faces: NDArray[np.uint32]) ->
     corners = rasterise(vertices, faces, light.P, light.radius, nearest, unused, NOTHING_DRAWN, 0)
     rows = corners[:, 1] / corners[:, 2]
     return ShadowMap(nearest, nearest_blocks(nearest, max(int(rows.min()) - 1, 0), int(rows.max()) + 2))
+
+
+_BLOCK_SHIFT = np.uint32(3)
+_BLOCK = 1 << 3  # pixels of the shadow map
+_LAST = np.uint32(3)
+_FILTER = 4  # side of the filter that softens shadow edges, pixels of the shadow map
+
+
+@njit(cache=True, error_model="numpy")
+def shadow_places(
+    triangle: np.ndarray,
+    inverse_depth: np.ndarray,
+    center: np.ndarray,
+    rays: np.ndarray,
+    light_P: np.ndarray,
+    side: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return where each pixel lies in a shadow map: index of the block (h, w) uint16, and inverse depth (h, w) float32.
+
+    Args:
+        triangle: visible face or -1, (h, w) int32.
+        inverse_depth: inverse depth, 1/m, (h, w) float32.
+        center: camera centre in the world, (3,).
+        rays: matrix, (3, 3), such that ``center + depth * rays @ (x, y, 1)`` is the point at a pixel.
+        light_P: projection into the shadow map, (3, 4).
+        side: side of the map in pixels. The index after the last block stands for a pixel without a surface, and for a
+            place outside of the map.
+    """
+    height, width = triangle.shape
+    count, end = (side + _BLOCK - 1) // _BLOCK, side - _FILTER + 1
+    place, depth = np.full((height, width), count * count, np.uint16), np.ones((height, width), np.float32)
+    for y in range(height):
+        for x in range(width):
+            if triangle[y, x] < 0:
+                continue
+            far = 1.0 / inverse_depth[y, x]
+            px = center[0] + far * (rays[0, 0] * x + rays[0, 1] * y + rays[0, 2])
+            py = center[1] + far * (rays[1, 0] * x + rays[1, 1] * y + rays[1, 2])
+            pz = center[2] + far * (rays[2, 0] * x + rays[2, 1] * y + rays[2, 2])
+            w = 1.0 / (light_P[2, 0] * px + light_P[2, 1] * py + light_P[2, 2] * pz + light_P[2, 3])
+            u = (light_P[0, 0] * px + light_P[0, 1] * py + light_P[0, 2] * pz + light_P[0, 3]) * w - 1.0
+            v = (light_P[1, 0] * px + light_P[1, 1] * py + light_P[1, 2] * pz + light_P[1, 3]) * w - 1.0
+            if 0 <= u < end and 0 <= v < end:
+                place[y, x] = int(v) // _BLOCK * count + int(u) // _BLOCK
+                depth[y, x] = w
+    return place, depth
+
+
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+def darken(
+    key_light: np.ndarray,
+    map_x: np.ndarray,
+    map_y: np.ndarray,
+    near: np.ndarray,
+    still_shadow: np.ndarray,
+    still_blocks: np.ndarray,
+    shadow: np.ndarray,
+    blocks: np.ndarray,
+) -> None:
+    """Remove the key light, in place, from the shaded pixels of a row, with soft edges; the two maps are one."""
+    end = np.float32(len(shadow) - _FILTER + 1)
+    for x in range(len(key_light)):
+        if key_light[x] <= 0:
+            continue
+        u, v, here = map_x[x], map_y[x], near[x]
+        if not ((u >= 0) & (u < end) & (v >= 0) & (v < end)):
+            continue
+        i, j = np.uint32(u), np.uint32(v)
+        of_still = still_blocks[j >> _BLOCK_SHIFT, i >> _BLOCK_SHIFT] > here
+        of_others = blocks[j >> _BLOCK_SHIFT, i >> _BLOCK_SHIFT] > here
+        if not (of_still | of_others):  # no surface nearby is nearer to the light
+            continue
+        if not of_others:
+            blocked = _blocked(still_shadow, still_shadow, i, j, u - i, v - j, here)
+        elif not of_still:
+            blocked = _blocked(shadow, shadow, i, j, u - i, v - j, here)
+        else:
+            blocked = _blocked(still_shadow, shadow, i, j, u - i, v - j, here)
+        key_light[x] *= 1.0 - blocked
+
+
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+def _blocked(
+    one: np.ndarray, other: np.ndarray, i: np.uint32, j: np.uint32, du: float, dv: float, here: float
+) -> float:
+    """Return the share of the light that surfaces of two shadow maps block at a place.
+
+    Percentage-closer filtering: 4 x 4 comparisons under a sliding box of 3 x 3; mostly the four corners agree, and
+    their result is used for all.
+    """
+    corners = int((one[j, i] > here) | (other[j, i] > here))
+    corners += int((one[j, i + _LAST] > here) | (other[j, i + _LAST] > here))
+    corners += int((one[j + _LAST, i] > here) | (other[j + _LAST, i] > here))
+    corners += int((one[j + _LAST, i + _LAST] > here) | (other[j + _LAST, i + _LAST] > here))
+    if corners == 0 or corners == 4:
+        return 0.25 * corners
+    blocked = 0.0
+    for m in range(_FILTER):
+        row = 0.0
+        for n in range(_FILTER):
+            y, x = j + np.uint32(m), i + np.uint32(n)
+            if (one[y, x] > here) | (other[y, x] > here):
+                row += (1.0 - du) if n == 0 else (du if n == _FILTER - 1 else 1.0)
+        blocked += row * ((1.0 - dv) if m == 0 else (dv if m == _FILTER - 1 else 1.0)) / 9.0
+    return blocked
+
+
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+def nearest_blocks(shadow: np.ndarray, first: int, end: int) -> np.ndarray:
+    """Return the highest inverse depth under all filters that begin in each block of 8 x 8 pixels of a shadow map.
+
+    Only the rows from ``first`` to before ``end`` have a surface.
+    """
+    side = len(shadow)
+    count = (side + _BLOCK - 1) // _BLOCK
+    bands, blocks = np.zeros((count, side), np.float32), np.zeros((count, count), np.float32)
+    first_block = max(first - _FILTER + 1, 0) // _BLOCK
+    for block in range(first_block, min((end + _BLOCK - 1) // _BLOCK, count)):
+        band = bands[block]
+        for y in range(_BLOCK * block, min(_BLOCK * (block + 1) + _FILTER - 1, side)):
+            row = shadow[y]
+            for x in range(side):
+                band[x] = row[x] if row[x] > band[x] else band[x]
+        for column in range(count):
+            for value in band[_BLOCK * column : _BLOCK * (column + 1) + _FILTER - 1]:
+                blocks[block, column] = max(blocks[block, column], value)
+    return blocks
