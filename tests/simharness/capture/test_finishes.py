@@ -9,9 +9,8 @@ import pytest
 from mesh_shapes import ball, sheet
 from test_renderers import camera_at
 
-from simharness.capture.rendering.figure_kernels import grain_of
 from simharness.capture.rendering.finish_kernels import FINISHING, GLOSS, finish
-from simharness.capture.rendering.finishes import Finishes
+from simharness.capture.rendering.finishes import Finishes, grain_of
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.rendering.surface_kernels import NORMAL_X, NORMAL_Y, NORMAL_Z, PIXELS, memory
 from simharness.types.finish import Finish, Material

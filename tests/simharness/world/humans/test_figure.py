@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from simharness.capture.rendering.figure_kernels import grain_of
+from simharness.capture.rendering.finishes import grain_of
 from simharness.types.finish import Material
 from simharness.world.humans.body import FacePart, make_body
 from simharness.world.humans.clothing import Garment, dress, face_colors, garments
