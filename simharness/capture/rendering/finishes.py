@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mvpose.camera import Camera
 from mvpose.kernels import njit
-from simharness.capture.rendering.moving_light_kernels import light_at
+from simharness.capture.rendering.moving_light import light_at
 from simharness.capture.rendering.room_light import Probes
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh

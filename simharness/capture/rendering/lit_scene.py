@@ -20,7 +20,7 @@ from simharness.capture.rendering.backgrounds import Background, LitBackground
 from simharness.capture.rendering.dimming_kernels import dim, runs_below
 from simharness.capture.rendering.finishes import MATTE, Finishes, PosedFinishes
 from simharness.capture.rendering.lit_kernels import shade_lit
-from simharness.capture.rendering.moving_light_kernels import capsules, moving_light
+from simharness.capture.rendering.moving_light import capsules, moving_light
 from simharness.capture.rendering.panoramas import fill_empty
 from simharness.capture.rendering.room_light import RoomLight, last_light, room_light
 from simharness.capture.rendering.scene_geometry import SceneGeometry

@@ -1,7 +1,7 @@
 """Compiled kernels of the shadows of moving bodies on surfaces that face up: private, on plain arrays, single-threaded.
 
 A shadow layer is a map at one height with the share of the light that bodies leave: of that of lamps and the sun, or of
-that of the surroundings (see :mod:`simharness.capture.rendering.moving_light_kernels`).
+that of the surroundings (see :mod:`simharness.capture.rendering.moving_light`).
 """
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.moving_light_kernels import enclose, hide, light_at
+from simharness.capture.rendering.moving_light import enclose, hide, light_at
 
 BLOCK = 8  # cells along each side of a block: whole blocks without shadow are skipped
 

@@ -13,7 +13,7 @@ from simharness.capture.rendering import tone
 from simharness.capture.rendering.box_tree_kernels import build_tree, trace
 from simharness.capture.rendering.light_kernels import direct_light
 from simharness.capture.rendering.light_samples import LightSamples
-from simharness.capture.rendering.moving_light_kernels import capsules
+from simharness.capture.rendering.moving_light import capsules
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.rendering.room_light import _REFLECTED, _SPECK, _reflected, room_light
 from simharness.capture.rendering.scene_geometry import StillGeometry

@@ -1,7 +1,7 @@
 """Compiled kernels of the light on moving bodies: private, on plain arrays, single-threaded.
 
 It is that of the room, at probes in the air, less what bodies keep from each other (see
-:mod:`simharness.capture.rendering.moving_light_kernels`).
+:mod:`simharness.capture.rendering.moving_light`).
 """
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
