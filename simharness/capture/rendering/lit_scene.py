@@ -20,11 +20,11 @@ from simharness.capture.rendering.backgrounds import Background, LitBackground
 from simharness.capture.rendering.finishes import MATTE, Finishes, PosedFinishes
 from simharness.capture.rendering.lit_kernels import shade_lit
 from simharness.capture.rendering.moving_light import capsules, moving_light
+from simharness.capture.rendering.moving_shadows import BLOCK, cast, dim, runs_below, touched_blocks
 from simharness.capture.rendering.panoramas import fill_empty
 from simharness.capture.rendering.room_light import RoomLight, last_light, room_light
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.scene_topology import SceneTopology
-from simharness.capture.rendering.shadow_layer_kernels import BLOCK, cast, dim, runs_below, touched_blocks
 from simharness.capture.rendering.vertex_kernels import whole
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simharness.capture.rendering.shadow_layer_kernels import dim, runs_below
+from simharness.capture.rendering.moving_shadows import dim, runs_below
 from simharness.capture.rendering.tone import dimming
 from simharness.capture.rendering.vertex_kernels import covering_spans, lifted, project_vertices, put_back
 
