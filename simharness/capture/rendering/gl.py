@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.camera import Camera
+from simharness.capture.rendering.backgrounds import fill_empty
 from simharness.capture.rendering.lens import through_lens
-from simharness.capture.rendering.panoramas import fill_empty
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, Unavailable, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry, normals
 from simharness.capture.rendering.scene_topology import pyramid

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from mvpose.camera import Camera
 from simharness.capture.rendering import tone
-from simharness.capture.rendering.backgrounds import Background, LitBackground
+from simharness.capture.rendering.backgrounds import Background, LitBackground, fill_empty
 from simharness.capture.rendering.finishes import MATTE, Finishes, PosedFinishes
 from simharness.capture.rendering.lit_kernels import shade_lit
 from simharness.capture.rendering.moving_light import capsules, moving_light
 from simharness.capture.rendering.moving_shadows import BLOCK, cast, dim, runs_below, touched_blocks
-from simharness.capture.rendering.panoramas import fill_empty
 from simharness.capture.rendering.room_light import RoomLight, last_light, room_light
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.scene_topology import SceneTopology

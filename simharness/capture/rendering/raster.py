@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.camera import Camera
-from simharness.capture.rendering.backgrounds import Background, Backgrounds, LitBackground
+from simharness.capture.rendering.backgrounds import Background, Backgrounds, LitBackground, fill_empty
 from simharness.capture.rendering.lens import through_lens
 from simharness.capture.rendering.lit_scene import LitScene
-from simharness.capture.rendering.panoramas import fill_empty
 from simharness.capture.rendering.raster_kernels import LONGEST_SIDE, NOTHING_DRAWN, draw_projected, rasterise
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry
