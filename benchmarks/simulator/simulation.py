@@ -9,7 +9,7 @@ from benchmarks.method.measure import collector_off, exponent
 from benchmarks.method.report import MET, MISSED, bar, caption, figure, table
 from benchmarks.simulator.scenes import scenario
 from mvpose.camera import Rig
-from simharness.capture.film import film
+from simharness.capture.filming import film
 from simharness.capture.ray_visibility import RayObserver
 from simharness.detector.detect import detect
 from simharness.scenario.sections.scenario import Scenario

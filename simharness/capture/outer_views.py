@@ -15,7 +15,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.skeleton import Skeleton
 from mvpose.wholebody.estimator import rows_of
-from simharness.capture.film import simultaneous_exposures
+from simharness.capture.filming import simultaneous_exposures
 from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import RayCaster
 from simharness.capture.ray_visibility import CameraArrays, cast_bands

@@ -17,7 +17,7 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Camera
 from mvpose.kernels import njit
 from simharness.capture.body_outlines import Outline, boxes, packed
-from simharness.capture.film import Observation
+from simharness.capture.filming import Observation
 from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import RayCaster
 from simharness.capture.shutter import joints_at_exposure
@@ -55,7 +55,7 @@ class RayObserver:
         self._allowed = np.concatenate([np.zeros(len(bodies)), self._lookalikes.allowed])
 
     def observe(self, states: Sequence[PlaybackState], cameras: Sequence[Camera]) -> list[Observation]:
-        """Return the observations: see :class:`simharness.capture.film.Observer`."""
+        """Return the observations: see :class:`simharness.capture.filming.Observer`."""
         people = len(self._radii)
         self._cameras = views = CameraArrays.of(cameras, self._cameras)
         bands = np.stack([state.joints for state in states])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mvpose.arrays import Floats
     from mvpose.skeleton import Skeleton
-    from simharness.capture.film import Observer
+    from simharness.capture.filming import Observer
     from simharness.capture.outer_views import OuterJointFilm
     from simharness.capture.picture import PictureSource
     from simharness.capture.rendering.renderer import Renderer, RendererName
@@ -41,7 +41,7 @@ class CaptureFrames:
 
     def __call__(self, frames: range) -> Views:
         """Return the views of these frames."""
-        from simharness.capture.film import film
+        from simharness.capture.filming import film
 
         return film(
             self._playback,
@@ -98,7 +98,7 @@ class FilmOuterJoints:
 
 def observer_of(scenario: Scenario, playback: Playback) -> Observer:
     """Return the method by which a scenario determines visibility: rendered pictures or cast rays."""
-    from simharness.capture.film import PictureObserver
+    from simharness.capture.filming import PictureObserver
     from simharness.capture.ray_visibility import RayObserver
 
     if scenario.rendering.renderer == "rays":

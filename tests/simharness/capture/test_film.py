@@ -12,7 +12,7 @@ from test_renderers import camera_at
 
 from mvpose.camera import Rig
 from simharness.capture.body_outlines import NO_EDGES, boxes
-from simharness.capture.film import PictureObserver, film
+from simharness.capture.filming import PictureObserver, film
 from simharness.capture.picture import PictureSource, antialiased, meshes_at
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.scenario.sections.cameras_section import FaultsSection, SensorSection

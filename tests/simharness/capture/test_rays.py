@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mvpose.camera import Rig
-from simharness.capture.film import PictureObserver
+from simharness.capture.filming import PictureObserver
 from simharness.capture.ray_casting import RayCaster
 from simharness.capture.ray_visibility import RayObserver
 from simharness.capture.rendering.renderer import make_renderer

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mvpose.camera import Camera
-from simharness.capture.film import PictureObserver, film
+from simharness.capture.filming import PictureObserver, film
 from simharness.capture.picture import meshes_at
 from simharness.capture.ray_visibility import RayObserver
 from simharness.capture.rendering.renderer import make_renderer
