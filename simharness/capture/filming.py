@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mvpose.camera import Camera
 from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.joint_visibility import label_joints
-from simharness.capture.picture import PictureSource, meshes_at, stack_bands
+from simharness.capture.picture import ScenePictures, meshes_at, stack_bands
 from simharness.capture.rendering.renderer import Image, Renderer
 from simharness.capture.shutter import band_cameras, band_times, joints_at_exposure
 from simharness.types.views import LookalikeViews, Views, Visibility
@@ -115,7 +115,7 @@ def film(
     observer: Observer,
     *,
     frames: Many[int] | None = None,
-    picture_source: PictureSource | None = None,
+    picture_source: ScenePictures | None = None,
     previews: Collection[int] = (),
 ) -> Views:
     """Film ``frames`` of a scene (all by default).

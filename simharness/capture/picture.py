@@ -111,7 +111,7 @@ def stack_bands(bands: Many[Image]) -> Image:
     )
 
 
-class PictureSource:
+class ScenePictures:
     """Source of the pictures that the cameras deliver, shutter and sensor included.
 
     Args:

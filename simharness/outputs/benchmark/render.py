@@ -15,7 +15,7 @@ from mvpose import Detections, Estimate
 from mvpose.commands.progress import Reporter, Silence
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.report.film_file import FilmFile
-from simharness.capture.picture import PictureSource
+from simharness.capture.picture import ScenePictures
 from simharness.outputs.figures.mosaic import mosaic
 from simharness.outputs.run.pictures import annotate
 from simharness.scenario.sections.scenario import Scenario
@@ -137,7 +137,7 @@ def _layers(scenario: Scenario, plan: RenderPlan, reporter: Reporter) -> tuple[T
 
 
 def _pictures(
-    trial: Trial, picture_source: PictureSource, plan: RenderPlan, layers: _Layers | None, frames: range
+    trial: Trial, picture_source: ScenePictures, plan: RenderPlan, layers: _Layers | None, frames: range
 ) -> Iterator[list[Rgb]]:
     """Yield the pictures of all views, frame by frame."""
     overlay = plan.overlay
@@ -160,7 +160,7 @@ def _pictures(
 
 
 def _channel(
-    picture_source: PictureSource, trial: Trial, frame: int, view: int, channel: str
+    picture_source: ScenePictures, trial: Trial, frame: int, view: int, channel: str
 ) -> NDArray[np.unsignedinteger]:
     """Return a channel of one picture as integers for PNG (see ``RenderPlan``); zeros where no picture is delivered."""
     if not trial.exposures.delivered[frame, view]:

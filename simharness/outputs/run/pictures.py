@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mvpose import Camera, Detections, Estimate
 from mvpose.report.limbs import COCO17_BODY, SMALL_FACE, plain_face
 from mvpose.report.palette import TRUTH, UNMATCHED, Color, person_color
-from simharness.capture.picture import PictureSource
+from simharness.capture.picture import ScenePictures
 from simharness.outputs.figures.mosaic import Mark, legend, mosaic, rooms_in_grid
 from simharness.outputs.figures.overlay import BoxTag, Overlay
 from simharness.scenario.sections.scenario import Scenario
@@ -116,7 +116,7 @@ def _caption(record: Record, variant: str, frame: int) -> str:
 
 def draw_frame(
     trial: Trial,
-    picture_source: PictureSource,
+    picture_source: ScenePictures,
     frame: int,
     *,
     truth: Truth,

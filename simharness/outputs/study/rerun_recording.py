@@ -17,7 +17,7 @@ from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback
 
 if TYPE_CHECKING:
-    from simharness.capture.picture import PictureSource
+    from simharness.capture.picture import ScenePictures
     from simharness.outputs.study.replay import Replay
 
 
@@ -126,7 +126,7 @@ def _log_frame(recording: Any, replay: Replay, frame: int) -> None:
         recording.log(f"{place}/truth", rerun.LineStrips2D(drawn, colors=TRUTH))
 
 
-def _log_pictures(recording: Any, replay: Replay, source: PictureSource, frame: int) -> None:
+def _log_pictures(recording: Any, replay: Replay, source: ScenePictures, frame: int) -> None:
     import rerun
 
     for view, camera in enumerate(replay.trial.exposures.believed_rig):

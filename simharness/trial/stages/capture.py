@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from mvpose.skeleton import Skeleton
     from simharness.capture.filming import Observer
     from simharness.capture.outer_views import OuterJointFilm
-    from simharness.capture.picture import PictureSource
+    from simharness.capture.picture import ScenePictures
     from simharness.capture.rendering.renderer import Renderer, RendererName
     from simharness.scenario.sections.scenario import Scenario
     from simharness.types.outer_joints import OuterViews
@@ -106,12 +106,12 @@ def observer_of(scenario: Scenario, playback: Playback) -> Observer:
     return PictureObserver(playback, renderer_of(scenario.rendering.renderer))
 
 
-def picture_source_of(scenario: Scenario, playback: Playback) -> PictureSource:
+def picture_source_of(scenario: Scenario, playback: Playback) -> ScenePictures:
     """Return the source of a scenario's colour pictures; the rasteriser where the scenario itself renders none."""
-    from simharness.capture.picture import PictureSource
+    from simharness.capture.picture import ScenePictures
 
     name = "raster" if scenario.rendering.renderer == "rays" else scenario.rendering.renderer
-    return PictureSource(playback, renderer_of(name), sensor=scenario.sensor, seed=scenario.seed)
+    return ScenePictures(playback, renderer_of(name), sensor=scenario.sensor, seed=scenario.seed)
 
 
 @functools.cache

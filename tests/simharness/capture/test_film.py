@@ -13,7 +13,7 @@ from test_renderers import camera_at
 from mvpose.camera import Rig
 from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.filming import PictureObserver, film
-from simharness.capture.picture import PictureSource, antialiased, meshes_at
+from simharness.capture.picture import ScenePictures, antialiased, meshes_at
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.scenario.sections.cameras_section import FaultsSection, SensorSection
 from simharness.types.lighting import Lighting
@@ -214,8 +214,8 @@ def test_boxes_at_the_border_and_beyond():
 
 class TestStudio:
     @staticmethod
-    def picture_source(**sensor) -> PictureSource:
-        return PictureSource(BallPlayback(), RasterRenderer(), sensor=SensorSection(**sensor), seed=0)
+    def picture_source(**sensor) -> ScenePictures:
+        return ScenePictures(BallPlayback(), RasterRenderer(), sensor=SensorSection(**sensor), seed=0)
 
     def test_a_picture_for_people_is_smooth_and_true(self):
         exposures = ExposureSchedule.ideal(RIG, TIME)
