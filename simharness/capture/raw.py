@@ -4,6 +4,10 @@ The noise is that of photons that are counted and of the readout of the counts, 
 Its variance is an affine function of the light, the photon transfer curve (EMVA Standard 1288, release 4.0, 2021,
 section 2). The Poisson distribution of the counts is approximated by a normal one, as in A. Foi et al., "Practical
 Poissonian-Gaussian noise modeling and fitting for single-image raw-data", IEEE Trans. Image Process. 17(10), 2008.
+
+A lens that blurs by ``sigma`` pixels and images a colour ``shift`` pixels beside its place is one filter of three taps
+along each axis, the only one with the sum 1, the mean ``shift`` and the variance ``sigma^2``. All work of the kernel is
+done in loops along rows without branches, on slices of equal length, so that the compiler vectorises them.
 """
 
 from __future__ import annotations

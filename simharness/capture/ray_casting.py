@@ -3,6 +3,8 @@
 MuJoCo tests each ray against every geom of the model, so the cost of a ray grows with the number of people. People are
 therefore tested by a separate kernel, which skips people far from the ray; a test compares it with ``mj_multiRay``. Of
 the other geoms MuJoCo tests only rays that meet a box around one of them: most rays to people meet none.
+
+Rays start at a camera and end at their target; of the surfaces between, the first one counts.
 """
 
 from __future__ import annotations
@@ -160,7 +162,7 @@ def _ends(model: mujoco.MjModel, geom: int, head: Floats) -> tuple[Floats, Float
     return head + model.geom_pos[geom] - reach, head + model.geom_pos[geom] + reach
 
 
-_ROUNDING = 1e-9  # metres: spheres that a ray must come near before the capsule in it is tested are this much larger
+_ROUND_OFF = 1e-9  # metres: spheres that a ray must come near before the capsule in it is tested are this much larger
 _STEEPEST = 1e30  # 1/m: greatest inverse of a direction; finite, so that no product with it is undefined
 
 
@@ -298,7 +300,7 @@ def hit_people(start, direction, near, length, placed, radii, first, around, own
         for k in range(3):
             spheres[c, k] = (placed[c, 0, k] + placed[c, 1, k]) / 2
             square += (placed[c, 1, k] - placed[c, 0, k]) ** 2
-        spheres[c, 3] = radii[c] + 0.5 * np.sqrt(square) + _ROUNDING
+        spheres[c, 3] = radii[c] + 0.5 * np.sqrt(square) + _ROUND_OFF
     for i in range(len(direction)):
         dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
         x, y, z = start[0] + near[i] * dx, start[1] + near[i] * dy, start[2] + near[i] * dz

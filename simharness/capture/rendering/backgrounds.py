@@ -1,4 +1,8 @@
-"""What a camera sees of the meshes that stay where they are: drawn once for a camera that stays too."""
+"""What a camera sees behind the meshes that move: the meshes that stay where they are, and pixels without a surface.
+
+It is drawn once for a camera that stays too. So NumPy is fast enough for the pixels without a surface, which show the
+background colour of the lighting or its panorama, and nothing is compiled for them.
+"""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ pixels together: they multiply the received light, and write the share of it tha
 - Cloth that is shorter along its grain than at rest folds, so deep that its length stays (Rohmer et al., "Animation
   wrinkling", 2010): its normal is tilted by a fixed profile of folds. The surface does not move.
 
-The light around a figure is taken as one direction and an even rest: a row of :func:`.figure_kernels.figure_light`.
+The light around a figure is taken as one direction and an even rest: a row of :func:`.finishes.figure_light`.
 """
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
@@ -117,9 +117,9 @@ def finish(
         narrow: surfaces of the pixels, see :func:`.surface_kernels.gather`.
         material: material of the moving faces, (m,) int8.
         figure: mesh of the moving faces, (m,) int16.
-        lights: light around the meshes, see :func:`.figure_kernels.figure_light`, (meshes, 7).
+        lights: light around the meshes, see :func:`.finishes.figure_light`, (meshes, 7).
         pixel: size of a pixel at each mesh, metres, (meshes,) float32.
-        grain: see :func:`.figure_kernels.grain_of`; of the moving vertices, (v, 4).
+        grain: see :func:`.finishes.grain_of`; of the moving vertices, (v, 4).
         place: see :class:`simharness.types.finish.Finish`, (v,).
         around: period of the place of hair, metres.
         work: memory, (``FINISHING``,) float32; the row from ``GLOSS`` on is the share that is reflected without colour.

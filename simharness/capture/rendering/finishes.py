@@ -1,4 +1,7 @@
-"""Finishes of the moving meshes of a scene, as the shading kernels take them."""
+"""Finishes of the moving meshes of a scene in a pose: the light around figures, and the grain of their cloth and hair.
+
+They are computed once for a frame and serve all cameras (:mod:`simharness.capture.rendering.finish_kernels`).
+"""
 
 from __future__ import annotations
 
@@ -78,7 +81,7 @@ class PosedFinishes:
 
     Attributes:
         finishes: what does not change.
-        lights: light around the meshes, see :func:`.figure_kernels.figure_light`, (meshes, 7).
+        lights: light around the meshes, see :func:`.finishes.figure_light`, (meshes, 7).
         grain: direction of the grain and slope of folds at the vertices, (v, 4).
         middles: middles of the meshes, (meshes, 3).
     """

@@ -56,7 +56,7 @@ def shade_lit(
     """Colour the pixels that show faces from ``first_face`` on, in place.
 
     Args:
-        spans: spans of pixels that may show them, see :func:`.span_kernels.covering_spans`.
+        spans: spans of pixels that may show them, see :func:`.vertex_kernels.covering_spans`.
         triangle: see :func:`.shading_kernels.shade`, as all arguments up to ``rays``.
         q: homogeneous pixel coordinates of the vertices.
         faces: vertex indices.

@@ -1,7 +1,9 @@
-"""Compiled kernels of the light on moving bodies: private, on plain arrays, single-threaded.
+"""Compiled kernels of the light on moving bodies: that of the room, less what bodies keep from each other.
 
-It is that of the room, at probes in the air, less what bodies keep from each other (see
-:mod:`simharness.capture.rendering.moving_light`).
+The light of the room is known at probes in the air. Bodies are capsules, one for each part. A lamp, as seen from a
+place, is a disc in the sky with an angular radius; a capsule hides of it what overlaps the disc. Of the light from all
+around it hides about its form factor, the share of a sphere at its nearest point (Quilez, "Sphere ambient occlusion"
+and "Capsule ambient occlusion", 2006 and 2013).
 """
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)

@@ -1,7 +1,10 @@
-"""Compiled kernels of the shadows of moving bodies on surfaces that face up: private, on plain arrays, single-threaded.
+"""Compiled kernels of the shadows of moving bodies on still surfaces.
 
-A shadow layer is a map at one height with the share of the light that bodies leave: of that of lamps and the sun, or of
-that of the surroundings (see :mod:`simharness.capture.rendering.moving_light`).
+A shadow layer is a map at one height with the share of the light that bodies leave to surfaces that face up: of that of
+lamps and the sun, or of that of the surroundings (see :mod:`simharness.capture.rendering.moving_light`).
+
+The map of the floor is divided into blocks. Which pixels of a camera lie over which block does not change: they are
+kept as runs along the rows, and pictures look at those over blocks in which anything is dark.
 """
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
@@ -49,7 +52,7 @@ def cast(
         z: height of the map, metres.
         cell: side of a cell, metres.
         corner: x and y of the corner of the map, (2,).
-        bodies: capsules, see :func:`.capsule_kernels.capsules`, (n, 7).
+        bodies: capsules, see :func:`.moving_light.capsules`, (n, 7).
         ranges: first and end of the capsules of each body, (bodies, 2).
         areas: area lights with the luminance of their radiance: centre, right, up, luminance, focus, (m, 11).
         sun: unit direction to the sun and luminance of its irradiance, (4,).

@@ -89,11 +89,11 @@ def shade(
         bias: ``BIAS`` as inverse depth, for a surface that faces the light.
         still_shadow: shadow map of still meshes: inverse depth from the light, (s, s) float32, 0 if nothing blocks the
             light.
-        still_blocks: highest inverse depth in every block of it, see :func:`.shadow_kernels.nearest_blocks`.
+        still_blocks: highest inverse depth in every block of it, see :func:`.shadow_maps.nearest_blocks`.
         shadow: shadow map of the other meshes, (s, s) float32.
         blocks: highest inverse depth in every block of it.
         shadow_place: place in the shadow maps of what each pixel shows of still meshes, see
-            :func:`.shadow_kernels.shadow_places`.
+            :func:`.shadow_maps.shadow_places`.
         shadow_depth: its inverse depth from the light.
         first_face: first face of the meshes that are not still. Only pixels that show them are coloured, and those of
             still meshes on which their shadows may fall.

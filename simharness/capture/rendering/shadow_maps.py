@@ -1,4 +1,7 @@
-"""Shadow maps of a distant light: what it sees of the meshes that stay where they are, and of the others."""
+"""Shadow maps of a distant light: what it sees of the meshes that stay where they are, and of the others.
+
+The kernels take the light from pixels that the maps show to be in shadow.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,11 @@
-"""Compiled kernels of vertices before they are drawn: private, on plain arrays, single-threaded.
+"""Compiled kernels of vertices before and after triangles are drawn: their pixels, and the spans of pixels around meshes.
 
 Vertices are projected once for all triangles that share them, and each gets a code of the pixels near it: of two
 vertices with the same code no pixel centre lies between. Half of the triangles of a body are dropped by it.
+
+A span is a row of the picture, its first and its end column. The spans of a picture cover the boxes around the moving
+meshes, which follow from the codes; what is outside of them is as in the background, and is neither copied nor looked
+at.
 """
 
 from __future__ import annotations

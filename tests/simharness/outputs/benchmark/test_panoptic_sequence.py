@@ -309,7 +309,7 @@ class TestAtomicFolder:
             done.extend(tmp_path.rglob("body3DScene*.json"))
             raise OSError("the disk is full")
 
-        monkeypatch.setattr("simharness.capture.picture.PictureSource.picture", fail)
+        monkeypatch.setattr("simharness.capture.picture.ScenePictures.picture", fail)
         with pytest.raises(RunError, match="disk is full"):
             export_sequence(trial.scenario, ExportPlan(tmp_path / "tiny"))
         assert done
@@ -318,7 +318,7 @@ class TestAtomicFolder:
     def test_an_error_leaves_an_earlier_export_unchanged(self, trial, tmp_path, monkeypatch):
         made, _ = exported(trial.scenario, tmp_path / "tiny", pictures=False)
         before = {file: file.read_bytes() for file in made.rglob("*.json")}
-        monkeypatch.setattr("simharness.capture.picture.PictureSource.picture", lambda *_, **__: 1 / 0)
+        monkeypatch.setattr("simharness.capture.picture.ScenePictures.picture", lambda *_, **__: 1 / 0)
         with pytest.raises(RunError, match="ZeroDivisionError"):
             export_sequence(trial.scenario, ExportPlan(made))
         assert {file: file.read_bytes() for file in made.rglob("*.json")} == before
@@ -346,8 +346,8 @@ class TestAtomicFolder:
             "import os, pathlib, sys\n"
             "from conftest import tiny\n"
             "from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence\n"
-            "from simharness.capture.picture import PictureSource\n"
-            "PictureSource.picture = lambda *_, **__: os._exit(9)\n"
+            "from simharness.capture.picture import ScenePictures\n"
+            "ScenePictures.picture = lambda *_, **__: os._exit(9)\n"
             "export_sequence(tiny(), ExportPlan(pathlib.Path(sys.argv[1])))\n"
         )
         folder = tmp_path / "out" / "tiny"
