@@ -1,4 +1,4 @@
-"""Compiled kernels of vertices before and after triangles are drawn: their pixels, and the spans of pixels around meshes.
+"""Compiled kernels of vertices: their pixels before triangles are drawn, and spans of pixels around meshes.
 
 Vertices are projected once for all triangles that share them, and each gets a code of the pixels near it: of two
 vertices with the same code no pixel centre lies between. Half of the triangles of a body are dropped by it.
