@@ -103,7 +103,7 @@ def check(
 
 def _write(result: GateResult, reports: Mapping[str, Path]) -> bool:
     """Write the reports independently of each other; return whether one could not be written, after a message."""
-    from simharness.gate.baseline import write_text
+    from mvpose.commands.output_files import write_text
     from simharness.gate.gate_reports import junit, markdown
 
     unwritten = False
