@@ -13,7 +13,7 @@ from mvpose.cli.estimate_command import Wanted, estimate_into
 from mvpose.cli.inputs import Calibration, Choices
 from mvpose.cli.program import PROGRAM
 from mvpose.commands.option_groups import grouped
-from mvpose.commands.program import note
+from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
     from mvpose.formats.pictures import PictureSource

@@ -11,7 +11,7 @@ import typer
 from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
 from mvpose.cli.program import PROGRAM
 from mvpose.commands.option_groups import grouped
-from mvpose.commands.program import FOUND
+from mvpose.commands.programs import FOUND
 
 if TYPE_CHECKING:
     from mvpose.calibration import Diagnosis

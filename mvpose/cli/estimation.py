@@ -7,7 +7,7 @@ import math
 from mvpose.cli.agreement import agreement, check
 from mvpose.cli.inputs import Inputs
 from mvpose.commands.errors import failing
-from mvpose.commands.program import note
+from mvpose.commands.programs import note
 from mvpose.commands.progress import single_stage
 from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS, preset

@@ -8,7 +8,7 @@ import numpy as np
 
 from mvpose.calibration.findings import Diagnosis
 from mvpose.cli.inputs import Inputs
-from mvpose.commands.program import note
+from mvpose.commands.programs import note
 from mvpose.detections import Detections
 from mvpose.report.verdict import sentence
 from mvpose.wholebody import body_part

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mvpose.commands.program import note
+from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
     import numpy as np

@@ -12,7 +12,7 @@ import typer
 from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
 from mvpose.cli.program import PROGRAM
 from mvpose.commands.option_groups import grouped
-from mvpose.commands.program import note
+from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
     from mvpose import Rig

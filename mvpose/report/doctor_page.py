@@ -13,7 +13,6 @@ import numpy as np
 from markupsafe import Markup
 
 from mvpose.arrays import Floats
-from mvpose.calibration.clocks import Clocks
 from mvpose.calibration.findings import Diagnosis, Finding, camera_names
 from mvpose.calibration.repair import Repair
 from mvpose.calibration.sightings import Sightings, gather
@@ -45,12 +44,11 @@ def write_doctor_page(
     diagnosis: Diagnosis,
     repair: Repair | None = None,
     sightings: Sightings | None = None,
-    clocks: Clocks | None = None,
     pictures: Pictures | None = None,
     period: float = PERIOD,
     files: tuple[str, str] = ("CALIBRATION", "DETECTIONS"),
 ) -> Path:
-    """Write what the doctor found, ``doctor.html``, and the same as ``doctor.json``.
+    """Write what the doctor found, ``doctor.html``, and its numbers, ``doctor.json``.
 
     Args:
         folder: an existing folder.
@@ -61,7 +59,6 @@ def write_doctor_page(
         repair: the corrected rig, where there is one.
         sightings: keypoints matched over time and views; by default they are matched here, with the corrected rig where
             there is one (:func:`mvpose.calibration.gather`).
-        clocks: offsets of the clocks of all cameras with intervals; by default those of findings and of the repair.
         pictures: function that returns the picture of a frame and view; by default drawings are on plain ground.
         period: seconds between frames whose detections carry no time.
         files: calibration and detections as a command names them, for commands that can be copied.
@@ -75,7 +72,7 @@ def write_doctor_page(
     if sightings is None:
         better = rig if repair is None or repair.refused is not None else repair.rig
         sightings = gather(better, frames, period=period)
-    case = Case.of(rig, sightings, diagnosis, repair)
+    case = DoctorCase.of(rig, sightings, diagnosis, repair)
     page = fill_template(
         "doctor.html",
         program="mvpose",
@@ -93,7 +90,7 @@ def write_doctor_page(
         held=() if repair is None else repair.held,
         fields=_fields(case),
         lines=_lines(case, pictures),
-        clocks=_clocks(case, clocks),
+        clocks=_clocks(case),
     )
     numbers = {"name": name, **diagnosis.to_json(), "repair": None if repair is None else repair.to_json()}
     write_atomic(Path(folder) / NUMBERS, (json.dumps(numbers, indent=1, allow_nan=False) + "\n").encode())
@@ -102,7 +99,7 @@ def write_doctor_page(
 
 
 @dataclass(frozen=True)
-class Case:
+class DoctorCase:
     """A rig with its residuals before and after the repair.
 
     Attributes:
@@ -124,7 +121,7 @@ class Case:
     after: Missing | None
 
     @classmethod
-    def of(cls, rig: Rig, sightings: Sightings, diagnosis: Diagnosis, repair: Repair | None) -> Case:
+    def of(cls, rig: Rig, sightings: Sightings, diagnosis: Diagnosis, repair: Repair | None) -> DoctorCase:
         """Compare the sightings with both rigs."""
         after = None
         if repair is not None and repair.refused is None:
@@ -161,7 +158,7 @@ def _finding(finding: Finding, files: tuple[str, str]) -> dict[str, Any]:
     }
 
 
-def _above(case: Case) -> dict[str, Any]:
+def _above(case: DoctorCase) -> dict[str, Any]:
     repaired = None if case.after is None or case.repair is None else case.repair.rig
     moved = case.accused
     if repaired is not None and not moved:
@@ -173,7 +170,7 @@ def _above(case: Case) -> dict[str, Any]:
     return {"svg": Markup(svg), "factor": f"{factor:g}" if factor > 1 else ""}
 
 
-def _cameras(case: Case) -> list[dict[str, Any]]:
+def _cameras(case: DoctorCase) -> list[dict[str, Any]]:
     """Return the rows of the table of cameras."""
     before = case.residuals(case.before)
     after = None if case.after is None else case.residuals(case.after)
@@ -203,7 +200,7 @@ def _pixels(value: float) -> str:
     return f"{value:.1f}" if math.isfinite(value) else "–"
 
 
-def _fields(case: Case) -> dict[str, Any] | None:
+def _fields(case: DoctorCase) -> dict[str, Any] | None:
     """Return the residual arrows of each camera; None where no camera has enough residuals."""
     order = np.argsort(-np.nan_to_num(case.residuals(case.before), nan=-1.0), kind="stable")[:_MOST_VIEWS]
     kinds = {"before": case.before, **({} if case.after is None else {"after": case.after})}
@@ -236,12 +233,12 @@ def _fields(case: Case) -> dict[str, Any] | None:
     return {"views": views, "factor": f"{factor:g}", "hidden": len(case.rig) - len(views)}
 
 
-def _mean_field(case: Case, missing: Missing, view: int) -> tuple[Floats, Floats]:
+def _mean_field(case: DoctorCase, missing: Missing, view: int) -> tuple[Floats, Floats]:
     here = case.sightings.view == view
     return mean_field(case.sightings.pixels[here], missing.offset[here], size=case.rig[view].size)
 
 
-def _lines(case: Case, pictures: Pictures | None) -> dict[str, Any] | None:
+def _lines(case: DoctorCase, pictures: Pictures | None) -> dict[str, Any] | None:
     """Return the epipolar lines of some joints in a pair of views; None where no pair shares any."""
     residuals = np.nan_to_num(case.residuals(case.before), nan=-1.0)
     second = case.accused[0] if case.accused else int(np.argmax(residuals))
@@ -277,22 +274,18 @@ def _lines(case: Case, pictures: Pictures | None) -> dict[str, Any] | None:
     return {"views": views, "rows": rows, "frame": joints[0].frame}
 
 
-def _clocks(case: Case, clocks: Clocks | None) -> Markup | None:
-    """Return the plot of clock offsets; None where nothing is known of any."""
-    offsets: dict[int, plots.Interval] = {}
-    if clocks is not None:
-        for view in np.flatnonzero(clocks.determined).tolist():
-            value, (low, high) = float(clocks.offsets[view]), clocks.interval[view].tolist()
-            offsets[view] = plots.Interval(case.names[view], 1000.0 * value, 1000.0 * low, 1000.0 * high)
-    elif case.repair is not None and case.repair.refused is None and np.any(case.repair.offsets):
+def _clocks(case: DoctorCase) -> Markup | None:
+    """Return the plot of clock offsets of the repair and of findings; None where nothing is known of any."""
+    offsets: dict[int, plots.ClockOffset] = {}
+    if case.repair is not None and case.repair.refused is None and np.any(case.repair.offsets):
         spread = _NINETY * case.repair.offset_sigmas
         for view, (value, half) in enumerate(zip(case.repair.offsets.tolist(), spread.tolist(), strict=True)):
             low, high = (value - half, value + half) if half > 0 else (math.nan, math.nan)
-            offsets[view] = plots.Interval(case.names[view], 1000.0 * value, 1000.0 * low, 1000.0 * high)
+            offsets[view] = plots.ClockOffset(case.names[view], 1000.0 * value, 1000.0 * low, 1000.0 * high)
     for finding in case.diagnosis.findings:
         if finding.kind == "clock-offset" and finding.view is not None and "ms" in finding.size:
             low, high = finding.interval.get("ms", (math.nan, math.nan))
-            offsets[finding.view] = plots.Interval(case.names[finding.view], finding.size["ms"], low, high)
+            offsets[finding.view] = plots.ClockOffset(case.names[finding.view], finding.size["ms"], low, high)
     if not offsets:
         return None
     return Markup(plots.clock_offsets("clock-offsets", [offsets[view] for view in sorted(offsets)]))

@@ -26,7 +26,7 @@ _MOST_POINTS = 600
 
 
 @dataclass(frozen=True)
-class Interval:
+class ClockOffset:
     """Offset of a camera's clock, ms; low and high are NaN where no interval is known."""
 
     name: str
@@ -104,7 +104,7 @@ def _outline(axes: Axes, camera: Camera, reach: float, color: str, style: str) -
     axes.plot(*camera.center[:2], "o", ms=4, mew=0, color=color, zorder=6)
 
 
-def clock_offsets(name: str, offsets: Sequence[Interval]) -> str:
+def clock_offsets(name: str, offsets: Sequence[ClockOffset]) -> str:
     """Plot the offset of each camera's clock with its 90 % interval, ms."""
     with svg_plot(name, size=(5.2, 0.9 + 0.34 * len(offsets))) as (axes, written):
         axes.axvline(0.0, color=FAINT, lw=0.8, zorder=1)

@@ -45,7 +45,7 @@ _SLOWEST = 1.0  # frames per second that players can be relied on to show
 
 
 @dataclass(frozen=True)
-class Film:
+class CameraFilm:
     """Film of a camera.
 
     Attributes:
@@ -65,7 +65,7 @@ def write_films(
     pictures: MovingPictures,
     *,
     progress: Callable[[int], None] = lambda _: None,
-) -> list[Film]:
+) -> list[CameraFilm]:
     """Write the film of each camera.
 
     Args:
@@ -98,7 +98,7 @@ def write_films(
             writer.add(drawn)
             progress(1)
         writer.close()
-        films.append(Film(recording.names[view], address, jpeg_uri(poster)))
+        films.append(CameraFilm(recording.names[view], address, jpeg_uri(poster)))
     return films
 
 

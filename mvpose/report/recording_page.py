@@ -30,6 +30,7 @@ from mvpose.report.verdict import sentence, sentence_of
 PAGE, NUMBERS = "recording.html", "recording.json"
 """Names of the files that :func:`write_page` writes."""
 
+_SHOWN_FRAMES = 3  # that are drawn
 _MOST_VIEWS = 12  # drawn of a frame
 _MOST_COLUMNS = 8  # people in a table
 
@@ -46,7 +47,6 @@ def write_page(
     pictures: Pictures | None = None,
     moving: MovingPictures | None = None,
     progress: Callable[[int], None] = lambda _: None,
-    shown_frames: int = 3,
 ) -> Path:
     """Write the page of a recording, ``recording.html``, and its numbers, ``recording.json``.
 
@@ -61,7 +61,6 @@ def write_page(
         pictures: function that returns the picture of a frame and view; by default people are drawn on plain ground.
         moving: pictures for a film of each camera, in a folder beside the page; without them there is none.
         progress: called with the number of pictures that were added to films since the last call.
-        shown_frames: frames that are drawn.
 
     Returns:
         Path of the page.
@@ -84,7 +83,7 @@ def write_page(
         doctor=_doctor(diagnosis, doctor_page),
         detections=sum(map(len, frames)),
         films=films,
-        **_sections(recording, pictures, shown_frames),
+        **_sections(recording, pictures),
     )
     numbers = {"name": name, **recording.numbers(), "doctor": None if diagnosis is None else diagnosis.to_json()}
     write_atomic(Path(folder) / NUMBERS, (json.dumps(numbers, indent=1, allow_nan=False) + "\n").encode())
@@ -136,7 +135,7 @@ def _doctor(diagnosis: Diagnosis | None, page: str) -> dict[str, Any] | None:
     return {"verdict": diagnosis.verdict, "sentence": sentence(diagnosis), "lines": lines, "link": page}
 
 
-def _sections(recording: ExaminedRecording, pictures: Pictures | None, shown_frames: int) -> dict[str, Any]:
+def _sections(recording: ExaminedRecording, pictures: Pictures | None) -> dict[str, Any]:
     """Return plots, drawings and tables by the names of the template; without people nearly nothing."""
     people, rig, seen = recording.people, recording.rig, recording.seen
     step = seen.frames[1] - seen.frames[0] if len(seen.frames) > 1 else 1
@@ -156,7 +155,7 @@ def _sections(recording: ExaminedRecording, pictures: Pictures | None, shown_fra
         "columns_left_out": f" Of {len(people)} people the {len(columns)} who are there longest."
         if len(people) > len(columns)
         else "",
-        "drawings": _drawings(recording, pictures, shown_frames),
+        "drawings": _drawings(recording, pictures),
         "residuals": _residuals(recording),
         "rests": _rests(recording),
         "errors": _errors(recording, columns),
@@ -196,12 +195,12 @@ def _errors(recording: ExaminedRecording, columns: Sequence[int]) -> tables.Tabl
     return tables.error_table(of_people, recording.errors, recording.groups, people, columns)
 
 
-def _drawings(recording: ExaminedRecording, pictures: Pictures | None, count: int) -> list[dict[str, Any]]:
+def _drawings(recording: ExaminedRecording, pictures: Pictures | None) -> list[dict[str, Any]]:
     """Return the drawings of some frames: of each part of the recording the one with the most detections of people."""
     people, seen = recording.people, recording.seen
     detections = np.array([(owner >= 0).sum() for owner in seen.owners])
     drawn = []
-    for part in np.array_split(np.arange(len(seen.frames)), min(count, len(seen.frames))):
+    for part in np.array_split(np.arange(len(seen.frames)), min(_SHOWN_FRAMES, len(seen.frames))):
         row = int(part[np.argmax(detections[part])])
         frame = int(seen.frames[row])
         views = np.flatnonzero(np.arange(len(recording.rig)) < _MOST_VIEWS).tolist()

@@ -30,12 +30,14 @@ class Cell:
         small: second line; of a head, the word before the text, which narrow tables leave out.
         share: shade, 0 (none) to 1 (full).
         color: chip before the text; empty for none.
+        strong: whether the number is bold.
     """
 
     text: str
     small: str = ""
     share: float = 0.0
     color: str = ""
+    strong: bool = False
 
 
 @dataclass(frozen=True)

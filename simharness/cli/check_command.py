@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 from mvpose.commands.errors import failing
-from mvpose.commands.program import BAD_INPUT, FOUND
+from mvpose.commands.programs import BAD_INPUT, FOUND
 from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:

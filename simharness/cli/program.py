@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mvpose.commands.program import Program
+from mvpose.commands.programs import Program
 
 
 def _version() -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +14,8 @@ from rich.console import Console
 from rich.text import Text
 
 from mvpose.commands.errors import failing
-from mvpose.commands.program import FAILED
+from mvpose.commands.option_groups import grouped
+from mvpose.commands.programs import FAILED
 from simharness.cli.options import BlameSeeds, Overrides, ScenarioFile
 from simharness.cli.program import PROGRAM
 
@@ -30,12 +32,45 @@ _SHORT_KEY = 16  # letters of a factor that stay on one line
 _IDENTITIES = ("hota", "idf1", "id_switches", "switches_per_minute")
 
 
+@dataclass(frozen=True)
+class Running:
+    """How and where the trials of a study run, and where the results appear."""
+
+    workers: Annotated[
+        int,
+        typer.Option(metavar="N", min=1, max=1024, help="Processes that share the trials; the results stay the same."),
+    ] = 1
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: [cyan]tcp://host:8786[/].")
+    ] = None
+    shard: Annotated[
+        str | None,
+        typer.Option(
+            metavar="I/N",
+            help="Run only part I of N, for several machines: [cyan]1/3[/]; then [cyan]merge[/] their stores.",
+        ),
+    ] = None
+    store: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder of finished trials, which are not run again. [dim]\\[default: store, in --out][/]",
+            file_okay=False,
+        ),
+    ] = None
+    out: Annotated[
+        Path,
+        typer.Option(metavar="FOLDER", help="Folder in which the study gets a folder with its name.", file_okay=False),
+    ] = Path("results/studies")
+
+
 def add_to(app: typer.Typer) -> None:
     """Add the commands."""
     app.command()(study)
     app.command()(merge)
 
 
+@grouped()
 def study(
     file: ScenarioFile,
     overrides: Overrides = None,
@@ -48,34 +83,10 @@ def study(
             metavar="VARIANT", help="A preset such as [cyan]fast[/], instead of the file's variants. Repeatable."
         ),
     ] = None,
-    workers: Annotated[
-        int,
-        typer.Option(metavar="N", min=1, max=1024, help="Processes that share the trials; the results stay the same."),
-    ] = 1,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: [cyan]tcp://host:8786[/].")
-    ] = None,
-    shard: Annotated[
-        str | None,
-        typer.Option(
-            metavar="I/N",
-            help="Run only part I of N, for several machines: [cyan]1/3[/]; then [cyan]merge[/] their stores.",
-        ),
-    ] = None,
-    store: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Folder of finished trials, which are not run again. [dim]\\[default: store, in --out][/]",
-            file_okay=False,
-        ),
-    ] = None,
-    out: Annotated[
-        Path,
-        typer.Option(metavar="FOLDER", help="Folder in which the study gets a folder with its name.", file_okay=False),
-    ] = Path("results/studies"),
     blame: BlameSeeds = 0,
     yes: Annotated[bool, typer.Option("--yes", help="Run even a study of more than 10,000 trials.")] = False,
+    *,
+    running: Running,
 ) -> None:
     """Run a study: a scenario with every combination of its swept values, at every seed.
 
@@ -88,30 +99,31 @@ def study(
 
         limits = None if yes else LIMIT
         loaded = load_study(file, overrides=overrides or (), seeds=seeds, variants=variant or None, limit=limits)
-        part = _part(shard)
+        part = _part(running.shard)
         from mvpose.commands.progress import reporter
         from simharness.study.study_run import run_shard, run_study
 
+        where: dict[str, Any] = {"workers": running.workers, "scheduler": running.scheduler}
         if part is not None:
-            kept_in = store or out / "store"
+            kept_in = running.store or running.out / "store"
             with reporter() as bars:
-                tally = run_shard(loaded, part, store=kept_in, workers=workers, scheduler=scheduler, reporter=bars)
+                tally = run_shard(loaded, part, store=kept_in, **where, reporter=bars)
             info: dict[str, Any] = {**vars(tally), "failed": [vars(each) for each in tally.failed]}
-            _write(_counts(info, f"part {shard}"))
+            _write(_counts(info, f"part {running.shard}"))
             _write(f"store: {kept_in}")
             _write("after all parts: simharness merge STORE... --into STORE, then the same study without --shard")
         else:
             command = PROGRAM.command_line()
             with reporter() as bars:
                 results = run_study(
-                    loaded, out=out, store=store, workers=workers, scheduler=scheduler, reporter=bars, command=command
+                    loaded, out=running.out, store=running.store, **where, reporter=bars, command=command
                 )
             info = dict(results.info)
             if len(results.trials):
                 for table in _tables(results):
                     table.print_to(Console())
             _write(_counts(info, loaded.name))
-            _report(results, blame=blame, workers=workers)
+            _report(results, blame=blame, workers=running.workers)
     if info["failed"]:
         raise typer.Exit(FAILED)
 

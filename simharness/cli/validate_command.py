@@ -13,7 +13,7 @@ from rich.console import Console
 
 from mvpose.commands.errors import failing
 from mvpose.commands.output_files import make_folder, write_json, write_text
-from mvpose.commands.program import FOUND
+from mvpose.commands.programs import FOUND
 from simharness.cli.options import JsonFile, RecordingFile, RecordingFolder
 from simharness.cli.program import PROGRAM
 

@@ -24,7 +24,7 @@ from mvpose.files.atomic_files import write_atomic
 from mvpose.report.limbs import COCO17_BODY
 from mvpose.report.palette import TRUTH, css, person_color
 from simharness.outputs.documents import fill_template
-from simharness.outputs.run.pictures import Picture
+from simharness.outputs.run.pictures import PagePicture
 from simharness.outputs.study.replay import Replay
 from simharness.trial.run_folder import Record, read_run
 from simharness.trial.stages.build_trial import build_trial
@@ -97,7 +97,9 @@ def overview(record: Record, digest: Mapping[str, Any], *, frame: int, views: Se
     for view in views:
         least = min(record.rig[view].size)
         width = round(record.rig[view].size[0] * _SHARPNESS * _SIDE / least)
-        pictures[view] = Picture("", "", picture_source.picture(trial.exposures, frame, view, finer=2, width=width)).uri
+        pictures[view] = PagePicture(
+            "", "", picture_source.picture(trial.exposures, frame, view, finer=2, width=width)
+        ).uri
     tiles = _tiles(record, views)
     matched = tiles[2:]
     return fill_template(

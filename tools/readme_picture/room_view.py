@@ -12,7 +12,7 @@ from mvpose import Camera
 from mvpose.arrays import Floats
 from mvpose.report.view_3d import camera_pyramid
 from simharness.capture.picture import antialiased, meshes_at, scaled
-from simharness.outputs.run.pictures import Picture
+from simharness.outputs.run.pictures import PagePicture
 from simharness.outputs.study.replay import Replay
 from simharness.trial.stages.capture import renderer_of
 from simharness.world.rigs.layouts import look_at
@@ -48,7 +48,7 @@ class RoomView:
         position = _AIM + _DISTANCE * diagonal * toward
         return look_at(position, _AIM, K=intrinsics(_FOV, self.size), size=self.size, name="eye")
 
-    def picture(self, *, finer: int = 2) -> Picture:
+    def picture(self, *, finer: int = 2) -> PagePicture:
         """Render the floor, the far walls and the objects without people, on a white background.
 
         Args:
@@ -60,7 +60,7 @@ class RoomView:
         shown = [mesh for mesh, solid in solids if solid.kind != "room" or not self._hides_room(mesh.vertices)]
         lighting = replace(scene.lighting, background=(1.0, 1.0, 1.0), panorama=None, sources=None)  # no ceiling
         rgb = antialiased(renderer_of("raster"), scaled(self.eye, finer), shown, lighting=lighting)
-        return Picture("The room", "", rgb)
+        return PagePicture("The room", "", rgb)
 
     def _hides_room(self, vertices: NDArray[np.floating]) -> bool:
         """Return whether a part of the room stands between the middle of the room and the camera."""

@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from mvpose import Camera
 from mvpose.arrays import Floats
+from mvpose.report.tables import NOTHING
 from simharness.outputs.documents import fill_template, provenance_sentence
 from simharness.outputs.planning.rehearsal_plots import (
     MapColors,
@@ -27,7 +28,6 @@ from simharness.planning.rehearsal_result import HEIGHTS, Estimated, ExtraCamera
 from simharness.runtime.number_text import fixed, signed
 from simharness.statistics.intervals import Interval
 
-_NOTHING = "–"
 _LAYER, _SIMULATION, _GEOMETRY = "fast layer", "simulation", "geometry"
 _WORST_MM, _BEST_MM = 100.0, 15.0  # ends of the colours of joint errors
 _LEAST_PCP = 60.0
@@ -210,7 +210,7 @@ def _camera_rows(rehearsal: Rehearsal) -> list[dict[str, Any]]:
             "sees": f"{100 * each.sees:.0f} %",
             "worth": _cell(each.worth, 1),
             "worth_mm": _cell(each.worth_mm, 0),
-            "layer": signed(each.layer_worth, 1) if np.isfinite(each.layer_worth) else _NOTHING,
+            "layer": signed(each.layer_worth, 1) if np.isfinite(each.layer_worth) else NOTHING,
             "verdict": "redundant" if each.redundant else "needed" if each.worth.low > 1.0 else "",
         }
         for each in rows
@@ -275,7 +275,7 @@ def _unit(direction: Floats) -> Floats:
 def _cell(value: Interval, digits: int) -> tuple[str, str]:
     """Return a number and its interval in small print."""
     if not np.isfinite(value.mean):
-        return _NOTHING, ""
+        return NOTHING, ""
     return fixed(value.mean, digits), _span(value, digits)
 
 

@@ -30,7 +30,7 @@ Draw = Callable[[Record, str], str | None]
 
 
 @dataclass(frozen=True)
-class Figure:
+class RunFigure:
     """A registered figure.
 
     Attributes:
@@ -56,11 +56,11 @@ class DrawnFigure:
     finding: str = ""
 
 
-_registered: dict[str, Figure] = {}
+_registered: dict[str, RunFigure] = {}
 
 
 def figure(title: str, caption: str, *, finding: Callable[[Record, str], str] | None = None) -> Callable[[Draw], Draw]:
-    """Register the decorated function as a figure; the arguments are the attributes of :class:`Figure`.
+    """Register the decorated function as a figure; the arguments are the attributes of :class:`RunFigure`.
 
     Raises:
         ValueError: the title is registered already.
@@ -69,7 +69,7 @@ def figure(title: str, caption: str, *, finding: Callable[[Record, str], str] | 
         raise ValueError(f"the figure {title!r} is registered twice: choose another title for one of them")
 
     def register(draw: Draw) -> Draw:
-        _registered[title] = Figure(title, caption, draw, finding)
+        _registered[title] = RunFigure(title, caption, draw, finding)
         return draw
 
     return register

@@ -6,12 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from mvpose.report.tables import NOTHING
 from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import SCORES
 from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES
-
-NOTHING = "–"
-"""Text of a score that does not apply."""
 
 
 @dataclass(frozen=True)

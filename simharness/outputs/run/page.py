@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.report.palette import line_color
+from mvpose.report.tables import NOTHING
 from mvpose.skeleton import COCO17
 from simharness.outputs.documents import fill_template
 from simharness.outputs.figures.blame_section import blame_section
 from simharness.outputs.run import findings, plots
 from simharness.outputs.run.figures import draw_figures
-from simharness.outputs.run.film import Film
-from simharness.outputs.run.headline import COLUMNS, NOTHING, WHOLE_BODY_COLUMNS, has_whole_body
-from simharness.outputs.run.pictures import Picture
+from simharness.outputs.run.headline import COLUMNS, WHOLE_BODY_COLUMNS, has_whole_body
+from simharness.outputs.run.pictures import PagePicture
+from simharness.outputs.run.run_film import RunFilm
 from simharness.outputs.run.standard_figures import person_errors, presence
 from simharness.outputs.run.tracked_people import TRACKING_COLUMNS, tracked_variants
 from simharness.scenario.toml_files import dumps
@@ -35,9 +36,9 @@ _HIPS = [COCO17.index("left_hip"), COCO17.index("right_hip")]
 def render(
     record: Record,
     *,
-    pictures: Sequence[Picture] = (),
+    pictures: Sequence[PagePicture] = (),
     things: Sequence[Floats] = (),
-    film: Film | None = None,
+    film: RunFilm | None = None,
     found: Blame | None = None,
 ) -> str:
     """Return the page of a run.
@@ -68,7 +69,7 @@ def render(
         people=_people_table(record, main),
         pictures=pictures,
         film=film,
-        poster=film and Picture("", "", film.poster).uri,
+        poster=film and PagePicture("", "", film.poster).uri,
         blame=found and blame_section(found),
         blame_hint=f"{_command(record)} --blame 10",
         plots=_plots(record, main, things, errors),

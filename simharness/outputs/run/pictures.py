@@ -37,7 +37,7 @@ _JPEG_QUALITY = 88
 
 
 @dataclass(frozen=True)
-class Picture:
+class PagePicture:
     """Picture on a page.
 
     Attributes:
@@ -72,7 +72,7 @@ def _encoded(rgb: Rgb, suffix: str, options: list[int]) -> bytes:
 
 def draw_pictures(
     trial: Trial, record: Record, *, progress: Callable[[int], None] = lambda pictures: None
-) -> list[Picture]:
+) -> list[PagePicture]:
     """Draw the typical frame of a run, and its worst frame if that is worse, by the scores of the first variant."""
     variant = next(iter(record.estimates))
     costs = frame_costs(record.scores, variant)
@@ -92,7 +92,7 @@ def draw_pictures(
             detections=record.detections[frame],
             estimate=record.estimates[variant][frame],
         )
-        pictures.append(Picture(title, _caption(record, variant, frame), rgb))
+        pictures.append(PagePicture(title, _caption(record, variant, frame), rgb))
         progress(1)
     return pictures
 

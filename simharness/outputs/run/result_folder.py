@@ -12,8 +12,8 @@ import polars as pl
 
 from mvpose.commands.progress import Reporter, Silence, Stages
 from mvpose.files.atomic_files import atomic_folder
-from simharness.outputs.run.film import filmed_frames, make_film
 from simharness.outputs.run.pictures import draw_pictures, outlines
+from simharness.outputs.run.run_film import filmed_frames, make_film
 from simharness.scenario.load import fingerprint
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import polars as pl
 
-from simharness.outputs.run.headline import NOTHING
+from mvpose.report.tables import NOTHING, Cell
 from simharness.outputs.study.curves import FactorBreakingPoint
 from simharness.outputs.study.failure_rates import NOT_BLAMED
 from simharness.runtime.number_text import fixed, signed
@@ -30,21 +29,6 @@ SIGNIFICANT = 0.05
 
 _OF_A_VARIANT = ("variant", "seconds", "scenario")  # columns besides the scores that are not part of the setting
 _OTHER = " of the other variant"  # suffix that no column of a study has
-
-
-@dataclass(frozen=True)
-class Cell:
-    """Table cell.
-
-    Attributes:
-        text: the number.
-        small: note in small letters below the number.
-        strong: whether the number is bold.
-    """
-
-    text: str
-    small: str = ""
-    strong: bool = False
 
 
 def tracks_people(trials: pl.DataFrame) -> bool:
@@ -148,7 +132,7 @@ def differences(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list
         if np.isfinite(pair.low):
             small = f"{_signed(pair.low, info)} to {_signed(pair.high, info)}"
         significant = adjusted.get((variant, info.key), 1.0) < SIGNIFICANT
-        rows[variant].append(Cell(_signed(pair.difference, info), small, significant))
+        rows[variant].append(Cell(_signed(pair.difference, info), small, strong=significant))
     return rows
 
 

@@ -12,7 +12,7 @@ import polars as pl
 
 from mvpose.report.view_3d import View3D
 from simharness.gate.trial_command import overrides
-from simharness.outputs.run.pictures import MAX_VIEWS, Picture, draw_frame
+from simharness.outputs.run.pictures import MAX_VIEWS, PagePicture, draw_frame
 from simharness.outputs.study.replay import Replay, replay
 from simharness.outputs.study.skeleton_view_3d import skeleton_view_3d
 from simharness.scenario.named_files import relative_files
@@ -62,7 +62,7 @@ class WorstFramePictures:
         command: command that renders the trial again; empty where no command gives the same scenario.
     """
 
-    picture: Picture
+    picture: PagePicture
     view: View3D
     setting: str
     trial: str
@@ -128,7 +128,7 @@ def show(
             explained=None,
         )
         setting = ", ".join(f"{key} {value}" for key, value in frame.setting.items())
-        picture = Picture(f"{number}. {setting}", _caption(results, frame, again), rgb)
+        picture = PagePicture(f"{number}. {setting}", _caption(results, frame, again), rgb)
         assert study is not None
         command = _command(study, scenario)
         yield WorstFramePictures(picture, skeleton_view_3d(again, frame.frame), setting, frame.trial, command), again

@@ -109,7 +109,7 @@ AROUND = {
     "mvpose/formats/people_table.py": "bytes that were read",
     "simharness/runtime/parquet_tables.py": "bytes that were read",
     "simharness/planning/search.py": "text that was just written",
-    "simharness/outputs/run/film.py": "a film that was just written",
+    "simharness/outputs/run/run_film.py": "a film that was just written",
     "simharness/runtime/code_digest.py": "code",
     "simharness/trial/needs.py": "what the kernel says of the machine",
     "simharness/trial/identity.py": "digests of regular files, read in blocks",

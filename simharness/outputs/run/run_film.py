@@ -26,7 +26,7 @@ _LEAST_RATE = 1.0  # pictures per second: players show nothing of a slower film 
 
 
 @dataclass(frozen=True)
-class Film:
+class RunFilm:
     """Film of a run.
 
     Attributes:
@@ -52,7 +52,7 @@ def filmed_frames(count: int) -> list[int]:
 
 def make_film(
     previews: Mapping[int, Sequence[Rgb]], record: Record, exposures: ExposureSchedule, *, variant: str
-) -> Film | None:
+) -> RunFilm | None:
     """Make a film with the mosaic of the views of each frame, played in real time; None without an encoder.
 
     Estimates are drawn as on the other pictures of the page (:func:`simharness.outputs.run.pictures.annotate`), without
@@ -76,7 +76,7 @@ def make_film(
         return None
     shown = "" if len(views) == len(record.rig) else f", {len(views)} of {len(record.rig)} cameras"
     count = "All frames" if len(frames) == len(record.time) else f"{len(frames)} of {len(record.time)} frames"
-    return Film(f"{count} in real time{shown}, with the estimates of variant {variant}.", mp4, sheets[0])
+    return RunFilm(f"{count} in real time{shown}, with the estimates of variant {variant}.", mp4, sheets[0])
 
 
 def _sheet(
