@@ -1,1 +1,8 @@
-"""HTML reports of a run and of a study, with their plots, pictures and films."""
+"""What people look at: pages of runs, studies, rehearsals and validations, with pictures and films; data on disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+TEMPLATES = Path(__file__).parent / "templates"
+"""Templates of the pages; they extend those of :mod:`mvpose.report.documents`."""

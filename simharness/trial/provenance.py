@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -38,3 +38,15 @@ def provenance(*, command: str | None, seeds: Iterable[int], variants: Iterable[
         "machine": {"system": platform.platform(), "processor": platform.machine(), "cpus": os.cpu_count()},
         "seconds": seconds,
     }
+
+
+def provenance_sentence(provenance: Mapping[str, Any]) -> str:
+    """Return a sentence with the code, the libraries and the machine that made a result.
+
+    Args:
+        provenance: keys of :func:`provenance`.
+    """
+    digests = ", ".join(f"{name} {digest[:8]}" for name, digest in provenance["digests"].items())
+    versions = ", ".join(f"{name} {version}" for name, version in provenance["versions"].items())
+    machine = provenance["machine"]
+    return f"Code {provenance['code']} ({digests}) with {versions}; {machine['processor']}, {machine['cpus']} cores."

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from mvpose.commands.progress import duration
-from simharness.outputs.documents import markdown_table, provenance_sentence
+from mvpose.report.tables import markdown_table
 from simharness.runtime.number_text import fixed, signed
+from simharness.trial.provenance import provenance_sentence
 
 _DATA = {"campus": "Campus", "shelf": "Shelf"}
 _OF = {

@@ -11,7 +11,8 @@ import numpy as np
 from markupsafe import Markup
 
 from mvpose.files.atomic_files import write_atomic
-from simharness.outputs.documents import fill_template
+from mvpose.report.documents import fill_template
+from simharness.outputs import TEMPLATES
 from simharness.outputs.planning.plan_plots import buying_curve, place_map, rig_bars, room_from_above, room_from_side
 from simharness.planning.candidates import candidates_in, places_in
 from simharness.planning.plan_result import RigPlan, sentences
@@ -69,6 +70,8 @@ def render_preview(room: Room) -> str:
     lenses = ", ".join(f"{each.name} ({each.fov[0]:.0f}°)" for each in room.lenses if not each.turned)
     return fill_template(
         "plan.html",
+        folder=TEMPLATES,
+        program="simharness",
         name=room.name,
         code=code_version(),
         title=f"{room.name}: the room",
@@ -95,6 +98,8 @@ def render_plan(plan: RigPlan, *, command: str = "") -> str:
     shown = plan.prediction
     return fill_template(
         "plan.html",
+        folder=TEMPLATES,
+        program="simharness",
         name=room.name,
         code=code_version(),
         title=f"{room.name}: a plan of {len(plan.rig)} cameras",

@@ -10,8 +10,9 @@ from markupsafe import Markup
 
 from mvpose import Camera
 from mvpose.arrays import Floats
+from mvpose.report.documents import fill_template
 from mvpose.report.tables import NOTHING
-from simharness.outputs.documents import fill_template, provenance_sentence
+from simharness.outputs import TEMPLATES
 from simharness.outputs.planning.rehearsal_plots import (
     MapColors,
     crowd_curve,
@@ -27,6 +28,7 @@ from simharness.outputs.planning.rig_view_3d import rig_view_3d
 from simharness.planning.rehearsal_result import HEIGHTS, Estimated, ExtraCamera, Rehearsal
 from simharness.runtime.number_text import fixed, signed
 from simharness.statistics.intervals import Interval
+from simharness.trial.provenance import provenance_sentence
 
 _LAYER, _SIMULATION, _GEOMETRY = "fast layer", "simulation", "geometry"
 _WORST_MM, _BEST_MM = 100.0, 15.0  # ends of the colours of joint errors
@@ -48,6 +50,8 @@ def render_rehearsal(rehearsal: Rehearsal, *, provenance: Mapping[str, Any]) -> 
     bottom = tolerance_bottom(rehearsal)
     return fill_template(
         "rehearsal.html",
+        folder=TEMPLATES,
+        program="simharness",
         name=rehearsal.name,
         code=provenance["code"],
         sentences=rehearsal.sentences,

@@ -11,10 +11,11 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
+from mvpose.report.documents import fill_template
 from mvpose.report.palette import line_color
 from mvpose.report.tables import NOTHING
 from mvpose.skeleton import COCO17
-from simharness.outputs.documents import fill_template
+from simharness.outputs import TEMPLATES
 from simharness.outputs.figures.blame_section import blame_section
 from simharness.outputs.run import findings, plots
 from simharness.outputs.run.figures import draw_figures
@@ -58,6 +59,8 @@ def render(
     errors = {variant: joint_errors(record, variant) for variant in record.estimates}
     return fill_template(
         "run.html",
+        folder=TEMPLATES,
+        program="simharness",
         scenario=record.scenario,
         summary=summary,
         main=main,

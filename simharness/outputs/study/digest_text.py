@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from mvpose.commands.progress import duration
-from simharness.outputs.documents import markdown_table, provenance_sentence
+from mvpose.report.tables import markdown_table
 from simharness.outputs.study.factor_names import NAMES, axis_label
 from simharness.outputs.study.plots import mean_over, short
 from simharness.outputs.study.tables import OVER_TIME
@@ -14,6 +14,7 @@ from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import AP_MM, SCORES, ScoreInfo
 from simharness.scoring.failure_classes import FailureKind
 from simharness.scoring.stage_blame import Stage
+from simharness.trial.provenance import provenance_sentence
 
 HEADS = ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts")
 """Scores of the first table of a digest."""

@@ -12,7 +12,8 @@ from markupsafe import Markup
 
 from mvpose.commands.progress import duration
 from mvpose.files.atomic_files import write_atomic
-from simharness.outputs.documents import fill_template
+from mvpose.report.documents import fill_template
+from simharness.outputs import TEMPLATES
 from simharness.outputs.figures.blame_section import blame_section
 from simharness.outputs.run.plots import stage_times
 from simharness.outputs.study import plots, tables
@@ -114,6 +115,8 @@ def render_study(
     drawn = (*CURVES, *(tables.OVER_TIME if tables.tracks_people(trials) else ()))
     return fill_template(
         "study.html",
+        folder=TEMPLATES,
+        program="simharness",
         info=info,
         facts=_facts(results),
         variants=variants,

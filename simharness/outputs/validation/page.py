@@ -9,7 +9,8 @@ import numpy as np
 from markupsafe import Markup
 
 from mvpose import SHELF14
-from simharness.outputs.documents import fill_template, provenance_sentence
+from mvpose.report.documents import fill_template
+from simharness.outputs import TEMPLATES
 from simharness.outputs.validation import plots, tables
 from simharness.reality.validation.detection_figures import AFFINITY_EDGES, AMBIGUOUS
 from simharness.reality.validation.evidence import Compared
@@ -17,6 +18,7 @@ from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.validation import Validation
 from simharness.reality.validation.verdicts import BOUNDS, VerdictState
 from simharness.runtime.number_text import fixed
+from simharness.trial.provenance import provenance_sentence
 
 _HEADS = {"voxelpose": "VoxelPose", "2019": "2019"}
 _RATIOS = (
@@ -41,6 +43,8 @@ def render_validation(validation: Validation, *, provenance: Mapping[str, Any], 
     states = [verdict.state for verdict in validation.verdicts]
     return fill_template(
         "validation.html",
+        folder=TEMPLATES,
+        program="simharness",
         name=recording.name,
         code=provenance["code"],
         fitted_on=fitted_on,
