@@ -17,7 +17,7 @@ from benchmarks.doctor.recordings import BenchRecording
 from mvpose import Detections, Rig
 from mvpose.calibration import Diagnosis, Repair, diagnose, estimate_clocks, repair
 from mvpose.calibration.repair import Size
-from mvpose.calibration.resampling import resampled
+from mvpose.calibration.repaired_pipeline import resampled
 
 EVERY = 5  # frames: of those that the slower variants estimate
 _NORMAL = 1.6449  # standard deviations, half the width of an interval that holds 90 %

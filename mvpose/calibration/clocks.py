@@ -78,7 +78,7 @@ class Clocks(Sealed):
         """Return the frames with the corrected times of their pictures; detections stay as they are.
 
         The tracker reads the times. A method of single frames takes detections of a frame as those of one time:
-        :func:`mvpose.calibration.resampling.resampled` moves them there.
+        :func:`mvpose.calibration.repaired_pipeline.resampled` moves them there.
         """
         return tuple(replace(each, time=times) for each, times in zip(frames, self.times, strict=True))
 

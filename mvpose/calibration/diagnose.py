@@ -8,24 +8,35 @@ from dataclasses import replace
 import numpy as np
 
 from mvpose.arrays import Floats, Integers
-from mvpose.calibration import camera_findings, convention_findings
+from mvpose.calibration.camera_findings import findings_of_cameras, turn_finding
 from mvpose.calibration.cameras import CameraFit, fit
 from mvpose.calibration.clocks import estimate_clocks
 from mvpose.calibration.consistency import Consistency, Reading
-from mvpose.calibration.conventions import FoundMistake, search
+from mvpose.calibration.conventions import FoundMistake, mistake_finding, search, unit_findings
 from mvpose.calibration.findings import Diagnosis, Finding, camera_names
-from mvpose.calibration.joint_views import joint_views
-from mvpose.calibration.mismatches import without_mismatches
-from mvpose.calibration.normal_equations import JointViews, residuals_of_others, with_errors
-from mvpose.calibration.people_size import relative_size
+from mvpose.calibration.normal_equations import (
+    JointViews,
+    joint_views,
+    residuals_of_others,
+    with_errors,
+    without_mismatches,
+)
 from mvpose.calibration.picture_offsets import COARSE_SPACING, OffsetSearch, blurred
 from mvpose.calibration.pieces import cut_into_windows
-from mvpose.calibration.reread import reread_rig, reread_tracklets
+from mvpose.calibration.reading_changes import reread_rig, reread_tracklets
+from mvpose.calibration.rig_size import relative_size
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
-from mvpose.calibration.sufficiency import DIFFERENT, RECORD, travelled, unknowns
+from mvpose.calibration.sufficiency import (
+    DIFFERENT,
+    RECORD,
+    PairAgreement,
+    silent_views,
+    strangers,
+    travelled,
+    unknowns,
+)
 from mvpose.calibration.tracklet_matching import PeopleGroups
 from mvpose.calibration.tracklets import Tracklets, link
-from mvpose.calibration.views import PairAgreement, silent_views, strangers
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 
@@ -55,11 +66,9 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     consistency = Consistency(cut_into_windows(tracklets))
     reading, mistakes = _without_mistakes(rig, tracklets, consistency)
     turned = {each.mistake.views[0] for each in mistakes if each.mistake.kind == "moved-camera"}
-    findings += [
-        convention_findings.mistake_finding(each, names) for each in mistakes if each.mistake.kind != "moved-camera"
-    ]
+    findings += [mistake_finding(each, names) for each in mistakes if each.mistake.kind != "moved-camera"]
     ratio, bones = relative_size(consistency, reading, tracklets.skeleton)
-    reading, unit = convention_findings.unit(reading, ratio)
+    reading, unit = unit_findings(reading, ratio)
     findings += unit
     mended = reread_rig(rig, reading)
     if mended is None:  # the cameras of no reading stand in different places within 200 m
@@ -91,13 +100,10 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     findings += missing
     starts = np.array([times[first][joints.block == block].min(initial=np.inf) for block in range(joints.blocks)])
     undetermined = any(each.camera is None for each in missing)
-    of_cameras = camera_findings.findings_of_cameras(result, mended, starts, names, undetermined=undetermined)
+    of_cameras = findings_of_cameras(result, mended, starts, names, undetermined=undetermined)
     findings += [each for each in of_cameras if each.view not in turned or each.kind != "moved-camera"]
     after = _corrected(reading, result).cameras
-    findings += [
-        camera_findings.turn_finding(rig, after, result.covariance[view], view, names)
-        for view in sorted(turned - useless)
-    ]
+    findings += [turn_finding(rig, after, result.covariance[view], view, names) for view in sorted(turned - useless)]
     different = any(DIFFERENT in each.text for each in missing)  # then neither files nor clocks can be compared
     if not different:
         clocks = estimate_clocks(_with_found_lenses(mended, reading, result), sightings, period=period)

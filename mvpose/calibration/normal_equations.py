@@ -9,6 +9,10 @@ Parameters of a camera, :data:`~mvpose.calibration.joint_elimination.PARAMETERS`
 ``R' = exp(w) R``), centre along the axes of the world (m), logarithm of the focal length, principal point (pixels), k1
 of the lens, and the offset of the clock (true minus given time of its pictures, s): keypoints move back by their
 velocity times the offset.
+
+The joints are those that several views see, in blocks of time. A camera that moved misplaces all people alike. One wrong
+tracklet among right ones would be taken for a camera that moved, because it misplaces its person in all frames: people
+whose keypoints in one view fit much worse than the rest are left out there (:func:`without_mismatches`).
 """
 
 from __future__ import annotations
@@ -18,8 +22,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mvpose.arrays import Floats, Integers
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.calibration.joint_elimination import PARAMETERS, accumulate, triangulate
+from mvpose.calibration.sightings import Sightings
 from mvpose.camera import Camera
 
 ROTATION, TRANSLATION, POSE = slice(0, 3), slice(3, 6), slice(0, 6)
@@ -30,6 +35,16 @@ FREEDOM = 4.0
 """Degrees of freedom of the Student distribution of keypoints, whose tails are those of real detectors."""
 
 _UNSEEN = 400.0  # squared residual of a keypoint that no joint explains, in standard deviations
+
+
+_JOINT_SPACING = 0.1  # seconds between frames that are used
+_BLOCK = 0.5  # seconds: blocks of time; errors of detectors last less
+_MOST_BLOCKS = 48  # of a long recording, whose blocks are longer
+
+
+_TIMES = 3.0  # as far off as the best quarter of the people in that view
+_SIGMAS = 4.0  # standard deviations of a keypoint; farther is not noise
+_FEWEST = 20  # sightings of a person in a view
 
 
 @dataclass(frozen=True)
@@ -217,3 +232,76 @@ def residuals_of_others(cameras: Floats, sightings: JointViews, *, scale: float)
         if len(distance):
             result[view] = np.median(distance)
     return result
+
+
+def joint_views(sightings: Sightings) -> tuple[JointViews, Integers]:
+    """Return the joints seen by two views or more, in frames 0.1 s apart, and the sightings' rows.
+
+    Returns:
+        The joints by blocks of time, and the row of each of their sightings among those given, (k,).
+    """
+    when = np.full(len(sightings.times), np.nan)
+    pictures = np.isfinite(sightings.times).any(axis=1)
+    when[pictures] = np.nanmedian(sightings.times[pictures], axis=1)
+    slot = np.where(pictures, np.floor((when - when[pictures].min(initial=np.inf)) / _JOINT_SPACING + 1e-9), -1)
+    chosen = np.zeros(len(when), np.bool_)
+    chosen[np.unique(slot, return_index=True)[1]] = True
+    chosen &= pictures
+    rows = np.flatnonzero(chosen[sightings.frame] & sightings.shared)
+    joints, people = len(sightings.skeleton), int(sightings.person.max(initial=0)) + 1
+    key = (sightings.frame[rows] * people + sightings.person[rows]) * joints + sightings.joint[rows]
+    order = np.argsort(key, kind="stable")
+    rows, key = rows[order], key[order]
+    start = np.flatnonzero(np.diff(key, prepend=-1))
+    times = when[sightings.frame[rows[start]]]
+    length = max(_BLOCK, float(np.ptp(times)) / _MOST_BLOCKS) if len(times) else _BLOCK
+    used, number = np.unique(np.floor((times - times.min(initial=np.inf)) / length + 1e-9), return_inverse=True)
+    velocity = sightings.velocity
+    assert velocity is not None
+    views = JointViews(
+        np.append(start, len(rows)).astype(np.int64),
+        number.astype(np.int64),
+        sightings.person[rows[start]],
+        sightings.view[rows],
+        np.ascontiguousarray(sightings.pixels[rows]),
+        sightings.sigma[rows],
+        np.ascontiguousarray(velocity[rows]),
+        max(len(used), 1),
+    )
+    return views, rows
+
+
+def without_mismatches(cameras: Floats, sightings: Sightings, joints: JointViews, rows: Integers) -> Sightings:
+    """Return the sightings without those of a person in a view who was matched wrongly there.
+
+    Args:
+        cameras: packed cameras, (V, 22).
+        sightings: all sightings.
+        joints: joints of them that several views see.
+        rows: rows of the sightings of ``joints``, (k,).
+    """
+    views, count = len(cameras), int(sightings.person.max(initial=-1)) + 1
+    equations = normal_equations(with_errors(cameras, np.zeros((joints.blocks, PARAMETERS * views))), joints)
+    distance = np.linalg.norm(equations.residuals, axis=1) / (equations.scale * joints.sigma)
+    cell = sightings.person[rows] * views + joints.view
+    off = np.full(count * views, np.nan)
+    known = np.isfinite(distance)
+    order = np.argsort(cell[known], kind="stable")
+    sorted_cells, sorted_distances = cell[known][order], distance[known][order]
+    used, start = np.unique(sorted_cells, return_index=True)
+    for each, part in zip(used, np.split(sorted_distances, start[1:]), strict=True):
+        if len(part) >= _FEWEST:
+            off[each] = np.median(part)
+    wrong = _much_farther(off.reshape(count, views))
+    return sightings.select(~wrong[sightings.person, sightings.view])
+
+
+def _much_farther(off: Floats) -> Bools:
+    """Return the people (n, V) who are much farther off than the others in a view; NaN is unknown."""
+    wrong = np.zeros(off.shape, np.bool_)
+    for view in range(off.shape[1]):
+        known = np.isfinite(off[:, view])
+        if known.sum() > 1:
+            usual = np.quantile(off[known, view], 0.25, method="lower")
+            wrong[known, view] = off[known, view] > max(_TIMES * usual, _SIGMAS)
+    return wrong

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from mvpose.calibration.consistency import Reading
+from mvpose.calibration.tracklets import Tracklets
+from mvpose.camera import Camera, Rig
 
 Size = tuple[int, int]
 
@@ -129,3 +132,32 @@ def scaled_picture(factor: float) -> Change:
     # The centre of the first pixel is at 0, its corner at -0.5.
     offset = 0.5 * (factor - 1.0)
     return mapped_pixels(lambda w, h: [[factor, 0, offset], [0, factor, offset]])
+
+
+def reread_rig(rig: Rig, reading: Reading) -> Rig | None:
+    """Return the rig as a reading has it; None if it is no rig."""
+    cameras = []
+    try:
+        for camera, row in zip(rig, reading.cameras, strict=True):
+            fx, skew, cx, fy, cy = row[:5]
+            R = row[5:14].reshape(3, 3)
+            K = np.array([[fx, skew, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+            cameras.append(Camera(K, R, -R @ row[14:17], row[17:22], camera.size, camera.name, camera.readout))
+        return Rig(cameras)
+    except ValueError:
+        return None
+
+
+def reread_tracklets(tracklets: Tracklets, reading: Reading) -> Tracklets:
+    """Return tracklets in the pixels and with the joint names of a reading."""
+    keypoints, sigma, velocity = tracklets.keypoints.copy(), tracklets.sigma.copy(), tracklets.velocity.copy()
+    mirror = list(tracklets.skeleton.mirror)
+    for view, (matrix, exchanged) in enumerate(zip(reading.pixels, reading.exchanged, strict=True)):
+        rows = np.flatnonzero(tracklets.view == view)
+        keypoints[rows] = keypoints[rows] @ matrix[:, :2].T + matrix[:, 2]
+        velocity[rows] = velocity[rows] @ matrix[:, :2].T
+        sigma[rows] *= np.sqrt(abs(np.linalg.det(matrix[:, :2])))
+        if exchanged:
+            for array in (keypoints, sigma, velocity):
+                array[rows] = array[rows][:, mirror]
+    return replace(tracklets, keypoints=keypoints, sigma=sigma, velocity=velocity)

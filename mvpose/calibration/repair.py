@@ -13,9 +13,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from mvpose.arrays import Bools, Floats, Integers
-from mvpose.calibration.adjustment import Adjustment, adjust, shared_joints
+from mvpose.calibration.adjustment import Adjustment, adjust, importance_by_place, shared_effect, shared_joints
 from mvpose.calibration.calibration_prior import Prior
-from mvpose.calibration.evidence import importance_by_place, shared_effect
 from mvpose.calibration.normal_equations import (
     CENTER,
     CLOCK,

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mvpose.arrays import Bools, Floats, Integers
-from mvpose.calibration.keypoint_sigma import keypoint_sigma
 from mvpose.camera import Rig
 from mvpose.checks import as_array
 from mvpose.detections import Detections
 from mvpose.duplicates import Duplicates
 from mvpose.kernels import njit
+from mvpose.reconstruction.likelihood import Noise
 from mvpose.skeleton import COCO17, Skeleton
 
 _LONGEST_GAP = 0.3  # seconds without a detection, after which a tracklet ends
@@ -28,6 +28,11 @@ _SCATTER = 0.25  # in square roots of the person's area: mean error of a bad det
 _RIVAL = 0.6  # a link must be shorter than this share of the distance to any other candidate
 _SATURATION = 1.0  # in square roots of the area: greatest distance that one joint counts for
 _WINDOW = 0.12  # seconds before and after, over which velocities are fitted: limbs swing once in a second
+
+
+_NOISE = Noise()
+_BOX_SHARE = 0.53  # fraction of its box that a person fills (Ronchi & Perona, ICCV 2017)
+_LOWEST_SCORE = 0.2  # a keypoint of a lower score is not less accurate: it is right or grossly wrong
 
 
 @dataclass(frozen=True)
@@ -277,3 +282,42 @@ def chosen_frames(tracklets: Tracklets, *, spacing: float) -> Bools:
         members = np.flatnonzero(slot == each)
         chosen[members[np.argmax(detections[members])]] = True
     return chosen
+
+
+def keypoint_sigma(
+    keypoints: Floats,
+    scores: Floats,
+    skeleton: Skeleton,
+    *,
+    noise: Noise = _NOISE,
+) -> tuple[Floats, Floats]:
+    """Return the area of each person, (n,), pixels², and the standard deviation of keypoints, (n, J), pixels.
+
+    The area is that of the box around the keypoints, without the fifth of them that are farthest from the median, times
+    the share of the box that a person fills. Where only few joints are detected it is too small.
+
+    Args:
+        keypoints: pixels, (n, J, 2); NaN where missing.
+        scores: scores, (n, J); a keypoint of half the score has twice the standard deviation.
+        skeleton: the J joints.
+        noise: error model.
+
+    Returns:
+        Areas and standard deviations; the latter are infinite where the keypoint is missing.
+    """
+    detected = scores > 0
+    if not len(keypoints):
+        return np.zeros(0), np.zeros(scores.shape)
+    center = np.nanmedian(keypoints, axis=1, keepdims=True)
+    away = np.abs(keypoints - center).max(axis=-1)
+    near = detected & (away <= 5.0 * np.nanmedian(away, axis=1, keepdims=True))
+    low = np.where(near[..., None], keypoints, np.inf).min(axis=1)
+    high = np.where(near[..., None], keypoints, -np.inf).max(axis=1)
+    sides = np.maximum(high - low, 1.0)
+    # A person seen from the side, or of whom one part is detected, has a narrow box: no side counts as less than a
+    # quarter of the other.
+    sides = np.maximum(sides, 0.25 * sides[:, ::-1])
+    area = _BOX_SHARE * sides.prod(axis=1)
+    relative = noise.sigmas(skeleton) / noise.area
+    sigma = np.hypot(np.sqrt(area)[:, None] * relative, noise.pixels) / np.maximum(scores, _LOWEST_SCORE)
+    return area, np.where(detected, sigma, np.inf)

@@ -16,8 +16,7 @@ from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import parse_json, read_bytes
 from mvpose.formats.pictures import PictureSource
 from mvpose.networks.detector import PeopleInPicture, PersonDetector
-from mvpose.networks.people import detect_people
-from mvpose.networks.pose import PoseHead
+from mvpose.networks.pose import PoseHead, detect_people
 
 MARK = ".mvpose-detections"
 """File by which a folder of detections is recognised."""

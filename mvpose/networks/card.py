@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any, Literal, Self
 
 Colour = tuple[float, float, float]
@@ -14,6 +15,9 @@ PREFIX = "mvpose."
 """Prefix of the card's keys in the ``metadata_props`` of an ONNX file, which other programs also use."""
 
 _CHOICES = {"color_order": ("rgb", "bgr"), "cells": ("stride", "span", "area")}
+
+
+_LARGEST = 2**24  # bytes; a card has some kilobytes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,3 +154,35 @@ def _size(value: Any) -> tuple[int, int]:
     if not whole:
         raise ValueError(f"card: size must be width and height, two positive whole numbers of pixels, got {value!r}")
     return int(width), int(height)
+
+
+def read_card_file(network: Path) -> dict[str, Any] | None:
+    """Return the content of the card beside a network; None where there is no card.
+
+    Args:
+        network: ONNX file; its card is the ``.json`` file of the same name.
+
+    Raises:
+        ValueError: there is a card and it cannot be read: no regular file, too large, not JSON, or no object.
+    """
+    card = network.with_suffix(".json")
+    if not card.exists():
+        return None
+    try:
+        if not card.is_file():  # a pipe or a device could be read for ever
+            raise ValueError("it is no regular file")
+        if (size := card.stat().st_size) > _LARGEST:
+            raise ValueError(f"it has {size} bytes, expected at most {_LARGEST}")
+        content = json.loads(card.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        why = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise ValueError(
+            f"{card}: cannot be read as the card of {network.name}: {why}. Copy both again from their source, or "
+            "remove the card if this network is intended without one"
+        ) from None
+    if not isinstance(content, dict):
+        raise ValueError(
+            f"{card}: expected the card of {network.name}, a JSON object, got a {type(content).__name__}; copy both "
+            "again from their source"
+        )
+    return content

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -13,13 +14,19 @@ from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from mvpose.detections import Detections
 from mvpose.heatmaps import Heatmaps
-from mvpose.networks.crops import Images, Placement, check_images, crop_images, in_view, padded, stretched
-from mvpose.networks.decoding import Cells, Values, outer_product, placed_heatmaps, simcc_modes
-from mvpose.networks.session import Session, as_session
+from mvpose.networks.crops import Images, Pixels, Placement, check_images, crop_images, in_view, padded, stretched
+from mvpose.networks.detector import PeopleInPicture, PersonDetector
+from mvpose.networks.session import Provider, Session, as_session
 from mvpose.skeleton import COCO17, Skeleton
+from mvpose.wholebody import SKELETONS, skeleton_by_name
 
 _HIGHEST = 2.0  # heat maps above this have another scale
 _BLACK = (0, 0, 0)  # fill outside the image, as in the training of all heads named below
+
+
+Values = NDArray[np.float32]
+
+_SPACING = 2.0  # input pixels between cells of an outer product; Gaussians of SimCC are at least twice as wide
 
 
 class PoseHead:
@@ -186,3 +193,104 @@ def _with_empty(found: Detections, seen: NDArray[np.bool_], view: NDArray[np.int
         found.skeleton,
         likelihoods=maps,
     )
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Crop pixels of the cells of an output along one axis: cell k is at pixel ``first + step * k``."""
+
+    first: float
+    step: float
+    count: int
+
+    @classmethod
+    def from_convention(cls, convention: str, count: int, extent: int) -> Cells:
+        """Create the cells of an axis of ``extent`` pixels by a convention of ``Card.cells``."""
+        if convention == "span":
+            return cls(0.0, (extent - 1) / max(count - 1, 1), count)
+        step = extent / count
+        return cls(0.5 * (step - 1.0) if convention == "area" else 0.0, step, count)
+
+    @property
+    def middle(self) -> float:
+        """Pixel halfway between the first and the last cell, the mirror axis of the flip test."""
+        return self.first + 0.5 * self.step * (self.count - 1)
+
+
+def placed_heatmaps(values: Values, placement: Placement, columns: Cells, rows: Cells) -> Heatmaps:
+    """Place heat maps of crops, (m, J, h, w) with confident peaks of 1, in the images; negative values become 0."""
+    first, step = np.array([columns.first, rows.first]), np.array([columns.step, rows.step])
+    return Heatmaps(np.maximum(values, 0.0), placement.origin + placement.stride * first, placement.stride * step)
+
+
+def simcc_modes(x: Values, y: Values, placement: Placement, columns: Cells, rows: Cells) -> tuple[Floats, Floats]:
+    """Return keypoints, (m, J, 2), and heights, (m, J), from SimCC vectors (m, J, Wx) and (m, J, Wy).
+
+    The peak of each vector is found at sub-bin accuracy, as that of a heat map one cell wide. The height is the lower
+    of the two peaks, as in the code of RTMPose.
+    """
+    across, height_x = placed_heatmaps(x[:, :, None, :], placement, columns, Cells(0.0, 1.0, 1)).modes(1)
+    down, height_y = placed_heatmaps(y[:, :, :, None], placement, Cells(0.0, 1.0, 1), rows).modes(1)
+    keypoints = np.stack([across[:, :, 0, 0], down[:, :, 0, 1]], axis=2)
+    return keypoints, np.minimum(height_x, height_y)[:, :, 0]
+
+
+def outer_product(x: Values, y: Values, placement: Placement, columns: Cells, rows: Cells) -> Heatmaps:
+    """Convert SimCC vectors to heat maps with cells about two input pixels apart.
+
+    The product of two vectors has the height of the lower of the two peaks at their position. A pair of vectors does
+    not determine which of two peaks in x belongs to which in y, so two candidates give four peaks in the product.
+    """
+    x, y = np.maximum(x, 0.0), np.maximum(y, 0.0)
+    every_x, every_y = (max(1, round(_SPACING / cells.step)) for cells in (columns, rows))
+    higher = np.maximum(x.max(axis=2), y.max(axis=2))[:, :, None, None]
+    x, y = x[:, :, ::every_x], y[:, :, ::every_y]
+    product: Values = np.einsum("mjy,mjx->mjyx", y, x)
+    product /= np.where(higher > 0, higher, 1.0)
+    thinned = (
+        Cells(columns.first, columns.step * every_x, x.shape[2]),
+        Cells(rows.first, rows.step * every_y, y.shape[2]),
+    )
+    return placed_heatmaps(product, placement, *thinned)
+
+
+def detect_people(
+    pictures: Iterable[Pixels], detector: PersonDetector, head: PoseHead | None
+) -> Iterator[PeopleInPicture]:
+    """Yield the people of every picture with their keypoints.
+
+    Args:
+        pictures: (h, w, 3) uint8, red green blue.
+        detector: gives their boxes, and if it is one-stage their keypoints.
+        head: pose head; None with a one-stage detector.
+
+    Raises:
+        ValueError: no head with a detector that gives boxes alone.
+    """
+    if head is None and not detector.one_stage:
+        raise ValueError("a detector that gives boxes alone needs a pose head")
+    for picture in pictures:
+        found = detector.find(picture)
+        if head is None or not len(found.scores):
+            yield found if found.keypoints is not None else _nobody(head)
+            continue
+        posed = head.detect([picture], np.zeros(len(found.boxes), np.int64), found.boxes, box_scores=found.scores)
+        yield replace(found, keypoints=posed.keypoints, keypoint_scores=posed.scores)
+
+
+def open_head(path: str | Path, *, provider: Provider = "cpu", threads: int = 1) -> PoseHead:
+    """Open a pose head, on COCO-17 or on the skeleton of :mod:`mvpose.wholebody` with its number of joints.
+
+    Raises:
+        ValueError: as :class:`mvpose.networks.PoseHead`, or another number of joints.
+    """
+    session = Session(path, provider=provider, threads=threads)
+    known: list[Skeleton] = [COCO17, *map(skeleton_by_name, SKELETONS)]
+    counts = {extent for shape in session.shapes for extent in (shape[0], shape[-1])}
+    skeleton = next((each for each in known if len(each) in counts), COCO17)
+    return PoseHead(session, skeleton=skeleton, likelihoods=False)
+
+
+def _nobody(head: PoseHead | None) -> PeopleInPicture:
+    joints = len(COCO17 if head is None else head.skeleton)
+    return PeopleInPicture(np.zeros((0, 4)), np.zeros(0), np.zeros((0, joints, 2)), np.zeros((0, joints)))

@@ -12,8 +12,7 @@ from typing import Any, Literal, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.networks.card import Card
-from mvpose.networks.card_file import read_card_file
+from mvpose.networks.card import Card, read_card_file
 from mvpose.networks.crops import Pixels
 
 Values = NDArray[np.float32]

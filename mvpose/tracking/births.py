@@ -15,8 +15,7 @@ from mvpose.tracking.bones import BonePrior
 from mvpose.tracking.frame_kernels import repeats
 from mvpose.tracking.looks import learn_looks, scale_of
 from mvpose.tracking.motion import JointMotion, MotionModel
-from mvpose.tracking.population import Population
-from mvpose.tracking.reappearance import Reappearance
+from mvpose.tracking.reappearance import Population, Reappearance
 from mvpose.tracking.recent_pictures import RecentPictures
 from mvpose.tracking.tracks import Tracks
 

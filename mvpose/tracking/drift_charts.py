@@ -21,7 +21,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.kernels import njit
-from mvpose.tracking.line_of_sight import in_image
+from mvpose.tracking.existence import in_image
 from mvpose.tracking.picture_shift import TERMS, measure_shifts, solve_shift
 
 NUMBERS = TERMS + 1

@@ -7,7 +7,7 @@ unless something that nobody modelled hides the person in this view. It finds a 
 lasts (a poster, a coat on a stand) or another one happens to lie there. Pictures that follow each other closely repeat
 themselves, so they count as a fraction of an independent one, and old ones are forgotten. Views in which the track lies
 outside the image, or behind another tracked person, say nothing. What lasts is found as reliably as a person, so it is
-motion (:mod:`mvpose.tracking.displacement`) and more views that tell people from it.
+motion (:mod:`mvpose.tracking.motion`) and more views that tell people from it.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ import numpy as np
 
 from mvpose.arrays import Bools, Floats
 from mvpose.kernels import njit
-from mvpose.tracking.displacement import staying
-from mvpose.tracking.line_of_sight import beside, depth_of, in_image
+from mvpose.tracking.motion import staying
 
 _SHORTEST, _LONGEST = 1e-3, 60.0  # seconds: people who were there before the first picture came within a minute
 _DENSITY_MEMORY, _FLASH_MEMORY = 5.0, 30.0  # seconds
@@ -298,3 +297,45 @@ def _count(density, watched, counts, unclaimed, pictures, since, least, first, e
             watched[v] = min(watched[v] + seconds, _DENSITY_MEMORY)
     counts[0] = keep * counts[0] + (1.0 - keep) * _FLASHES * _WEIGHT
     counts[1] = keep * counts[1] + (1.0 - keep) * _WEIGHT + min(elapsed, FLASH)  # a gap shows no flashes
+
+
+@njit(cache=True, borrows=True)
+def depth_of(camera, point):
+    """Return the distance of a point along the optical axis."""
+    depth = 0.0
+    for r in range(3):
+        depth += camera[11 + r] * (point[r] - camera[14 + r])
+    return depth
+
+
+@njit(cache=True, borrows=True)
+def beside(camera, point, nearer):
+    """Return the distance of a nearer point from the line of sight to a point."""
+    square, along, reach = 0.0, 0.0, 0.0
+    for r in range(3):
+        a, b = point[r] - camera[14 + r], nearer[r] - camera[14 + r]
+        reach += a * a
+        along += a * b
+        square += b * b
+    return np.sqrt(max(square - along * along / max(reach, 1e-12), 0.0))
+
+
+@njit(cache=True, borrows=True)
+def in_image(camera, size, state):
+    """Return whether most joints of a person lie in the image; distortion is left out."""
+    inside, known = 0, 0
+    for j in range(len(state)):
+        if np.isnan(state[j, 0]):
+            continue
+        known += 1
+        z = depth_of(camera, state[j])
+        if z <= 0.0:
+            continue
+        x, y = 0.0, 0.0
+        for r in range(3):
+            offset = state[j, r] - camera[14 + r]
+            x += camera[5 + r] * offset
+            y += camera[8 + r] * offset
+        u, v = camera[0] * x / z + camera[1] * y / z + camera[2], camera[3] * y / z + camera[4]
+        inside += (0.0 <= u < size[0]) and (0.0 <= v < size[1])
+    return 2 * inside > known

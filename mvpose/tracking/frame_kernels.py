@@ -11,9 +11,8 @@ import numpy as np
 from mvpose.kernels import njit
 from mvpose.reconstruction.poses import MISSING_SCORE
 from mvpose.tracking.bones import constrain, learn_lengths
-from mvpose.tracking.displacement import note_displacement
 from mvpose.tracking.existence import gather_evidence, log_odds, log_presence
-from mvpose.tracking.motion import predict
+from mvpose.tracking.motion import note_displacement, predict
 from mvpose.tracking.pose_update import update_people
 
 _GIVEN_UP = -7.0  # log-odds below which a track is no longer followed: one in a thousand
@@ -100,32 +99,6 @@ def update_tracks(
         if groups[t] >= 0:
             learn_lengths(length[t], variance[t], state[t], covariance[t], ends, elapsed)
     return _owners(labels, groups)
-
-
-@njit(cache=True)
-def number_people(labels, groups, lead, of_pose, people):
-    """Number the tracks that several cameras saw at the time of the frame, in place.
-
-    Args:
-        labels: group of each detection, (m,), or -1.
-        groups: group of each track, (n,), or -1.
-        lead: time from the frame to the picture of each detection, (m,), seconds.
-        of_pose: output, (n,): number of the track; -1 stays where fewer than two cameras saw it, or at other times.
-        people: output, (m,): number of the track of each detection.
-    """
-    count = 0
-    for t in range(len(groups)):
-        seen, late = 0, False
-        for d in range(len(labels)):
-            if groups[t] >= 0 and labels[d] == groups[t]:
-                seen += 1
-                late = late or lead[d] != 0.0
-        if seen >= 2 and not late:
-            of_pose[t] = count
-            for d in range(len(labels)):
-                if labels[d] == groups[t]:
-                    people[d] = count
-            count += 1
 
 
 @njit(cache=True)

@@ -13,11 +13,19 @@ them saw.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 
+from mvpose.arrays import Floats, Integers
 from mvpose.kernels import njit
+from mvpose.rays import Rays
 from mvpose.reconstruction.likelihood import accumulate, log_likelihood, solve
-from mvpose.reconstruction.triangulation import consensus
+from mvpose.reconstruction.poses import Poses
+from mvpose.reconstruction.triangulation import Triangulation, consensus
+from mvpose.skeleton import Skeleton
 from mvpose.tracking.motion import carry, condition, transition, trunk_velocity
 
 _FREEDOM = 4.0  # degrees of freedom of the prediction's t distribution, a common choice for heavy tails
@@ -202,3 +210,90 @@ def _log_posterior(point, state, prior, view):
     origins, directions, weights, pixel, sigma, floor = view
     value = log_likelihood(point, origins, directions, weights, pixel, sigma, floor)
     return value - 0.5 * (_FREEDOM + 3.0) * np.log(1.0 + _mahalanobis2(point, state, prior) / _FREEDOM)
+
+
+class PlacedPeople(NamedTuple):
+    """Poses of k of n tracked people, arguments of :func:`mvpose.tracking.frame_kernels.update_tracks`.
+
+    Attributes:
+        of_pose: row of each track in the poses, (n,); -1 for a track whose rays are the evidence.
+        places: joints, (k, J, 3), metres; NaN for an unknown joint.
+        spreads: their covariances, (k, J, 3, 3).
+        confidences: their scores, (k, J).
+        factor: factor of these covariances, at least 1.
+    """
+
+    of_pose: Integers
+    places: Floats
+    spreads: Floats
+    confidences: Floats
+    factor: float
+
+
+def place_people(
+    reconstruction: Callable[[Rays, Integers, Skeleton], Poses],
+    rays: Rays,
+    skeleton: Skeleton,
+    labels: Integers,
+    groups: Integers,
+    lead: Floats,
+    *,
+    factor: float,
+) -> PlacedPeople:
+    """Place the tracked people whom several cameras see at the time of the frame.
+
+    Triangulation uses each joint's rays alone, which the filter does better: then nobody is placed.
+
+    Args:
+        reconstruction: stage of one frame.
+        rays: viewing rays of the m detections.
+        skeleton: their skeleton.
+        labels: group of each, (m,), or -1.
+        groups: group of each track, (n,), or -1.
+        lead: time from the frame to the picture of each detection, (m,), seconds.
+        factor: factor of the covariances, of :func:`repetition`.
+    """
+    joints = len(skeleton)
+    of_pose, people = np.full(len(groups), -1), np.full(len(labels), -1)
+    if not isinstance(reconstruction, Triangulation):
+        number_people(labels, groups, lead, of_pose, people)
+    if not (people >= 0).any():
+        nobody = np.empty((0, joints, 3)), np.empty((0, joints, 3, 3)), np.empty((0, joints))
+        return PlacedPeople(of_pose, *nobody, 1.0)
+    poses = reconstruction(rays, people, skeleton)
+    return PlacedPeople(of_pose, poses.joints, poses.covariance, poses.scores, factor)
+
+
+def repetition(since: float, correlation: float) -> float:
+    """Return the factor of the variance of errors that repeat those of ``since`` seconds ago.
+
+    Errors with the correlation ``exp(-t / correlation)`` average out over many frames like independent ones of
+    ``coth(since / (2 correlation))`` times the variance.
+    """
+    return 1.0 / math.tanh(since / (2.0 * correlation)) if since > 0.0 and correlation > 0.0 else 1.0
+
+
+@njit(cache=True)
+def number_people(labels, groups, lead, of_pose, people):
+    """Number the tracks that several cameras saw at the time of the frame, in place.
+
+    Args:
+        labels: group of each detection, (m,), or -1.
+        groups: group of each track, (n,), or -1.
+        lead: time from the frame to the picture of each detection, (m,), seconds.
+        of_pose: output, (n,): number of the track; -1 stays where fewer than two cameras saw it, or at other times.
+        people: output, (m,): number of the track of each detection.
+    """
+    count = 0
+    for t in range(len(groups)):
+        seen, late = 0, False
+        for d in range(len(labels)):
+            if groups[t] >= 0 and labels[d] == groups[t]:
+                seen += 1
+                late = late or lead[d] != 0.0
+        if seen >= 2 and not late:
+            of_pose[t] = count
+            for d in range(len(labels)):
+                if labels[d] == groups[t]:
+                    people[d] = count
+            count += 1

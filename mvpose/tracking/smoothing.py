@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from copy import copy as shallow_copy
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,11 +20,13 @@ from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.estimate import Estimate
 from mvpose.kernels import njit
+from mvpose.pipeline import Pipeline
 from mvpose.tracking.existence import FLASH
 from mvpose.tracking.frame_kernels import vagueness_of
-from mvpose.tracking.moment import Moment
 from mvpose.tracking.motion import transition
 from mvpose.tracking.tracker import Tracker
+from mvpose.tracking.tracking_model import TrackingModel
+from mvpose.tracking.tracks import Moment
 
 _FASTEST = 1e3  # frames per second; more wait only for a clock that stands still
 
@@ -262,3 +265,40 @@ def smooth_joint(state, covariance, predicted, predicted_covariance, after, afte
         for k in range(6):
             for c in range(6):
                 covariance[r, c] += half[r, k] * gain[k, c]
+
+
+@dataclass(frozen=True)
+class TrackingPipeline:
+    """Tracker of recordings (:class:`mvpose.estimators.SequenceEstimator`), which keeps no state between them.
+
+    Attributes:
+        pipeline: stages of one frame.
+        model: settings of the tracker.
+        lag: seconds of later frames that an estimate waits for: 0 for none, infinite for a whole recording. A fifth of
+            a second, the default, is long enough to tell a person from two false detections that meet, and short enough
+            for a live display.
+    """
+
+    pipeline: Pipeline = Pipeline()
+    model: TrackingModel = TrackingModel()
+    lag: float = 0.2
+
+    def __post_init__(self) -> None:
+        if not self.lag >= 0.0:
+            raise ValueError(f"lag must be 0 s or more, got {self.lag}")
+
+    def estimate(self, rig: Rig, detections: Detections) -> Estimate:
+        """Estimate the people of one frame alone, as the pipeline does, without identities."""
+        return self.pipeline.estimate(rig, detections)
+
+    def track(self, rig: Rig, frames: Iterable[Detections]) -> Iterator[Estimate]:
+        """Yield the estimate of every frame of a recording, in order; every call starts without a past.
+
+        Args:
+            rig: calibrated cameras.
+            frames: detections of each frame, in the order of time.
+
+        Raises:
+            ValueError: as :meth:`mvpose.tracking.Tracker.estimate`.
+        """
+        return track(Tracker(self.pipeline, model=self.model), rig, frames, lag=self.lag)

@@ -27,7 +27,7 @@ from scipy.optimize import least_squares
 
 from mvpose.arrays import Floats
 from mvpose.files.message_text import one_line
-from mvpose.networks.card_file import read_card_file
+from mvpose.networks.card import read_card_file
 from mvpose.networks.session import check_content
 from simharness.types.random_streams import stream
 

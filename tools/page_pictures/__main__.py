@@ -26,7 +26,7 @@ from mvpose.calibration import diagnose, repair
 from mvpose.recording import People
 from mvpose.report.doctor_page import write_doctor_page
 from mvpose.report.recording_page import write_page
-from mvpose.tracking.tracking_pipeline import TrackingPipeline
+from mvpose.tracking.smoothing import TrackingPipeline
 from simharness.trial.run_trial import TrialResult, run_trial
 from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback

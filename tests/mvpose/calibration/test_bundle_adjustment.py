@@ -9,9 +9,16 @@ from people import ring
 from scipy.optimize import least_squares
 
 from mvpose import Rig
-from mvpose.calibration.adjustment import adjust, shared_joints
+from mvpose.calibration.adjustment import (
+    CORRELATION,
+    LIFETIME,
+    adjust,
+    importance_over_time,
+    lasting_effect,
+    shared_effect,
+    shared_joints,
+)
 from mvpose.calibration.calibration_prior import Prior, PriorWeights
-from mvpose.calibration.evidence import CORRELATION, LIFETIME, importance_over_time, lasting_effect, shared_effect
 from mvpose.calibration.normal_equations import (
     CLOCK,
     FREEDOM,

@@ -9,7 +9,7 @@ from people import look_at
 
 from mvpose import Rig
 from mvpose.calibration.cameras import fit
-from mvpose.calibration.joint_views import joint_views
+from mvpose.calibration.normal_equations import joint_views
 from mvpose.calibration.sightings import match_over_time, sightings_of
 from mvpose.calibration.tracklets import link
 

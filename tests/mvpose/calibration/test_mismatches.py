@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mvpose.calibration.mismatches import _much_farther
+from mvpose.calibration.normal_equations import _much_farther
 
 
 def test_one_person_far_off_is_wrong_and_all_people_far_off_are_not():

@@ -9,8 +9,7 @@ from people import ring
 
 from mvpose import Detections, preset
 from mvpose.calibration.clocks import estimate_clocks
-from mvpose.calibration.repaired_pipeline import RepairedPipeline
-from mvpose.calibration.resampling import resampled
+from mvpose.calibration.repaired_pipeline import RepairedPipeline, resampled
 from mvpose.estimators import SequenceEstimator
 
 RIG = ring(4)

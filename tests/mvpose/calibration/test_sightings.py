@@ -7,10 +7,9 @@ from people import ring
 
 from mvpose import Detections
 from mvpose.calibration import gather
-from mvpose.calibration.keypoint_sigma import keypoint_sigma
 from mvpose.calibration.sightings import sightings_of
 from mvpose.calibration.tracklet_matching import RigUncertainty, corrected, match_tracklets
-from mvpose.calibration.tracklets import link
+from mvpose.calibration.tracklets import keypoint_sigma, link
 from mvpose.skeleton import COCO17
 
 RIG = ring(4)

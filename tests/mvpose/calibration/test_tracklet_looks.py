@@ -7,7 +7,7 @@ import pytest
 from moving_people import film, walk
 from people import ring
 
-from mvpose.calibration.tracklet_looks import evidence_of_looks, mean_looks
+from mvpose.calibration.tracklet_matching import evidence_of_looks, mean_looks
 from mvpose.calibration.tracklets import link
 
 RIG = ring(3)

@@ -99,9 +99,8 @@ def test_broken_json_names_the_file_in_one_line(tmp_path):
 
 # What reads files by itself, and why it may.
 AROUND = {
-    "mvpose/networks/card_file.py": "mvpose stands alone; the file is checked before",
     "mvpose/networks/session.py": "the digest of an ONNX file, read in blocks",
-    "mvpose/networks/card.py": "text within an ONNX file",
+    "mvpose/networks/card.py": "text within an ONNX file; mvpose stands alone, and a file beside it is checked before",
     "mvpose/tracking/state.py": "mvpose stands alone; kind and size of the file are checked before",
     "mvpose/kernels.py": "code",
     "mvpose/files/input_files.py": "the reader",

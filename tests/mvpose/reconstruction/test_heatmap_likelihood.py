@@ -6,7 +6,7 @@ from mvpose import COCO17, Detections, Rig
 from mvpose.heatmaps import Heatmaps
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import PictorialStructure
-from mvpose.reconstruction.heatmap_likelihood import rescore
+from mvpose.reconstruction.pictorial import rescore
 
 STRIDE, WIDTH = 4.0, 2.0  # pixels a cell; deviation of a blob in cells
 

@@ -19,7 +19,7 @@ from mvpose.reconstruction.limb_direction_prior import (
     direction_log_likelihood,
     trunk_segments,
 )
-from mvpose.reconstruction.proposals import propose_all
+from mvpose.reconstruction.pictorial import propose_all
 from mvpose.reconstruction.refinement import _add_ambiguity, climb, refine
 from mvpose.reconstruction.triangulation import consensus
 

@@ -10,10 +10,10 @@ from mvpose import COCO17, SHELF14, Skeleton
 from mvpose.recording import People
 from mvpose.skeleton_fit import fit_bodies
 from mvpose.skeleton_fit.body import SEGMENTS, ArticulatedBody
+from mvpose.skeleton_fit.fit import first_lengths
 from mvpose.skeleton_fit.inverse_kinematics import within_limits
 from mvpose.skeleton_fit.joint_limits import ELBOWS, GIRDLES, HIPS, KNEE, NECK, SHOULDERS, SPINE
 from mvpose.skeleton_fit.kinematics import Freedom, Pose
-from mvpose.skeleton_fit.proportions import first_lengths
 from mvpose.skeleton_fit.rotations import frame, shortest, to_matrices, to_vectors
 from mvpose.wholebody import skeleton_by_name
 

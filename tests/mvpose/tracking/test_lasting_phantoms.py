@@ -9,9 +9,9 @@ from walking_people import film, identities
 
 from mvpose import Detections, preset
 from mvpose.tracking import Tracker, track
-from mvpose.tracking.displacement import note_displacement, staying
 from mvpose.tracking.existence import Existence, MeasuredClutter, log_odds
 from mvpose.tracking.frame_kernels import repeats
+from mvpose.tracking.motion import note_displacement, staying
 
 RIG = ring(5)
 WALKERS = [(-1.2, -0.5, 0.5, 0.1), (1.0, 0.8, -0.4, 0.0)]

@@ -9,9 +9,7 @@ from mvpose import COCO17, PANOPTIC19, Pipeline
 from mvpose.reconstruction import Triangulation
 from mvpose.tracking import Tracker, TrackingModel, track
 from mvpose.tracking.bones import bone_prior, scaled_lengths
-from mvpose.tracking.frame_kernels import number_people
-from mvpose.tracking.placed_people import repetition
-from mvpose.tracking.pose_update import update_people
+from mvpose.tracking.pose_update import number_people, repetition, update_people
 
 CENTERS = np.array([[4.0, 0.0, 1.0], [0.0, 4.0, 1.5]])
 
