@@ -1,4 +1,10 @@
-"""Models of faults of a camera: which parameters are off, by how much, and since when."""
+"""Models of faults of a camera (which parameters are off, by how much, since when), and the evidence for them.
+
+The log likelihood of the errors of all cameras is a quadratic form, which gives the evidence of faults under Gaussian
+priors. Errors of detectors last for tenths of a second and are shared by joints, so keypoints count for less than their
+number: the scatter of the gradient between blocks of time says by how much (a sandwich estimate: White, Econometrica
+1982).
+"""
 
 from __future__ import annotations
 
@@ -20,7 +26,6 @@ axis), log focal length, principal point (px), k1, clock (s). Careful calibratio
 ALWAYS, SINCE, GROWING = "always", "since", "growing"
 _COURSES = {ALWAYS: 0.6, SINCE: 0.25, GROWING: 0.15}  # prior of the course over time of a pose that is wrong
 _FEWEST = 3  # blocks of time before and after a change
-
 
 _LEAST_TEMPER = 2.0  # keypoints of one pose are never independent of each other
 _UNKNOWN_TEMPER = 20.0  # in a recording too short to measure it

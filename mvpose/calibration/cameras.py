@@ -6,8 +6,11 @@ respect of one camera (it moved, its focal length is wrong, ...), all the time, 
 Gaussian priors the evidence of each model is a closed form (Bishop, Pattern Recognition and Machine Learning, section
 3.5), which weighs the better fit of a freer model against its freedom. All cameras are in one form, so each model
 explains the disagreements of all views at once, and a wrong camera is not blamed on the others. Models are added one by
-one as long as the evidence grows, if they are likelier as errors about everybody than about one person
-(:mod:`.fault_support`).
+one as long as the evidence grows, if they are likelier as errors about everybody than about one person.
+
+A camera that is wrong is wrong for everybody. A correction that only one person supports comes from a detection of
+another person that was matched with this one, or from an error of the detector that lasts for this person. Both
+explanations are compared by their evidence: one error for all people, or the same error for one of them.
 """
 
 from __future__ import annotations
@@ -42,7 +45,6 @@ place and the pose of people, over seconds, which the scatter between blocks of 
 imitates changes with odds of up to e^26, half a degree of a true one has e^100 and more."""
 
 _REST = 0.03  # share of the strongest fault's odds below which another may be what the model left of it
-
 
 _MOST_PEOPLE = 8  # who are tried, those with the most joints in the view
 _RARER = 3.0

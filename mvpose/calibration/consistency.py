@@ -27,7 +27,6 @@ ViewRays = tuple[Integers, Integers, Integers, Integers, Floats, Floats]
 """Detections of a view: first one of each window (W + 1,), number of pieces in each (W,), and of each its frame (n,),
 piece (n,), normalised coordinates (n, J, 2) and their standard deviations (n, J)."""
 
-
 WRONG = 0.2  # share of keypoints that are wrong by more than the error model (Ronchi & Perona: misses, swaps, hidden)
 _NEGLIGIBLE = 40.0  # exponent from which e^-x is nothing beside WRONG
 

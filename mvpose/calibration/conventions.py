@@ -3,6 +3,8 @@
 A hypothesis says how the files would have to be read if one mistake had been made, in one camera or in all. All are
 compared by the same evidence (:mod:`.consistency`) on the same detections, "nothing is wrong" among them. The best one
 is applied, and the search goes on with it, so that several cameras may have mistakes of their own.
+
+The findings name the mistakes and how to mend the files. The unit of all files shows in the size of people alone.
 """
 
 from __future__ import annotations
@@ -35,7 +37,6 @@ _PLAUSIBLE = 4.0  # mean squared move in these, up to which moved cameras are be
 _LARGEST_TURN = float(np.radians(5.0))  # a crop of 6 % of a picture with a field of view of 75 degrees is such a turn
 _LEAST_AGREEMENT = 0.2  # people who are not the same agree less, by chance
 _NOTHING = 0.8  # prior probability that the files are right
-
 
 _UNITS = {
     0.001: "divided by 1000 twice (or metres taken for millimetres)",

@@ -10,9 +10,9 @@ Parameters of a camera, :data:`~mvpose.calibration.joint_elimination.PARAMETERS`
 of the lens, and the offset of the clock (true minus given time of its pictures, s): keypoints move back by their
 velocity times the offset.
 
-The joints are those that several views see, in blocks of time. A camera that moved misplaces all people alike. One wrong
-tracklet among right ones would be taken for a camera that moved, because it misplaces its person in all frames: people
-whose keypoints in one view fit much worse than the rest are left out there (:func:`without_mismatches`).
+The joints are those that several views see, in blocks of time. A camera that moved misplaces all people alike. One
+wrong tracklet among right ones would be taken for a camera that moved, because it misplaces its person in all frames:
+people whose keypoints in one view fit much worse than the rest are left out there (:func:`without_mismatches`).
 """
 
 from __future__ import annotations
@@ -36,11 +36,9 @@ FREEDOM = 4.0
 
 _UNSEEN = 400.0  # squared residual of a keypoint that no joint explains, in standard deviations
 
-
 _JOINT_SPACING = 0.1  # seconds between frames that are used
 _BLOCK = 0.5  # seconds: blocks of time; errors of detectors last less
 _MOST_BLOCKS = 48  # of a long recording, whose blocks are longer
-
 
 _TIMES = 3.0  # as far off as the best quarter of the people in that view
 _SIGMAS = 4.0  # standard deviations of a keypoint; farther is not noise

@@ -1,4 +1,4 @@
-"""Changes of a reading: other poses of cameras, maps of pixels, lenses, exchanged names of joints."""
+"""Changes of a reading: poses of cameras, maps of pixels, lenses, names of joints; and files that are read again so."""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""Estimation after repair: the rig and the clocks are corrected from the whole recording, then people are estimated."""
+"""Estimation after repair: the rig and the clocks are corrected from the whole recording, then people are estimated.
+
+Methods that take a frame by itself get detections at one time of each frame where the clocks of cameras differ: of each
+camera the picture that was truly taken nearest to the time of the frame, with keypoints that are moved by their
+velocities in the picture over what is left, half a frame at most. Trackers need none of this: they read the times of
+the pictures (:meth:`mvpose.calibration.clocks.Clocks.corrected`).
+"""
 
 from __future__ import annotations
 

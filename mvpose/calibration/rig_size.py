@@ -1,4 +1,8 @@
-"""Size of a rig by the bone lengths of the people it sees, for calibrations whose scale is not trusted."""
+"""Size of a rig by the bone lengths of the people it sees, for calibrations whose scale is not trusted.
+
+Where the scale is trusted, the size of people relative to adults is the only evidence of a wrong unit of the whole rig
+(:func:`relative_size`).
+"""
 
 from __future__ import annotations
 
@@ -14,7 +18,6 @@ from mvpose.reconstruction.bone_length_prior import STATURE_DEVIATION, published
 from mvpose.skeleton import Skeleton
 
 _FEWEST = 30  # bones in frames of a person; fewer show nothing
-
 
 _FEWEST_BONES = 30  # bones in frames; fewer show nothing
 _LEAST_SINE = 0.2  # of the angle between two viewing rays; a place found by narrower ones is vague

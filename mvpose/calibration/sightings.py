@@ -22,7 +22,6 @@ UNCERTAINTIES = (
 )
 """Uncertainties of the rig that :func:`gather` tries; the one under which the detections are likeliest is taken."""
 
-
 _CLEARLY_BETTER = 0.02  # share of the score by which a rig that is further off must be likelier
 _LEAST_BETTER = 10.0
 

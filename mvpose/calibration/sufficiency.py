@@ -1,4 +1,8 @@
-"""Whether a recording determines the calibration: how long it is, how much people moved, who saw them."""
+"""Whether a recording determines the calibration: how long it is, how much people moved, who saw them.
+
+Views may contribute nothing: those without detections, or with detections of other people than the other views have.
+Pictures that are mirrored and exchanged names of left and right are among the conventions (:mod:`.conventions`).
+"""
 
 from __future__ import annotations
 
@@ -28,10 +32,8 @@ RECORD = (
 )
 """What to record."""
 
-
 DIFFERENT = "the cameras do not see the same people at the same time and place"
 """Reason of a finding where no calibration explains the detections."""
-
 
 _SILENT = 0.02  # share of the median number of detections of a view below which it contributes nothing
 _FEW = 0.20  # share of the median number of detections below which all of them may be false

@@ -6,7 +6,7 @@ of tracklets over many frames and joints are a linear regression on 14 unknowns 
 rig: tracklets of one person fit it up to the errors of keypoints, those of different people do not, however far the
 cameras are off, as soon as people move or differ in pose. The score of a pair is the logarithm of its marginal
 likelihood, against that of two different people. Where detections carry descriptors, appearance counts as well
-(:mod:`mvpose.calibration.tracklet_matching`).
+(:func:`evidence_of_looks`).
 
 People are the groups of tracklets with the greatest sum of scores (correlation clustering, as in
 :mod:`mvpose.matching.clustering`), with no two tracklets of one view at one time. The pairs in groups then give the

@@ -3,6 +3,10 @@
 A detection continues a tracklet where each is the other's nearest and every rival is much farther. Where people pass
 each other, the tracklets end and new ones begin: a tracklet that is cut in two costs little, one that changes from a
 person to another spoils all that is concluded from it.
+
+The standard deviation of a keypoint is that of :class:`mvpose.reconstruction.likelihood.Noise`, in pixels instead of
+metres: an adult has an area of (0.70 m)², so the size of a person in the picture gives the pixels per metre at the
+person.
 """
 
 from __future__ import annotations
@@ -28,7 +32,6 @@ _SCATTER = 0.25  # in square roots of the person's area: mean error of a bad det
 _RIVAL = 0.6  # a link must be shorter than this share of the distance to any other candidate
 _SATURATION = 1.0  # in square roots of the area: greatest distance that one joint counts for
 _WINDOW = 0.12  # seconds before and after, over which velocities are fitted: limbs swing once in a second
-
 
 _NOISE = Noise()
 _BOX_SHARE = 0.53  # fraction of its box that a person fills (Ronchi & Perona, ICCV 2017)

@@ -1,4 +1,8 @@
-"""Model card: input normalisation and output conventions of a network, which its ONNX file does not state."""
+"""Model card: input normalisation and output conventions of a network, which its ONNX file does not state.
+
+An ONNX file holds its card, or a JSON file of its name beside it, with the digest of the network and what was measured
+of it.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,6 @@ PREFIX = "mvpose."
 """Prefix of the card's keys in the ``metadata_props`` of an ONNX file, which other programs also use."""
 
 _CHOICES = {"color_order": ("rgb", "bgr"), "cells": ("stride", "span", "area")}
-
 
 _LARGEST = 2**24  # bytes; a card has some kilobytes
 

@@ -1,4 +1,8 @@
-"""Top-down pose estimation: keypoints of the person in each box."""
+"""Top-down pose estimation: keypoints of the person in each box, or of all people whom a detector finds in a picture.
+
+Heads are trained with one of three conventions for the input pixel of an output cell; see ``cells`` of
+:class:`mvpose.networks.card.Card`. The wrong convention causes errors of up to 2 pixels of the input.
+"""
 
 from __future__ import annotations
 

@@ -5,6 +5,12 @@ length. Its logarithm is a sum over the bones, which form a tree or, with the mi
 (:mod:`mvpose.reconstruction.bone_graph`), nearly so. So max-product (here max-sum) finds the best combination of
 proposals exactly, in time linear in the number of bones and quadratic in the number of proposals per joint, cubic for a
 joint that both sides hold.
+
+Pairs of views propose the positions. If a joint is right in two views, its position is among them; the point on which
+all views agree is added because it is more accurate where more views are right. A joint that only one view sees is
+proposed where its ray is a bone length away from a neighbour. Where there are heat maps, proposals and refinement use
+Gaussians at their modes (:mod:`mvpose.reconstruction.likelihood`); the maps themselves decide which proposal is the
+likeliest.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""Bodies fitted to the people of a recording: bone lengths of each person, and joint rotations over time."""
+"""Bodies fitted to the people of a recording: bone lengths of each person, and joint rotations over time.
+
+Both sides have the same lengths, and the head and the feet are symmetric. Lengths, and the places of the joints on the
+head and the feet, are medians over frames, so that wrong joints do not count.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,6 @@ _MODEL_ERROR = 0.01  # metres; joints of detectors are not the centres of rotati
 _UNKNOWN_ERROR = 0.02  # metres; where there is no covariance
 _FEWEST_FRAMES = 3  # with hips and shoulders
 _WINDOW, _OVERLAP = 1000, 50  # frames fitted at once, and frames of each that the next window fits again
-
 
 _FEWEST = 3  # frames in which a bone must be seen
 _SHORTEST = 0.01  # metres

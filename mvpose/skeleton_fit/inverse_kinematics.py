@@ -10,6 +10,8 @@ The negative logarithm of the posterior is minimised by the Levenberg-Marquardt 
   most even motion.
 
 The normal equations are block tridiagonal, and are solved as a banded system.
+
+The search starts with every bone in its measured direction, joint by joint.
 """
 
 from __future__ import annotations
@@ -34,7 +36,6 @@ _ROOT, _SPEED = 0.3, 1.4  # metres over 1 s; m/s, comfortable gait (R. Bohannon,
 _LONGEST_STEP = 1.0  # rad; of one iteration
 _CONVERGED = 1e-3  # relative decrease of the cost
 _LEAST_DAMPING, _MOST_DAMPING = 1e-6, 1e6
-
 
 _STRAIGHT = 0.25  # sine of the angle at an elbow or knee; a straighter limb does not show its axis
 

@@ -8,6 +8,9 @@ lasts (a poster, a coat on a stand) or another one happens to lie there. Picture
 themselves, so they count as a fraction of an independent one, and old ones are forgotten. Views in which the track lies
 outside the image, or behind another tracked person, say nothing. What lasts is found as reliably as a person, so it is
 motion (:mod:`mvpose.tracking.motion`) and more views that tell people from it.
+
+Where people stand as a camera sees them says which views count: their depth, who stands before whom, and who is in the
+image.
 """
 
 from __future__ import annotations

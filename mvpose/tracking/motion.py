@@ -5,6 +5,11 @@ tracking filter performance for manned maneuvering targets", IEEE Transactions o
 1970, with velocity in place of acceleration). Over a frame it is a constant-velocity model with white acceleration of
 spectral density ``2 speed² / time``. Over a gap of a second, in which a person turns, the joint slows down and its
 uncertainty grows like that of a random walk, not like that of a joint that flies on.
+
+How far a track has moved since its birth tells people from false detections that last (a poster, a coat on a stand):
+people move sooner or later, and what hangs on a wall never does, nor does the place where two such detections meet by
+chance. The displacement is that of the body as a whole, the mean over the joints that are known both times. It counts
+only while two cameras see the track: where one does, or none, the place is partly a guess.
 """
 
 from __future__ import annotations
@@ -22,7 +27,6 @@ from mvpose.skeleton import Skeleton
 
 _EXTREMITIES = frozenset({"wrist", "ankle"})
 _MIDDLE = frozenset({"elbow", "knee"})
-
 
 _TOGETHER = 0.1  # seconds: two cameras have seen a track at about the same time
 

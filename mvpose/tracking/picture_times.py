@@ -1,4 +1,8 @@
-"""Times of frames and of their pictures."""
+"""Times of frames, of their pictures and of the rows of a rolling shutter.
+
+A camera with a rolling shutter shows every joint at the time of its row. How far the joint moves between this time and
+that of the picture follows from the velocity of its track, and the ray is turned by as much at the depth of the joint.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Identities of people who come back after they were lost."""
+"""People whom a tracker knows, those whom it follows and lost ones, and the identities of those who come back."""
 
 from __future__ import annotations
 

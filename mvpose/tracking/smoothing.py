@@ -1,4 +1,4 @@
-"""Smoothing: estimates of earlier frames, improved by later ones (Rauch, Tung & Striebel, AIAA Journal 1965).
+"""Tracking of whole recordings, with smoothing by later frames (Rauch, Tung & Striebel, AIAA Journal 1965).
 
 The smoother goes backwards over the moments that a tracker has passed. What it needs of a frame is the state before and
 after its update, so pictures that were lost, late or taken by one camera alone need no care of their own. A track that

@@ -1,4 +1,4 @@
-"""Tracked people as arrays, and the lost ones who may come back."""
+"""Tracked people as arrays, the lost ones who may come back, and what a tracker knows after a frame."""
 
 from __future__ import annotations
 
