@@ -26,9 +26,9 @@ def test_every_picture_is_of_a_camera_and_a_frame_of_its_scene(catalogue: Path) 
         assert all(size <= most for size, most in zip(rig[picture.camera].size, MOST_PIXELS, strict=True)), picture
 
 
-def test_the_gallery_has_twelve_scenes_of_which_two_show_detections_and_estimates() -> None:
+def test_the_gallery_has_thirteen_scenes_of_which_two_show_detections_and_estimates() -> None:
     pictures = read_catalogue()
-    assert len({picture.scene for picture in pictures}) == 12
+    assert len({picture.scene for picture in pictures}) == 13
     assert sum({"detections", "estimates"} <= set(picture.layers) for picture in pictures) == 2
 
 

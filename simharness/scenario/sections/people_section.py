@@ -67,6 +67,30 @@ class TrafficSection(Section):
     doors: int = Field(2, ge=1, le=8, description="number of doors, which everyone uses")
 
 
+class PushSection(Section):
+    """A push on one person in dynamic playback: a constant force at one place of the body, for a short time."""
+
+    person: int = Field(0, ge=0, lt=100, description="index of the person who is pushed")
+    time: Span = Field(1.0, description="time at which the push begins, seconds")
+    duration: float = Field(0.2, ge=0.01, le=10.0, description="time for which the force acts, seconds")
+    impulse: float = Field(
+        0.0,
+        ge=0.0,
+        le=1000.0,
+        description="change of momentum by the push, N s: the force is impulse / duration; 0: nobody is pushed",
+    )
+    direction: float = Field(
+        0.0,
+        ge=-360.0,
+        le=360.0,
+        description="horizontal direction of the force, degrees counter-clockwise from where the person faces as the "
+        "push begins: 0 forwards, 90 to the left, 180 backwards",
+    )
+    place: Literal["pelvis", "chest", "head", "left_shoulder", "right_shoulder"] = Field(
+        "chest", description="part of the body on which the force acts, at its centre of mass"
+    )
+
+
 class PeopleSection(Section):
     """The people in the room and their activities."""
 
@@ -115,6 +139,7 @@ class PeopleSection(Section):
         le=100_000.0,
         description="dynamic playback: largest force that supports a pelvis, newtons; running needs about 1000",
     )
+    push: PushSection = PushSection()
     motion: MocapSection = MocapSection()
 
     @model_validator(mode="after")
@@ -132,6 +157,13 @@ class PeopleSection(Section):
                 'people.playback = "kinematic" with the activities "hide" and "visit" and with people.traffic, because '
                 "simulated contacts stop people at curtains and doors"
             )
+        if self.push.impulse and self.playback != "dynamic":
+            raise ValueError(
+                'people.playback = "dynamic" with people.push.impulse above 0, because people are pushed in dynamic '
+                "playback alone"
+            )
+        if self.push.impulse and self.push.person >= self.count:
+            raise ValueError(f"people.push.person below people.count = {self.count}, got {self.push.person}")
         if self.motion.tracks and set(self.activities) != {"mocap"}:
             raise ValueError(
                 'people.activities = ["mocap"] with the joint tracks of people.motion.file, because every person '

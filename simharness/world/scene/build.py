@@ -35,7 +35,7 @@ from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.presence import Presence, held
 from simharness.world.motion.trajectory import motion_clock
 from simharness.world.scene.camera_clearance import check_rig
-from simharness.world.scene.dynamics.motion_servos import track
+from simharness.world.scene.dynamics.motion_servos import planned_push, track
 from simharness.world.scene.objects.props import make_prop
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.placement.clutter import place_clutter, place_decoys
@@ -157,7 +157,8 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     bodies = tuple(person.body for person in cast)
     model = compile_model(movers, solids)
     if people.playback == "dynamic":
-        motions = track(model, bodies, motions, assist=people.assist, solids=solids)
+        push = planned_push(people.push, motions)
+        motions = track(model, bodies, motions, assist=people.assist, solids=solids, pushes=push)
     figures = tuple(person.figure for person in cast)
     time = np.arange(scenario.frames) / scenario.rate
     return Scene(model, bodies, figures, motions, plan.presence, solids, room_lighting(room, seed, areas), time)

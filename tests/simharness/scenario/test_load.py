@@ -48,7 +48,7 @@ class TestKeys:
         assert message.startswith(f"{path}: people.cuont is not a key; did you mean people.count?")
         assert (
             "[people] has activities, alike, area, around, assist, children, count, group, hidden, look_alike, motion, "
-            "passing, playback, spacing, traffic" in message
+            "passing, playback, push, spacing, traffic" in message
         )
 
     def test_a_key_of_another_section_is_found_there(self, scenario_file):
@@ -400,6 +400,16 @@ class TestNamedFiles:
     @pytest.mark.parametrize("text", ['activities = ["mocap"]', 'activities = ["walk"]\nmotion = { file = "a.bvh" }'])
     def test_a_motion_without_a_player_and_the_reverse_are_refused(self, scenario_file, text):
         assert "go together: give both or neither" in refusal(scenario_file(f'name = "x"\n[people]\n{text}'))
+
+    @pytest.mark.parametrize(
+        ("text", "expected"),
+        [
+            ("push = { impulse = 50 }", 'people.playback = "dynamic" with people.push.impulse above 0'),
+            ('playback = "dynamic"\ncount = 3\npush = { impulse = 50, person = 3 }', "below people.count = 3, got 3"),
+        ],
+    )
+    def test_a_push_that_nobody_would_feel_is_refused(self, scenario_file, text, expected):
+        assert expected in refusal(scenario_file(f'name = "x"\n[people]\n{text}'))
 
 
 def test_names_that_cannot_be_of_files_are_refused(scenario_file):

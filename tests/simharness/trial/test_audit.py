@@ -7,7 +7,7 @@ import pytest
 
 from mvpose import Rig
 from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
-from simharness.scenario.sections.people_section import PeopleSection
+from simharness.scenario.sections.people_section import PeopleSection, PushSection
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import RenderingSection, Scenario
 from simharness.scenario.study_definition import load_study
@@ -72,8 +72,9 @@ def test_a_correct_trial_passes(ready):
         {"cameras": CamerasSection(count=3, size=(320, 240), distortion=(-0.3, 0.1, 0.001, -0.001, 0.0))},
         {"rendering": RenderingSection(renderer="rays")},
         {"people": PeopleSection(count=0)},
+        {"people": PeopleSection(count=2, playback="dynamic", push=PushSection(time=0.0, impulse=120.0))},
     ],
-    ids=["faults", "rolling shutter", "distortion", "rays", "nobody"],
+    ids=["faults", "rolling shutter", "distortion", "rays", "nobody", "pushed"],
 )
 def test_every_kind_of_scenario_passes(sections):
     Ready(small(**sections)).audit()

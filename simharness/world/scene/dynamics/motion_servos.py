@@ -14,8 +14,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats, Integers
+from simharness.scenario.sections.people_section import PushSection
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import Body
 from simharness.world.motion.motion import Motion
@@ -51,23 +53,53 @@ _REACH = (0.4, 1.0)
 _GYRATION = 0.3  # metres: radius of gyration of a body about its pelvis, for the assisting torque
 _BAR = 0.018  # metres: radius of the bars that represent the soles
 _CONTACT_TIME = 0.006  # s: time constant of contacts; MuJoCo requires at least two steps
+_BONES = {
+    "pelvis": "Hips",
+    "chest": "Spine1",
+    "head": "Head",
+    "left_shoulder": "LeftArm",
+    "right_shoulder": "RightArm",
+}  # bone of each place of a push
 _CHUNK = 120  # frames of the plan sampled at a time, because plans may be long
 
 
 @dataclass(frozen=True)
 class Push:
-    """Force on the pelvis of one person.
+    """Constant force on one bone of one person, at its centre of mass.
 
     Attributes:
         person: index of the person.
         start, duration: start and duration in seconds.
         force: force in the world, (3,), newtons.
+        bone: name of the bone.
     """
 
     person: int
     start: float
     duration: float
     force: tuple[float, float, float]
+    bone: str = "Hips"
+
+    def share(self, time: float, step: float) -> float:
+        """Return the share of a step of ``step`` seconds from ``time`` on in which the force acts."""
+        return max(0.0, min(time + step, self.start + self.duration) - max(time, self.start)) / step
+
+
+def planned_push(section: PushSection, motions: Sequence[Motion]) -> tuple[Push, ...]:
+    """Return the push of a scenario as a force in the world; none where its impulse is 0.
+
+    Args:
+        section: the push, whose direction is relative to the person.
+        motions: planned motions of all people.
+    """
+    if not section.impulse:
+        return ()
+    root, _ = motions[section.person].read(section.time)
+    ahead = Rotation.from_quat(root[3:], scalar_first=True).apply([1.0, 0.0, 0.0])
+    bearing = np.arctan2(ahead[1], ahead[0]) + np.radians(section.direction)
+    size = section.impulse / section.duration
+    force = (size * float(np.cos(bearing)), size * float(np.sin(bearing)), 0.0)
+    return (Push(section.person, section.time, section.duration, force, _BONES[section.place]),)
 
 
 def track(
@@ -132,7 +164,7 @@ class MotionServos:
         time: times of the plans, (T,), seconds.
         people: indices of the people in the arrays of MuJoCo.
         model: copy of the model, with the damping of the servos.
-        data: MuJoCo state; ``xfrc_applied`` of the pelvises is the sum of assistance and pushes.
+        data: MuJoCo state; ``xfrc_applied`` is the assistance of the pelvises and the pushes.
     """
 
     def __init__(
@@ -153,6 +185,7 @@ class MotionServos:
         self._motions = tuple(motions)
         self._assist = assist
         self._pushes = tuple(pushes)
+        self._pushed = [int(self.model.body(f"person{push.person}/{push.bone}").id) for push in pushes]
         self.people = tuple(_person(self.model, body, f"person{i}/") for i, body in enumerate(bodies))
         self._moving = [solid for solid in solids if solid.trajectory is not None]
         self._mocap = [int(self.model.body(solid.name).mocapid[0]) for solid in self._moving]
@@ -253,10 +286,11 @@ class MotionServos:
         torque = np.clip(wanted, -self._strength, self._strength)
         # The damping of the model, which MuJoCo integrates implicitly, is part of the servo: compensate for it here.
         data.qfrc_applied[self._hinge_dofs] = torque + _DAMPING * self._stiffness * speed
+        data.xfrc_applied[self._pushed] = 0.0
         data.xfrc_applied[self._pelvises] = self._assistance(plan, adherence, k)
-        for push in self._pushes:
-            if push.start <= time < push.start + push.duration:
-                data.xfrc_applied[self.people[push.person].pelvis, :3] += push.force
+        for push, bone in zip(self._pushes, self._pushed, strict=True):
+            if share := push.share(time, self.model.opt.timestep):
+                data.xfrc_applied[bone, :3] += share * np.array(push.force)
         mujoco.mj_step(self.model, data)
 
     def _adherence(self, plan: _Plan, k: int) -> Floats:

@@ -6,6 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from simharness.scenario.load import load
+from simharness.scenario.sections.people_section import PushSection
+from simharness.trial.stages.build_trial import build_trial
 from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
@@ -17,7 +20,7 @@ from simharness.world.motion.paths import make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.trajectory import RATE, Trajectory, motion_clock
 from simharness.world.scene.dynamics.inverse_dynamics import InverseDynamics
-from simharness.world.scene.dynamics.motion_servos import LEVER, MotionServos, Push, track
+from simharness.world.scene.dynamics.motion_servos import LEVER, MotionServos, Push, planned_push, track
 from simharness.world.scene.objects.assembly import Assembly
 
 GRAVITY = 9.81
@@ -65,14 +68,14 @@ def test_only_gravity_moves_the_centre_of_mass_in_the_air():
     """Independent of joint torques, it falls by g t^2 / 2."""
     plan = standing(MAN, height=3.0, duration=0.5, left_elbow_flexion=40.0)
     waving = replace(plan, angles=plan.angles + 0.8 * np.sin(9 * plan.time[:, None]) * (plan.angles > 0))
-    tracker = MotionServos(room([MAN]), [MAN.body], [waving], assist=1e-9)
-    pelvis = tracker.people[0].pelvis
+    servos = MotionServos(room([MAN]), [MAN.body], [waving], assist=1e-9)
+    pelvis = servos.people[0].pelvis
     heights, elbow = [], []
-    for qpos in tracker.run():
-        mujoco.mj_kinematics(tracker.model, tracker.data)
-        mujoco.mj_comPos(tracker.model, tracker.data)
-        heights.append(tracker.data.subtree_com[pelvis, 2])
-        elbow.append(qpos[tracker.people[0].hinges[DOFS.index("left_elbow_flexion")]])
+    for qpos in servos.run():
+        mujoco.mj_kinematics(servos.model, servos.data)
+        mujoco.mj_comPos(servos.model, servos.data)
+        heights.append(servos.data.subtree_com[pelvis, 2])
+        elbow.append(qpos[servos.people[0].hinges[DOFS.index("left_elbow_flexion")]])
     fallen = heights[0] - np.array(heights)
     time = plan.time - plan.time[0]
     # The elbow's first velocity lifts a little; and MuJoCo moves by the velocity at the end of a step.
@@ -109,13 +112,13 @@ def test_a_walk_without_assistance_falls():
 
 def test_assistance_stays_within_its_bound():
     push = Push(person=0, start=0.3, duration=0.2, force=(1200.0, 0.0, 0.0))
-    tracker = MotionServos(room([MAN]), [MAN.body], [standing(MAN)], assist=150.0, pushes=[push])
-    pelvis = tracker.people[0].pelvis
+    servos = MotionServos(room([MAN]), [MAN.body], [standing(MAN)], assist=150.0, pushes=[push])
+    pelvis = servos.people[0].pelvis
     forces, torques = [], []
-    for _ in tracker.run():
-        if not 0.25 < tracker.data.time + tracker.time[0] < 0.55:
-            forces.append(np.linalg.norm(tracker.data.xfrc_applied[pelvis, :3]))
-            torques.append(np.linalg.norm(tracker.data.xfrc_applied[pelvis, 3:]))
+    for _ in servos.run():
+        if not 0.25 < servos.data.time + servos.time[0] < 0.55:
+            forces.append(np.linalg.norm(servos.data.xfrc_applied[pelvis, :3]))
+            torques.append(np.linalg.norm(servos.data.xfrc_applied[pelvis, 3:]))
     assert max(forces) <= 150.0 + 1e-9
     assert max(torques) <= 150.0 * LEVER + 1e-9
     assert max(forces) == pytest.approx(150.0)  # the bound is reached
@@ -138,18 +141,86 @@ def test_a_push_displaces_and_a_small_one_is_recovered_from():
     assert great[-1] > 0.5
 
 
+@pytest.mark.parametrize("place", ["pelvis", "chest", "left_shoulder"])
+def test_a_push_changes_the_momentum_by_its_impulse(place):
+    """In the air no other force acts along the floor: the centre of mass moves by J / m from the middle of the push."""
+    section = PushSection(time=0.1, duration=0.1037, impulse=40.0, direction=90.0, place=place)
+    plan = standing(MAN, height=3.0, duration=0.5)
+    servos = MotionServos(room([MAN]), [MAN.body], [plan], assist=1e-9, pushes=planned_push(section, [plan]))
+    pelvis, way, time = servos.people[0].pelvis, [], []
+    for _ in servos.run():
+        mujoco.mj_kinematics(servos.model, servos.data)
+        mujoco.mj_comPos(servos.model, servos.data)
+        way.append(servos.data.subtree_com[pelvis, :2].copy())
+        time.append(servos.data.time + plan.time[0])
+    moved, after = np.array(way) - way[0], np.array(time) - (0.1 + 0.1037 / 2)
+    late = after > 0.1
+    assert late.any()
+    expected = section.impulse / servos.people[0].mass * after[late]
+    np.testing.assert_allclose(moved[late, 1], expected, rtol=0.03)  # MuJoCo moves by the velocity at a step's end
+    assert np.abs(moved[:, 0]).max() < 2e-3
+    assert np.abs(moved[np.array(time) < 0.1]).max() < 1e-3
+
+
+@pytest.mark.parametrize("start", [0.3, 0.3004, 0.31])
+def test_the_shares_of_the_steps_add_up_to_the_duration(start):
+    push, step = Push(0, start, 0.1037, (1.0, 0.0, 0.0)), 1 / 480
+    shares = np.array([push.share(k * step, step) for k in range(480)])
+    assert shares.sum() * step == pytest.approx(0.1037)
+    assert shares.min() == 0.0
+    assert shares.max() <= 1.0 + 1e-9
+
+
+def test_the_direction_of_a_push_is_that_of_the_person():
+    plan = standing(MAN)
+    facing = np.radians(60.0)  # from the x axis
+    root = plan.root.copy()
+    root[:, 3:] = np.cos(facing / 2), 0.0, 0.0, np.sin(facing / 2)
+    (push,) = planned_push(PushSection(impulse=50.0, duration=0.5, direction=90.0), [replace(plan, root=root)])
+    bearing = facing + np.pi / 2
+    np.testing.assert_allclose(push.force, [100 * np.cos(bearing), 100 * np.sin(bearing), 0.0], atol=1e-9)
+    assert planned_push(PushSection(impulse=0.0), [plan]) == ()
+
+
+def one_person(**push):
+    """The shipped scenario with the pushed person alone: its scene."""
+    keys = {"time": 0.5, **push}
+    overrides = ["people.count=1", "duration=2.5", 'rendering.renderer="rays"']
+    return build_trial(load("pushed", overrides=[*overrides, *(f"people.push.{k}={v}" for k, v in keys.items())])).scene
+
+
+def test_a_pushed_person_recovers_or_falls_within_the_limits_of_joints():
+    calm, stumbling, falling = (one_person(impulse=impulse) for impulse in (0.0, 60.0, 150.0))
+    limits = np.array([calm.model.joint(f"person0/{name}").range for name in DOFS])
+    for scene in (calm, stumbling, falling):
+        (motion,) = scene.motions
+        beyond = np.maximum(limits[:, 0] - motion.angles, motion.angles - limits[:, 1]).max()
+        assert np.degrees(beyond) < 10.0  # contacts bend joints a little beyond their limits, as anywhere in MuJoCo
+    off = misplaced(calm.motions[0], stumbling.motions[0])
+    assert off.max() > 0.1
+    assert off[-1] < 0.05
+    assert calm.motions[0].root[-1, 2] > 0.7
+    assert falling.motions[0].root[-1, 2] < 0.3
+
+
+def test_nobody_is_pushed_by_an_impulse_of_zero():
+    one, other = (scene.motions[0] for scene in (one_person(impulse=0), one_person(impulse=0, direction=90, time=0.2)))
+    np.testing.assert_array_equal(one.root, other.root)
+    np.testing.assert_array_equal(one.angles, other.angles)
+
+
 def test_people_whose_plans_intersect_collide():
     cast = [MAN, WOMAN]
     plans = [walking(MAN, start=(0.0, -1.2)), walking(WOMAN, start=(0.1, 1.2), ahead=-1.0, seed=2)]
     apart = np.linalg.norm(plans[0].root[:, :2] - plans[1].root[:, :2], axis=1)
     assert apart.min() < 0.15  # as planned
-    tracker = MotionServos(room(cast), [mover.body for mover in cast], plans, assist=300.0)
-    owner = tracker.model.body_rootid[tracker.model.geom_bodyid]
+    servos = MotionServos(room(cast), [mover.body for mover in cast], plans, assist=300.0)
+    owner = servos.model.body_rootid[servos.model.geom_bodyid]
     deepest, met = 0.0, False
     happened = []
-    for qpos in tracker.run():
-        happened.append([qpos[person.root[:2]] for person in tracker.people])
-        for contact in tracker.data.contact:
+    for qpos in servos.run():
+        happened.append([qpos[person.root[:2]] for person in servos.people])
+        for contact in servos.data.contact:
             if 0 not in owner[contact.geom]:
                 met = True
                 deepest = min(deepest, contact.dist)
