@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import runpy
 import tomllib
 from collections import Counter
@@ -15,11 +16,12 @@ from mvpose.wholebody import read_skeleton
 from simharness.planning.candidates import candidates_in
 from simharness.planning.room_file import read_room
 from simharness.scenario.sections.detector_section import DetectorSection
+from simharness.scenario.sections.people_section import PeopleSection
 
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in FENCE.findall(page))
-    assert languages == {"python": 15, "toml": 10, "yaml": 1}
+    assert languages == {"python": 15, "toml": 11, "yaml": 1}
 
 
 def test_the_shares_of_the_face_are_valid():
@@ -27,6 +29,12 @@ def test_the_shares_of_the_face_are_valid():
     assert (
         DetectorSection.model_validate(tomllib.loads(block)).keypoints.face.ears[9] == 0.99
     )  # 270 degrees: the far side
+
+
+def test_the_push_of_the_scenarios_is_valid():
+    (block,) = {block for block in blocks("toml") if "[people.push]\n" in block}
+    people = PeopleSection.model_validate_json(json.dumps(tomllib.loads(block)["people"]), strict=True)
+    assert people.push.impulse / people.push.duration == 500.0
 
 
 def test_the_room_of_the_plan_is_read_and_has_places(tmp_path):
