@@ -1,7 +1,7 @@
 """Films of the cameras: pictures with the people in 3D and the detections drawn into them, which browsers play.
 
-VP9 in MP4, or VP8 in WebM without PyAV (:mod:`.film_file`). Drawings are those of the page (:mod:`.picture_drawings`):
-broad limbs for people in 3D, thin lines with dots for detections.
+VP9 in MP4, or VP8 in WebM without PyAV (:mod:`.film_file`). Drawings look as those of the page
+(:mod:`.picture_drawings`): broad limbs for people in 3D, thin lines with dots for detections.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Bools, Floats, Integers
+from mvpose.arrays import Floats, Integers
 from mvpose.files.message_text import one_line
 from mvpose.report.examined_recording import ExaminedRecording
 from mvpose.report.film_file import FilmFile, film_suffix
-from mvpose.report.limbs import SMALL_FACE, Edges, face_of, limbs_of, plain_face
-from mvpose.report.palette import UNMATCHED, identity_color
-from mvpose.report.picture_drawings import jpeg_uri
+from mvpose.report.limbs import SMALL_FACE, face_of, limbs_of, plain_face
+from mvpose.report.overlay import USUAL_HEIGHT, Overlay
+from mvpose.report.palette import INK, TRUTH, UNMATCHED, Color, identity_color
+from mvpose.report.picture_drawings import jpeg_uri, near_picture
 
 if TYPE_CHECKING:
     from mvpose.camera import Camera
@@ -35,11 +36,9 @@ FOLDER = "films"
 """Folder of the films, beside the page."""
 
 _WIDEST = 768  # pixels
-_USUAL_HEIGHT = 600.0  # pixels; height of a picture at which widths apply unscaled
-_SHIFT = 4  # bits of a pixel's fraction in OpenCV's coordinates
-_BEYOND = 0.5  # of the size of the picture: what lies farther outside of it is not drawn
 _BROAD = 2.0  # times as large a face as for thin lines has room for broad limbs
 _OPACITY = 0.6  # of people in 3D
+_FINER = 2  # mask pixels: films have many pictures, which are seen for a moment
 _GROUND = (236, 238, 240)  # where a picture is missing
 _SLOWEST = 1.0  # frames per second that players can be relied on to show
 
@@ -116,7 +115,7 @@ class _Pen:
         people = recording.people
         self._limbs, self._face = limbs_of(people.skeleton), face_of(people.skeleton)
         self._colors = [_rgb(identity_color(row)) for row in range(len(people))]
-        self._unit = scale * recording.rig[view].size[1] / _USUAL_HEIGHT
+        self._unit = scale * recording.rig[view].size[1] / USUAL_HEIGHT
 
     def drawn(self, row: int, picture: Rgb | None, size: tuple[int, int]) -> Rgb:
         """Return a picture with the drawings of a compared frame."""
@@ -124,10 +123,10 @@ class _Pen:
             canvas = np.full((size[1], size[0], 3), _GROUND, np.uint8)
         else:
             canvas = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
-        canvas = np.ascontiguousarray(canvas)
-        self._draw_people(canvas, int(self._recording.seen.frames[row]))
-        self._draw_detections(canvas, row, plain=picture is None)
-        return canvas
+        overlay = Overlay(canvas, scale=self._unit, finer=_FINER)
+        self._draw_people(overlay, int(self._recording.seen.frames[row]))
+        self._draw_detections(overlay, row, plain=picture is None)
+        return overlay.rgb
 
     def detected(self, row: int) -> int:
         """Return the number of people who are detected in this view of a compared frame."""
@@ -135,72 +134,40 @@ class _Pen:
         owners = seen.owners[row][self._recording.frames[int(seen.frames[row])].view == self._view]
         return int((owners >= 0).sum())
 
-    def _draw_people(self, canvas: Rgb, frame: int) -> None:
+    def _draw_people(self, overlay: Overlay, frame: int) -> None:
         people, camera = self._recording.people, self._recording.rig[self._view]
-        layer = canvas.copy()
         names = []
         for person in np.flatnonzero(people.present[frame].any(axis=1)).tolist():
             points = self._placed(camera, camera.project(people.joints[frame, person]))
             points = plain_face(points, least=_BROAD * SMALL_FACE * self._unit, face=self._face)
-            _draw_limbs(layer, points, self._limbs, self._colors[person], max(2, round(8 * self._unit)))
+            color = self._colors[person]
+            overlay.skeleton(points, color=color, edges=self._limbs, width=8, dots=0, opacity=_OPACITY)
             if np.isfinite(points).any():
-                names.append((points, person))
-        cv2.addWeighted(layer, _OPACITY, canvas, 1.0 - _OPACITY, 0.0, dst=canvas)
-        for points, person in names:
-            _draw_name(canvas, points, one_line(str(people.ids[person]), 12), self._colors[person], self._unit)
+                names.append((points, one_line(str(people.ids[person]), 12), color))
+        for points, name, color in names:
+            above = float(np.nanmean(points[:, 0])), float(np.nanmin(points[:, 1])) - 12 * self._unit
+            overlay.tag(name, at=above, color=color, centered=True)
 
-    def _draw_detections(self, canvas: Rgb, row: int, *, plain: bool) -> None:
+    def _draw_detections(self, overlay: Overlay, row: int, *, plain: bool) -> None:
         recording, seen = self._recording, self._recording.seen
         detections, owners = recording.frames[int(seen.frames[row])], seen.owners[row]
-        face = face_of(detections.skeleton)
-        edges, line = limbs_of(detections.skeleton), (27, 29, 33) if plain else (255, 255, 255)
+        edges, face = limbs_of(detections.skeleton), face_of(detections.skeleton)
         for index in np.flatnonzero(detections.view == self._view):
             owner = int(owners[index])
             color = UNMATCHED if owner < 0 else self._colors[owner]
+            line = UNMATCHED if owner < 0 else INK if plain else TRUTH
             points = self._placed(recording.rig[self._view], detections.keypoints[index])
             points = plain_face(points, least=SMALL_FACE * self._unit, face=face)
-            _draw_limbs(canvas, points, edges, line if owner >= 0 else UNMATCHED, max(1, round(1.2 * self._unit)))
-            for point in points[_known(points)]:
-                place, radius = _fixed(point), round(2.6 * self._unit * 2**_SHIFT)
-                cv2.circle(canvas, place, radius, color, cv2.FILLED, cv2.LINE_AA, _SHIFT)
+            overlay.skeleton(points, color=line, edges=edges, width=1.2, dots=0)
+            overlay.skeleton(points, color=color, edges=(), dots=2.6)
 
     def _placed(self, camera: Camera, points: Floats) -> Floats:
         """Return pixels of the camera (J, 2) as pixels of the film; NaN far outside of the picture."""
-        size = np.array(camera.size)
-        with np.errstate(invalid="ignore"):
-            near = (points > -_BEYOND * size) & (points < (1 + _BEYOND) * size)
-        return np.where(near.all(axis=1, keepdims=True), (points + 0.5) * self._scale - 0.5, np.nan)
+        near = near_picture(camera, points)
+        return np.where(near[:, None], (points + 0.5) * self._scale - 0.5, np.nan)
 
 
-def _draw_limbs(canvas: Rgb, points: Floats, edges: Edges, color: Sequence[int], width: int) -> None:
-    known = _known(points)
-    for a, b in edges:
-        if known[a] and known[b]:
-            cv2.line(canvas, _fixed(points[a]), _fixed(points[b]), tuple(color), width, cv2.LINE_AA, _SHIFT)
-
-
-def _draw_name(canvas: Rgb, points: Floats, name: str, color: Sequence[int], unit: float) -> None:
-    """Write the identity above a person, on a ground of its colour."""
-    font, size, weight = cv2.FONT_HERSHEY_SIMPLEX, 0.55 * unit, max(1, round(1.4 * unit))
-    (width, height), _ = cv2.getTextSize(name, font, size, weight)
-    margin = max(2, round(4 * unit))
-    x = round(float(np.nanmean(points[:, 0])) - width / 2)
-    y = round(float(np.nanmin(points[:, 1])) - 16 * unit)
-    corner, opposite = (x - margin, y - height - margin), (x + width + margin, y + margin)
-    cv2.rectangle(canvas, corner, opposite, tuple(color), cv2.FILLED, cv2.LINE_AA)
-    cv2.putText(canvas, name, (x, y), font, size, (255, 255, 255), weight, cv2.LINE_AA)
-
-
-def _known(points: Floats) -> Bools:
-    """Return which points (J, 2) are known, (J,)."""
-    return np.asarray(np.isfinite(points).all(axis=1))
-
-
-def _fixed(point: Floats) -> tuple[int, int]:
-    return round(float(point[0]) * 2**_SHIFT), round(float(point[1]) * 2**_SHIFT)
-
-
-def _rgb(color: str) -> tuple[int, int, int]:
+def _rgb(color: str) -> Color:
     """Return red, green and blue, 0 to 255, of "#0077bb"."""
     red, green, blue = (int(color[k : k + 2], 16) for k in (1, 3, 5))
     return red, green, blue

@@ -11,17 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from mvpose.camera import Camera
 from mvpose.detections import Detections
 from mvpose.report.limbs import SMALL_FACE, Edges, face_of, limbs_of, plain_face
+from mvpose.report.overlay import USUAL_HEIGHT
 from mvpose.report.palette import UNMATCHED, css
 from mvpose.skeleton import Skeleton
 
 Pictures = Callable[[int, int], NDArray[np.uint8] | None]
 """Function of frame and view that returns the picture, (h, w, 3) uint8 RGB, or None where there is none."""
 
-_USUAL_HEIGHT = 600.0  # pixels; height of a picture at which widths apply unscaled
 _BEYOND = 0.5  # of the size of the picture: what lies farther outside of it is not drawn
 _BROAD = 2.0  # times as large a face as for thin lines has room for broad limbs
 _WIDEST = 960  # pixels of an embedded picture
@@ -104,10 +104,10 @@ def draw_people(camera: Camera, people: Sequence[Person], skeleton: Skeleton) ->
 
 
 def _unit(camera: Camera) -> float:
-    return camera.size[1] / _USUAL_HEIGHT
+    return camera.size[1] / USUAL_HEIGHT
 
 
-def _near(camera: Camera, points: Floats) -> NDArray[np.bool_]:
+def near_picture(camera: Camera, points: Floats) -> Bools:
     """Return which points (k, 2) lie in the picture or not far outside of it, (k,)."""
     size = np.array(camera.size)
     with np.errstate(invalid="ignore"):
@@ -116,7 +116,7 @@ def _near(camera: Camera, points: Floats) -> NDArray[np.bool_]:
 
 
 def _path(camera: Camera, points: Floats, edges: Edges) -> str:
-    near = _near(camera, points)
+    near = near_picture(camera, points)
     return "".join(
         f"M{points[a, 0]:.1f} {points[a, 1]:.1f}L{points[b, 0]:.1f} {points[b, 1]:.1f}"
         for a, b in edges
@@ -129,7 +129,7 @@ def _dots(camera: Camera, points: Floats, radius: float) -> str:
     arc = f"a{radius:.3g} {radius:.3g} 0 1 0 "
     return "".join(
         f"M{x - radius:.1f} {y:.1f}{arc}{2 * radius:.3g} 0{arc}{-2 * radius:.3g} 0"
-        for x, y in points[_near(camera, points)].tolist()
+        for x, y in points[near_picture(camera, points)].tolist()
     )
 
 

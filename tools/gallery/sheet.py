@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from simharness.outputs.figures.mosaic import mosaic
+from mvpose.report.overlay import mosaic
 
 Rgb = NDArray[np.uint8]
 

@@ -15,8 +15,8 @@ from mvpose import Detections, Estimate
 from mvpose.commands.progress import Reporter, Silence
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.report.film_file import FilmFile
+from mvpose.report.overlay import mosaic
 from simharness.capture.picture import ScenePictures
-from simharness.outputs.figures.mosaic import mosaic
 from simharness.outputs.run.pictures import annotate
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.run_trial import Goal, run_trial

@@ -16,7 +16,7 @@ from mvpose.report.palette import line_color
 from mvpose.report.tables import NOTHING
 from mvpose.skeleton import COCO17
 from simharness.outputs import TEMPLATES
-from simharness.outputs.figures.blame_section import blame_section
+from simharness.outputs.blame_section import blame_section
 from simharness.outputs.run import findings, plots
 from simharness.outputs.run.figures import draw_figures
 from simharness.outputs.run.headline import COLUMNS, WHOLE_BODY_COLUMNS, has_whole_body

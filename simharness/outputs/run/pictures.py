@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from mvpose import Camera, Detections, Estimate
 from mvpose.report.limbs import COCO17_BODY, SMALL_FACE, plain_face
+from mvpose.report.overlay import BoxTag, Mark, Overlay, legend, mosaic, rooms_in_grid
 from mvpose.report.palette import TRUTH, UNMATCHED, Color, person_color
 from simharness.capture.picture import ScenePictures
-from simharness.outputs.figures.mosaic import Mark, legend, mosaic, rooms_in_grid
-from simharness.outputs.figures.overlay import BoxTag, Overlay
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.pairing import LIMIT, pair
 from simharness.trial.run_folder import Record

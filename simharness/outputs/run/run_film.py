@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.report.film_file import FilmFile
+from mvpose.report.overlay import legend, mosaic
 from simharness.capture.picture import scaled
-from simharness.outputs.figures.mosaic import legend, mosaic
 from simharness.outputs.run.pictures import annotate, legend_entries
 from simharness.trial.run_folder import Record
 from simharness.world.rigs.exposure_schedule import ExposureSchedule

@@ -14,7 +14,7 @@ from mvpose.commands.progress import duration
 from mvpose.files.atomic_files import write_atomic
 from mvpose.report.documents import fill_template
 from simharness.outputs import TEMPLATES
-from simharness.outputs.figures.blame_section import blame_section
+from simharness.outputs.blame_section import blame_section
 from simharness.outputs.run.plots import stage_times
 from simharness.outputs.study import plots, tables
 from simharness.outputs.study.curves import (

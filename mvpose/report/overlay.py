@@ -1,16 +1,16 @@
-"""Overlays on pictures: anti-aliased skeletons, boxes and labels at any resolution.
+"""Drawing on pictures: anti-aliased skeletons, boxes and labels at any resolution, mosaics, and legends.
 
-Everything is painted through coverage masks that are drawn four times as large and averaged. So lines may have any
+Everything is painted through coverage masks that are drawn several times as large and averaged. So lines may have any
 width and position, and a translucent skeleton is evenly translucent where its limbs meet.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from itertools import pairwise
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 import cv2
 import numpy as np
@@ -22,10 +22,10 @@ from mvpose.report.palette import INK, OUTLINE, PAPER, Color
 if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
-_FINER = 4  # mask pixels for each pixel of the picture, in each direction
 _SUBPIXEL_BITS = 4  # of cv2's fixed-point coordinates
 _RIM = 0.5  # pixels of the mask: cv2 fills every pixel that an outline touches
-_USUAL_HEIGHT = 600.0  # picture height in pixels at which widths and sizes apply unscaled
+USUAL_HEIGHT = 600.0
+"""Height in pixels of a picture on which widths and sizes apply unscaled."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,7 @@ class Overlay:
     Args:
         rgb: picture, (h, w, 3) uint8; it is copied.
         scale: factor of all widths and sizes; by default height / 600.
+        finer: mask pixels for each pixel of the picture, in each direction: 4 for pictures, 2 for films.
 
     Attributes:
         rgb: picture with everything drawn so far, (h, w, 3) uint8.
@@ -57,11 +58,12 @@ class Overlay:
         ValueError: the picture is not (h, w, 3) uint8.
     """
 
-    def __init__(self, rgb: NDArray[np.uint8], *, scale: float | None = None) -> None:
+    def __init__(self, rgb: NDArray[np.uint8], *, scale: float | None = None, finer: int = 4) -> None:
         if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8:
             raise ValueError(f"rgb must be (h, w, 3) uint8, got {rgb.shape} {rgb.dtype}")
         self.rgb = rgb.copy()
-        self.scale = rgb.shape[0] / _USUAL_HEIGHT if scale is None else scale
+        self.scale = rgb.shape[0] / USUAL_HEIGHT if scale is None else scale
+        self._finer = finer
 
     def skeleton(
         self,
@@ -106,12 +108,22 @@ class Overlay:
             self.tag(label, at=(x - width * self.scale / 2, y), color=color)
         return self
 
-    def tag(self, text: str, *, at: tuple[float, float], color: Color, size: float = 15.0) -> Self:
-        """Draw text on a coloured patch with its lower left corner at ``at``, moved to lie within the picture."""
+    def tag(
+        self, text: str, *, at: tuple[float, float], color: Color, size: float = 15.0, centered: bool = False
+    ) -> Self:
+        """Draw text on a coloured patch with its lower left corner at ``at``, moved to lie within the picture.
+
+        Args:
+            text: one line.
+            at: pixel of the corner.
+            color: of the patch.
+            size: height of the letters.
+            centered: the middle of the lower side is at ``at`` instead.
+        """
         glyphs = text_mask(text, size * self.scale)
         pad_x, pad_y = round(4 * self.scale), round(2 * self.scale)
         height, width = self._tag_size(text, size)
-        top, left = self._tag_place(at, height, width)
+        top, left = self._tag_place((at[0] - width / 2, at[1]) if centered else at, height, width)
         self._paint((top, left, np.ones((height, width), np.float32)), color, 0.9)
         self._paint((top + pad_y, left + pad_x, glyphs), readable_on(color), 1.0)
         return self
@@ -174,33 +186,38 @@ class Overlay:
         columns, rows = np.maximum(high - low, 0)
         if not (rows and columns):
             return 0, 0, np.zeros((0, 0), np.float32)
-        large = np.zeros((rows * _FINER, columns * _FINER), np.uint8)
-        half = max(width * _FINER / 2 - _RIM, 0.25)
-        for line in lines:
-            path = (line - low + 0.5) * _FINER - 0.5
-            for start, end in pairwise(path):
-                across = np.array([start[1] - end[1], end[0] - start[0]])
-                across *= half / max(float(np.linalg.norm(across)), 1e-9)
-                corners = np.stack([start + across, end + across, end - across, start - across])
-                cv2.fillConvexPoly(large, _fixed(corners), 255, cv2.LINE_8, _SUBPIXEL_BITS)
+        large = np.zeros((rows * self._finer, columns * self._finer), np.uint8)
+        half = max(width * self._finer / 2 - _RIM, 0.25)
+        if lines:
+            starts, ends = (
+                (np.concatenate(each) - low + 0.5) * self._finer - 0.5
+                for each in ([line[:-1] for line in lines], [line[1:] for line in lines])
+            )
+            across = (ends - starts)[:, ::-1] * (-1.0, 1.0)
+            across *= half / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+            for corners in _fixed(np.stack([starts + across, ends + across, ends - across, starts - across], axis=1)):
+                cv2.fillConvexPoly(large, corners, 255, cv2.LINE_8, _SUBPIXEL_BITS)
             if width > 1.5:  # rounded ends and corners, where they show
-                self._dots(large, path, half)
+                self._dots(large, np.unique(np.concatenate([starts, ends]), axis=0), half)
         if radius:
-            self._dots(large, (points - low + 0.5) * _FINER - 0.5, radius * _FINER - _RIM)
+            self._dots(large, (points - low + 0.5) * self._finer - 0.5, radius * self._finer - _RIM)
         small = cv2.resize(large, (int(columns), int(rows)), interpolation=cv2.INTER_AREA)
         return int(top), int(left), small.astype(np.float32) / np.float32(255)
 
     @staticmethod
     def _dots(large: NDArray[np.uint8], centers: NDArray, radius: float) -> None:
-        for center in _fixed(centers):
-            size = round(max(radius, 0.25) * 2**_SUBPIXEL_BITS)
-            cv2.circle(large, center.tolist(), size, 255, -1, cv2.LINE_8, _SUBPIXEL_BITS)
+        size = round(max(radius, 0.25) * 2**_SUBPIXEL_BITS)
+        for center in _fixed(centers).tolist():
+            cv2.circle(large, center, size, 255, -1, cv2.LINE_8, _SUBPIXEL_BITS)
 
     def _paint(self, mask: tuple[int, int, NDArray[np.float32]], color: Color, opacity: float) -> None:
         top, left, coverage = mask
         patch = self.rgb[top : top + coverage.shape[0], left : left + coverage.shape[1]]
-        weight = opacity * coverage[: patch.shape[0], : patch.shape[1], None]
-        patch[:] = np.round(patch + weight * (np.array(color, np.float32) - patch))
+        coverage = coverage[: patch.shape[0], : patch.shape[1]]
+        painted = coverage > 0
+        before = patch[painted]
+        weight = opacity * coverage[painted][:, None]
+        patch[painted] = np.round(before + weight * (np.array(color, np.float32) - before))
 
 
 def _fixed(points: NDArray) -> NDArray[np.int32]:
@@ -239,3 +256,106 @@ def _font(size: int) -> FreeTypeFont | ImageFont:
     from PIL import ImageFont as fonts
 
     return fonts.load_default(size)
+
+
+Mark = Literal["skeleton", "limbs", "box", "none"]
+
+_TITLE = 24.0  # height in pixels for a picture 600 pixels high: legible when three tiles share the width of a page
+_ZIGZAG = ((0, 1), (1, 2))
+
+
+def mosaic(
+    images: Sequence[NDArray[np.uint8]], titles: Sequence[str], *, columns: int | None = None, gap: int | None = None
+) -> NDArray[np.uint8]:
+    """Arrange pictures row by row, each below its title.
+
+    All tiles have the size of the largest picture; a smaller picture is enlarged to fit its tile and keeps its aspect
+    ratio.
+
+    Args:
+        images: pictures, each (h, w, 3) uint8.
+        titles: one title for each picture.
+        columns: tiles in a row; by default about as many as there are rows (five pictures: three and two).
+        gap: pixels between tiles and around them; by default a 60th of the picture height.
+
+    Returns:
+        (H, W, 3) uint8.
+
+    Raises:
+        ValueError: there is no picture, or there are not as many titles as pictures.
+    """
+    if not images or len(images) != len(titles):
+        raise ValueError(
+            f"a mosaic needs one picture or more and one title for each, got {len(images)} pictures and {len(titles)} "
+            "titles"
+        )
+    height, width = max(picture.shape[0] for picture in images), max(picture.shape[1] for picture in images)
+    gap = max(2, height // 60) if gap is None else gap
+    columns = _columns(len(images)) if columns is None else columns
+    rows = math.ceil(len(images) / columns)
+    scale = height / 600
+    band = text_mask("", _TITLE * scale).shape[0] + round(8 * scale)
+    sheet = np.full(
+        (rows * (height + band) + (rows + 1) * gap, columns * width + (columns + 1) * gap, 3), PAPER, np.uint8
+    )
+    paper = Overlay(sheet, scale=scale)
+    for k, (picture, title) in enumerate(zip(images, titles, strict=True)):
+        top, left = gap + k // columns * (height + band + gap), gap + k % columns * (width + gap)
+        fitted = _fitted(picture, height, width)
+        down, right = top + band + (height - fitted.shape[0]) // 2, left + (width - fitted.shape[1]) // 2
+        paper.rgb[down : down + fitted.shape[0], right : right + fitted.shape[1]] = fitted
+        paper.text(title, at=(left + 2 * scale, top), size=_TITLE)
+    return paper.rgb
+
+
+def rooms_in_grid(count: int) -> int:
+    """Return the number of tiles, empty ones included, of a mosaic of ``count`` pictures: 6 of 5."""
+    columns = _columns(count)
+    return columns * math.ceil(count / columns)
+
+
+def _columns(count: int) -> int:
+    return math.ceil(math.sqrt(count))
+
+
+def _fitted(picture: NDArray[np.uint8], height: int, width: int) -> NDArray[np.uint8]:
+    """Return the picture scaled to the largest size that fits into a tile."""
+    scale = min(height / picture.shape[0], width / picture.shape[1])
+    if scale == 1.0:
+        return picture
+    size = (min(width, round(scale * picture.shape[1])), min(height, round(scale * picture.shape[0])))
+    return cv2.resize(picture, size, interpolation=cv2.INTER_LINEAR).astype(np.uint8, copy=False)
+
+
+def legend(entries: Sequence[tuple[Mark, Color, str]], *, size: tuple[int, int], title: str = "") -> NDArray[np.uint8]:
+    """Draw a legend as a picture, (height, width, 3) uint8.
+
+    Args:
+        entries: mark ("skeleton": thin with a dark rim, "limbs": thick and translucent, "box", or "none": text alone),
+            colour and meaning of each entry.
+        size: width and height of the picture in pixels.
+        title: heading.
+    """
+    width, height = size
+    paper = Overlay(np.full((height, width, 3), PAPER, np.uint8))
+    scale = paper.scale
+    left, indent, line = 30.0, 72.0, min(56.0, 520.0 / (len(entries) + 2))
+    room = width / scale - 2 * left - indent
+    longest = max((text_mask(meaning, 100).shape[1] / 100 for _, _, meaning in entries), default=1.0)
+    letters = min(_TITLE, 0.55 * line, room / longest)
+    y = 36.0
+    if title:
+        paper.text(title, at=(left * scale, y * scale), size=1.2 * _TITLE)
+        y += 1.5 * line
+    for mark, color, meaning in entries:
+        middle = y + line / 2
+        ends = np.array([[left, middle + 7], [left + 26, middle - 7], [left + 52, middle + 5]]) * scale
+        if mark == "skeleton":
+            paper.skeleton(ends, color=color, edges=_ZIGZAG, outline=1.0, width=2, dots=3)
+        elif mark == "limbs":
+            paper.skeleton(ends, color=color, edges=_ZIGZAG, width=9, dots=0, opacity=0.55)
+        elif mark == "box":
+            paper.box(np.array([left + 6, middle - 12, 40, 24]) * scale, color=color, width=2.5)
+        paper.text(meaning, at=((left + indent) * scale, (middle - 0.62 * letters) * scale), size=letters)
+        y += line
+    return paper.rgb

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from mvpose.report.limbs import COCO17_LIMBS, plain_face
+from mvpose.report.overlay import BoxTag, Overlay, legend, mosaic, readable_on, rooms_in_grid, text_mask
 from mvpose.report.palette import INK, OUTLINE, PAPER, TRUTH, UNMATCHED, css, person_color
 from mvpose.skeleton import COCO17
-from simharness.outputs.figures.mosaic import legend, mosaic, rooms_in_grid
-from simharness.outputs.figures.overlay import BoxTag, Overlay, readable_on, text_mask
 
 BLACK = np.zeros((600, 800, 3), np.uint8)
 WHITE = (255, 255, 255)

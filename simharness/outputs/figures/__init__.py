@@ -1,1 +1,0 @@
-"""Drawing shared by reports and tools: SVG plots, overlays on pictures, mosaics and colours."""
