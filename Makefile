@@ -26,7 +26,7 @@ lint: $(DEV)
 
 # The site in build/docs; a reference to a name that does not exist is an error.
 docs: $(DEV)
-	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+	$(BIN)/python -m sphinx -W --keep-going -q -j auto -b html docs build/docs
 
 # dist/mvpose-*.whl and dist/simharness-*.whl; `pip install --find-links dist simharness` installs both. Folders of an
 # earlier build are removed first: setuptools would pack the modules that they still hold.

@@ -1,5 +1,7 @@
 """Sphinx configuration: pages in Markdown, the API reference from the docstrings of both packages."""
 
+import functools
+import importlib
 from typing import Any
 
 from simharness.runtime.version import code_version
@@ -16,19 +18,40 @@ html_title = "simharness and mvpose"
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 
+# Rooms that nobody imports who uses or extends the packages; their docstrings are read in the code.
+INTERNAL = {
+    "mvpose": ("build", "cli", "report"),
+    "simharness": (
+        "capture",
+        "cli",
+        "outputs/figures",
+        "outputs/planning",
+        "outputs/study",
+        "outputs/validation",
+        "runtime",
+        "world/humans",
+        "world/motion/activities",
+        "world/motion/interactions",
+        "world/motion/mocap",
+        "world/motion/poses",
+        "world/scene",
+    ),
+}
+
 apidoc_modules = [
     {
         "path": f"../{package}",
         "destination": f"api/{package}",
-        "exclude_patterns": [f"../{package}/build/**"],
+        "exclude_patterns": [f"../{package}/{room}" for room in rooms],
         "separate_modules": False,
         "module_first": True,
         "automodule_options": {"members", "show-inheritance"},
     }
-    for package in ("mvpose", "simharness")
+    for package, rooms in INTERNAL.items()
 ]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
+autodoc_use_type_comments = False  # nobody writes them; looking for them parses every function again
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
@@ -53,6 +76,39 @@ def _skip_namesakes(app: Any, what: str, name: str, obj: Any, skip: bool, option
     return True if module != origin and origin == f"{module}.{name}" else None
 
 
+def _internal(app: Any, env: Any, node: Any, contnode: Any) -> Any:
+    """Return the text of a reference to something that exists, but has no page; None for all others."""
+    target, module = node.get("reftarget", ""), node.get("py:module") or ""
+    if node.get("refdomain") != "py":
+        return None
+    scopes = [module.rsplit(".", depth)[0] for depth in range(module.count(".") + 1)] if module else []
+    names = [target, *(f"{scope}.{target}" for scope in scopes), f"{module}.{node.get('py:class')}.{target}"]
+    return contnode if any(_exists(name) for name in names if name.startswith(("mvpose.", "simharness."))) else None
+
+
+@functools.cache
+def _exists(name: str) -> bool:
+    """Return whether a dotted name of the packages is a module, or a name in one."""
+    module, rest = name, []
+    while module:
+        try:
+            found = importlib.import_module(module)
+        except ImportError:
+            module, _, last = module.rpartition(".")
+            rest.insert(0, last)
+            continue
+        for each in rest:
+            fields = getattr(found, "__annotations__", {}) | getattr(found, "__dataclass_fields__", {})
+            if each in fields and not hasattr(found, each):
+                return True
+            if not hasattr(found, each):
+                return False
+            found = getattr(found, each)
+        return True
+    return False
+
+
 def setup(app: Any) -> None:
     """Connect the handlers."""
     app.connect("autodoc-skip-member", _skip_namesakes)
+    app.connect("missing-reference", _internal)

@@ -1,1 +1,1 @@
-"""Camera calibrations in the file formats of the field; :mod:`.registry` reads all of them."""
+"""Camera calibrations in the file formats of the field; :mod:`.calibration_formats` reads all of them."""

@@ -56,7 +56,7 @@ def with_camera_in_gap(rig: Rig, is_free: Callable[[Floats], bool], *, reach: Ar
     Args:
         rig: the V cameras.
         is_free: whether a camera can stand at a place, (3,), metres.
-        reach: largest |x|, |y| and z of a place, metres; None: unlimited.
+        reach: largest absolute x and y, and largest z, of a place, metres; None: unlimited.
     """
     aim = _aim(rig)
     away = rig.centers - aim
