@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from mvpose import Detections, Estimate, Rig, preset
 from mvpose.arrays import Floats
 from mvpose.estimators import Estimator, SequenceEstimator
-from mvpose.skeleton import coco17_to_shelf14
-from simharness.scoring.pcp import percent, score_parts
+from simharness.scoring.frame_scores import score_frames
+from simharness.scoring.pcp import percent
 
 
 def pcp(
@@ -33,12 +33,9 @@ def pcp(
         every, estimates = 1, list(estimator.track(rig, frames))
     else:
         estimates = [estimator.estimate(rig, each) for each in frames[::every]]
-    parts = np.stack(
-        [
-            score_parts(_truth_at(truth, k * every, given, each, period), coco17_to_shelf14(each.joints))
-            for k, (given, each) in enumerate(zip(frames[::every], estimates, strict=True))
-        ]
-    )
+    pairs = enumerate(zip(frames[::every], estimates, strict=True))
+    moved = np.stack([_truth_at(truth, k * every, given, each, period) for k, (given, each) in pairs])
+    parts = score_frames(moved, [each.joints for each in estimates]).parts
     scores = [percent(parts[:, person]) for person in range(parts.shape[1])]
     return float(np.mean([each for each in scores if each is not None]))
 

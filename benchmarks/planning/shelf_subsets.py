@@ -30,10 +30,10 @@ from simharness.reality.annotation_errors import AnnotationModel
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, track_people
 from simharness.reality.recording_file import read_recording
-from simharness.reality.validation.head_joints import fill_face
 from simharness.reality.validation.passes import CameraSubset, annotated, run_passes
 from simharness.reality.validation.subsets import FILLED, camera_subsets
 from simharness.scenario.presets import read_profile
+from simharness.scoring.frame_scores import fill_face
 from simharness.scoring.pcp import Part, part_states
 
 Subset = tuple[int, ...]

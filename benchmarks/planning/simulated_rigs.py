@@ -24,8 +24,7 @@ from simharness import simulate
 from simharness.planning import FastLayer, Prediction, Volume
 from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scoring.frame import score_frame
-from simharness.scoring.pairing import pair
+from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.pcp import Part
 from simharness.trial.stages.build_trial import true_rig
 from simharness.types.random_streams import stream
@@ -113,15 +112,11 @@ class Outcome:
 def simulated(scenario: Scenario) -> Outcome:
     """Simulate a scenario and score ``full`` on it."""
     recording, pipeline = simulate(scenario), preset("full")
-    parts, positions, errors = [], [], []
-    for detections, truth in zip(recording.detections, recording.truth, strict=True):
-        estimate = pipeline.estimate(recording.rig, detections)
-        parts.append(score_frame(truth.joints, estimate.joints).parts)
-        positions.append(truth.joints[:, 11:13, :2].mean(axis=1))
-        errors.append(1000.0 * pair(truth.joints, estimate.joints).error)
-    counted = np.concatenate(parts)
-    pcp = 100.0 * (counted == Part.CORRECT).sum() / (counted != Part.UNDEFINED).sum()
-    return Outcome(float(pcp), np.concatenate(positions), np.concatenate(errors))
+    truth = np.stack([each.joints for each in recording.truth])
+    scores = score_frames(truth, [pipeline.estimate(recording.rig, each).joints for each in recording.detections])
+    pcp = 100.0 * (scores.parts == Part.CORRECT).sum() / (scores.parts != Part.UNDEFINED).sum()
+    positions = truth[:, :, 11:13, :2].mean(axis=2)
+    return Outcome(float(pcp), positions.reshape(-1, 2), 1000.0 * scores.error.ravel())
 
 
 def predicted(scenario: Scenario, *, spacing: float = 0.5, draws: int = 1) -> Prediction:

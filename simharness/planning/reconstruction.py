@@ -15,7 +15,7 @@ from mvpose.reconstruction import Triangulation
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.planning.camera_terms import CameraTerms
 from simharness.planning.standing_people import StandingScenes
-from simharness.scoring.pairing import LIMIT, pair
+from simharness.scoring.pairing import LIMIT, mean_distances, pair
 from simharness.scoring.pcp import nearest
 
 _SCENES_AT_ONCE = 64  # whose people are triangulated in one call, which searches its detections for each of them
@@ -103,7 +103,7 @@ def _by_variant(rig: Rig, terms: Sequence[CameraTerms], scenes: StandingScenes, 
         estimate = pipeline.estimate(rig, detections)
         truth = np.where(scenes.present[s][:, None, None], scenes.joints[s], np.nan)
         if len(estimate.joints):
-            partner = nearest(coco17_to_shelf14(truth), coco17_to_shelf14(estimate.joints))
+            partner = nearest(mean_distances(coco17_to_shelf14(truth), coco17_to_shelf14(estimate.joints)))
             close[s] = np.where((partner >= 0)[:, None, None], estimate.joints[partner], np.nan)
             partner = pair(truth, estimate.joints, limit=LIMIT).estimate
             paired[s] = np.where((partner >= 0)[:, None, None], estimate.joints[partner], np.nan)

@@ -15,10 +15,10 @@ from mvpose import Rig
 from mvpose.arrays import Floats
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
-from simharness.reality.validation.frame_scores import RULES, HeadRule
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import Scenario
+from simharness.scoring.frame_scores import RULES, HeadRule
 from simharness.world.humans.accessories import take_off
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.scene.build import Scene, build, compile_model

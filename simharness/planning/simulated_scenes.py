@@ -28,9 +28,9 @@ from simharness.planning.rehearsal_scene import (
 )
 from simharness.planning.scene_results import Condition, SceneResult, SceneScores
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.validation.frame_scores import RULES, score_frames
 from simharness.runtime.frame_pool import map_jobs
 from simharness.scenario.sections.cameras_section import FaultsSection
+from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.matching import count_groups
 from simharness.scoring.pcp import Part
 from simharness.trial.conditions import ConditionedTrial, estimate_frames
@@ -181,16 +181,14 @@ def _take(
     exposures = exposures_of(scenario, frame.rig(settings.rig), scene.time)
     draws = ConditionedTrial(Trial(scenario, scene, exposures, {}, None))
     truth = coco17_to_shelf14(draws.sequence.joints, head=settings.head.mapping)
-    pipeline, rule = preset(settings.variant), RULES.index(settings.head)
+    pipeline, rule = preset(settings.variant), settings.head
     scored: dict[Condition, _Scored] = {}
     for condition in sorted(conditions, key=lambda each: (each.fault == "clock_offset", each.level)):
         faults = FaultsSection.model_validate({condition.fault: condition.level} if condition.fault else {})
         detected = draws.detected(scenario.model_copy(update={"faults": faults}))
         estimates, groups, mixed = _estimates(pipeline, detected, condition.cameras)
-        scores = score_frames(truth, estimates)
-        found = scores.found[rule]
-        error = np.where(found, _mean(scores.errors[rule]), np.nan)
-        scored[condition] = _Scored(_share_correct(scores.parts[rule]), error, found, groups, mixed)
+        scores = score_frames(truth, estimates, head=rule.mapping, filled=rule.filled)
+        scored[condition] = _Scored(_share_correct(scores.parts), scores.error, scores.found, groups, mixed)
     hips = draws.sequence.joints[:, :, (11, 12), :2].mean(axis=2)
     return _Take(frame.to_world(hips), scored)
 

@@ -12,7 +12,7 @@ from mvpose import Detections, Estimate, Matching
 from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.scoring.frame import score_frame
+from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.matching import count_violations
 from simharness.scoring.score_summary import VariantScores, summarize
 from simharness.scoring.tracking.identity_figures import tracking_of_some
@@ -123,10 +123,10 @@ def score_estimates(
     for name, of_frames in estimates.items():
         violations[name] = _violations(recording.detections, [estimate.matching for estimate in of_frames])
         rows = np.flatnonzero(annotated).tolist()
-        scores = [score_frame(recording.truth[row], of_frames[row].joints, head=head) for row in rows]
+        scores = score_frames(recording.truth[annotated], [of_frames[row].joints for row in rows], head=head)
         scored = [estimate for estimate, known in zip(of_frames, annotated, strict=True) if known]
         variants[name] = VariantScores(
-            tuple(scores),
+            scores,
             tuple(estimate.timings for estimate in of_frames),
             tracking_of_some(
                 recording.truth[annotated], scored, recording.time[annotated], head=head, actors=recording.scored

@@ -72,10 +72,7 @@ class SeedEvaluation:
 
     def pooled(self, name: str) -> VariantScores:
         """Return the scores of a variant in all frames of all seeds."""
-        return VariantScores(
-            tuple(frame for each in self.variant_scores(name) for frame in each.frames),
-            tuple(timing for each in self.variant_scores(name) for timing in each.timings),
-        )
+        return VariantScores.pooled(self.variant_scores(name))
 
     def pcp(self, name: str, people: Sequence[int] | None = None) -> PcpInterval:
         """Return the PCP of a variant, mean over ``people`` (None: all)."""
@@ -202,7 +199,7 @@ def _counts(recordings: Sequence[VariantScores], people: Sequence[int]) -> Float
 
 def _counts_by_frame(recording: VariantScores, people: Sequence[int]) -> Floats:
     """Count the correct and the defined parts of people in each frame, (F, A, 2)."""
-    parts = np.stack([frame.parts for frame in recording.frames])[:, list(people)]
+    parts = recording.frames.parts[:, list(people)]
     return np.stack([(parts == Part.CORRECT).sum(axis=2), (parts != Part.UNDEFINED).sum(axis=2)], axis=-1)
 
 

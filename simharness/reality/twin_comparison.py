@@ -110,13 +110,7 @@ def compare(
             scores.append(evaluate(each, estimators, head=head).variants)
             advance(1)
     real, simulated, actors = scores[0], scores[1:], recorded.scored
-    pooled = {
-        name: VariantScores(
-            tuple(frame for each in simulated for frame in each[name].frames),
-            tuple(timing for each in simulated for timing in each[name].timings),
-        )
-        for name in variants
-    }
+    pooled = {name: VariantScores.pooled([each[name] for each in simulated]) for name in variants}
     return TwinComparison(
         name=recorded.name,
         frames=len(recorded),

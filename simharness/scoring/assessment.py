@@ -15,10 +15,9 @@ from mvpose.arrays import Floats
 from simharness.scoring.average_precision import average_precision, nearest_people
 from simharness.scoring.catalogue import AP_MM, PCK_MM
 from simharness.scoring.feet_and_hands import WholeBodyInput, whole_body_scores
-from simharness.scoring.frame import score_frame
+from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.joint_errors import joint_errors, pck, pck_area
 from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, count_pairs, count_violations
-from simharness.scoring.pairing import Pairing
 from simharness.scoring.pcp import Part
 from simharness.scoring.reprojection import reprojection_errors
 from simharness.scoring.score_registry import ScoreInput, compute_scores
@@ -79,7 +78,7 @@ def assess(recording: Recording, estimates: Sequence[Estimate], *, whole: WholeB
     summary = variant.summary()
     groups = _groups(recording, estimates)
     truth = np.stack([true.joints for true in recording.truth])
-    partner = np.stack([frame.pairing.estimate for frame in variant.frames])
+    partner = variant.frames.partner
     placed = _paired_joints(truth.shape, partner, estimates)
     errors = joint_errors(truth, placed)
     scores = (
@@ -104,11 +103,9 @@ def assess(recording: Recording, estimates: Sequence[Estimate], *, whole: WholeB
 
 def score_variant(recording: Recording, estimates: Sequence[Estimate]) -> VariantScores:
     """Score every frame; ``summary.json`` is made from the result."""
-    frames = [
-        score_frame(true.joints, estimate.joints, matching=pairs)
-        for true, estimate, pairs in zip(recording.truth, estimates, _pairs(recording, estimates), strict=True)
-    ]
-    return VariantScores(tuple(frames), tuple(estimate.timings for estimate in estimates))
+    truth = np.stack([true.joints for true in recording.truth])
+    frames = score_frames(truth, [each.joints for each in estimates], matching=_pairs(recording, estimates))
+    return VariantScores(frames, tuple(estimate.timings for estimate in estimates))
 
 
 def _labels(recording: Recording, estimates: Sequence[Estimate]) -> list[Labels] | None:
@@ -120,11 +117,11 @@ def _labels(recording: Recording, estimates: Sequence[Estimate]) -> list[Labels]
     return [matching.labels_of(count) for matching, count in zip(matchings, counts, strict=True)]
 
 
-def _pairs(recording: Recording, estimates: Sequence[Estimate]) -> list[PairCounts | None]:
-    """Count the pairs of detections of every frame; None for every frame if there are no labels."""
+def _pairs(recording: Recording, estimates: Sequence[Estimate]) -> list[PairCounts] | None:
+    """Count the pairs of detections of every frame; None if there are no labels."""
     labels = _labels(recording, estimates)
     if labels is None:
-        return [None] * len(recording)
+        return None
     frames = zip(recording.detections, labels, recording.truth, strict=True)
     return [count_pairs(detections.view, label, truth.person) for detections, label, truth in frames]
 
@@ -221,27 +218,25 @@ def _time_column(stage: str) -> str:
 def _frame_table(
     recording: Recording, variant: VariantScores, counted: tuple[list[GroupCounts], list[int]] | None
 ) -> pl.DataFrame:
-    rows = []
-    groups, violations = counted or ([], [])
-    for index, (frame, timing) in enumerate(zip(variant.frames, variant.timings, strict=True)):
-        row = frame.row()
-        del row["errors_mm"], row["parts"]  # they are in the table of people
-        group = groups[index] if counted else None
-        rows.append(
-            {"frame": index, "time": float(recording.time[index]), **row}
-            | {"violations": violations[index] if counted else None}
-            | {key: getattr(group, key, None) for key in ("merged", "split", "phantoms", "admitted")}
-            | {_time_column(stage): 1000.0 * timing[stage] if stage in timing else None for stage in STAGES}
-        )
+    columns = variant.frames.columns()
+    del columns["errors_mm"], columns["parts"]  # they are in the table of people
+    nothing: list[None] = [None] * len(recording)
+    groups, violations = counted or (nothing, nothing)
+    columns = {"frame": list(range(len(recording))), "time": recording.time.tolist(), **columns}
+    columns["violations"] = list(violations)
+    for key in ("merged", "split", "phantoms", "admitted"):
+        columns[key] = [getattr(group, key, None) for group in groups]
+    for stage in STAGES:
+        columns[_time_column(stage)] = [1000.0 * each[stage] if stage in each else None for each in variant.timings]
     types: dict[str, Any] = dict.fromkeys(("pcp", "mpjpe_mm", *map(_time_column, STAGES)), pl.Float64)
     types |= dict.fromkeys((*_PAIR_COLUMNS, "violations", "merged", "split", "phantoms", "admitted"), pl.Int64)
-    return pl.DataFrame(rows, schema_overrides=types, infer_schema_length=None)
+    return pl.DataFrame(columns, schema_overrides=types)
 
 
 def _people_table(recording: Recording, variant: VariantScores, errors: Floats) -> pl.DataFrame:
-    pairings = [frame.pairing for frame in variant.frames]
-    frame, person = np.nonzero(np.stack([pairing.present for pairing in pairings]))
-    parts = np.stack([each.parts for each in variant.frames])[frame, person]
+    scored = variant.frames
+    frame, person = np.nonzero(scored.present)
+    parts = scored.parts[frame, person]
     counted = (parts != Part.UNDEFINED).sum(axis=1)
     error = errors[frame, person]
     finite = np.where(np.isfinite(error), error, -1.0)
@@ -252,8 +247,8 @@ def _people_table(recording: Recording, variant: VariantScores, errors: Floats) 
     columns: dict[str, Any] = {
         "frame": frame,
         "person": person,
-        "found": _stacked(pairings, "estimate")[frame, person] >= 0,
-        "error_mm": 1000.0 * _stacked(pairings, "error")[frame, person],
+        "found": scored.found[frame, person],
+        "error_mm": 1000.0 * scored.error[frame, person],
         "pcp": np.where(counted > 0, 100.0 * (parts == Part.CORRECT).sum(axis=1) / np.maximum(counted, 1), np.nan),
         "worst_joint": np.where(known, worst, -1),
         "worst_mm": np.where(known, 1000.0 * finite.max(axis=1), np.nan),
@@ -264,10 +259,6 @@ def _people_table(recording: Recording, variant: VariantScores, errors: Floats) 
         pl.col("error_mm", "pcp", "worst_mm").fill_nan(None),
         pl.col("worst_joint").replace_strict(names, default=None, return_dtype=pl.String),
     )
-
-
-def _stacked(pairings: Sequence[Pairing], key: str) -> NDArray[Any]:
-    return np.stack([getattr(pairing, key) for pairing in pairings])
 
 
 def _percent(share: float | None) -> float | None:

@@ -27,33 +27,11 @@ class Pairing:
         estimate: index of the estimate paired with each true person, (P,); -1 where the person is missed or absent.
         error: MPJPE of each pair over the joints that both have, (P,), metres; NaN without a pair.
         present: which of the P people are in the frame, that is have at least one defined joint, (P,).
-        estimates: number of estimates.
     """
 
     estimate: NDArray[np.int64]
     error: NDArray[np.float64]
     present: NDArray[np.bool_]
-    estimates: int
-
-    @property
-    def people(self) -> int:
-        """Number of true people in the frame."""
-        return int(self.present.sum())
-
-    @property
-    def found(self) -> int:
-        """Number of true people paired with an estimate."""
-        return int((self.estimate >= 0).sum())
-
-    @property
-    def missed(self) -> int:
-        """Number of true people without an estimate."""
-        return self.people - self.found
-
-    @property
-    def ghosts(self) -> int:
-        """Number of estimates that match no person."""
-        return self.estimates - self.found
 
 
 def pair(truth: ArrayLike, estimate: ArrayLike, *, limit: float = LIMIT) -> Pairing:
@@ -75,7 +53,7 @@ def pair(truth: ArrayLike, estimate: ArrayLike, *, limit: float = LIMIT) -> Pair
     error = np.full(len(truth), np.nan)
     error[rows] = distance[rows, partner[rows]]
     present = np.isfinite(truth).all(axis=-1).any(axis=-1)
-    return Pairing(partner, error, present, len(estimate))
+    return Pairing(partner, error, present)
 
 
 def assign(distance: Floats, *, limit: float = LIMIT) -> NDArray[np.int64]:

@@ -13,9 +13,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mvpose.arrays import Floats
-from mvpose.checks import as_array
-from simharness.scoring.pairing import mean_distances
+from mvpose.arrays import Floats, Integers
 
 ALPHA = 0.5
 """Largest mean error of the two ends of a correct part, as a share of the part's true length."""
@@ -56,28 +54,6 @@ class Part(IntEnum):
     CORRECT = 1
 
 
-def score_parts(truth: ArrayLike, estimate: ArrayLike, *, alpha: float = ALPHA) -> NDArray[np.int8]:
-    """Score every part of every true person of one frame.
-
-    Args:
-        truth: joints on SHELF14, (P, 14, 3), metres; NaN where undefined.
-        estimate: joints on SHELF14, (n, 14, 3), metres; NaN where missing. A part with a missing end is wrong.
-        alpha: largest error of a correct part, as a share of its true length.
-
-    Returns:
-        :class:`Part` values, (P, 10).
-
-    Raises:
-        ValueError: a wrong shape.
-    """
-    truth = as_array(truth, ("P", 14, 3), "truth")
-    estimate = as_array(estimate, ("n", 14, 3), "estimate")
-    partner = nearest(truth, estimate)
-    compared = np.full_like(truth, np.nan)
-    compared[partner >= 0] = estimate[partner[partner >= 0]]
-    return part_states(truth, compared, alpha=alpha)
-
-
 def part_states(truth: Floats, compared: Floats, *, alpha: float = ALPHA) -> NDArray[np.int8]:
     """Return the :class:`Part` values of people, (..., 10), each compared with one estimate.
 
@@ -93,12 +69,11 @@ def part_states(truth: Floats, compared: Floats, *, alpha: float = ALPHA) -> NDA
     return np.where(np.isnan(length), Part.UNDEFINED, correct).astype(np.int8)
 
 
-def nearest(truth: ArrayLike, estimate: ArrayLike) -> NDArray[np.int64]:
-    """Return the estimate at the least mean joint distance from each true person, (P,); -1 where there is none."""
-    distance = mean_distances(np.asarray(truth, float), np.asarray(estimate, float))
-    if distance.shape[1] == 0:
-        return np.full(len(distance), -1)
-    return np.where(np.isfinite(distance).any(axis=1), distance.argmin(axis=1), -1)
+def nearest(distance: Floats) -> Integers:
+    """Return the nearest estimate of each person, (...), -1 where there is none, from mean joint distances (..., n)."""
+    if distance.shape[-1] == 0:
+        return np.full(distance.shape[:-1], -1)
+    return np.where(np.isfinite(distance).any(axis=-1), distance.argmin(axis=-1), -1)
 
 
 def part_ends(joints: Floats) -> Floats:

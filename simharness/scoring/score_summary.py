@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simharness.scoring.frame import FrameScore
+from simharness.scoring.frame_scores import FrameScores
 from simharness.scoring.pcp import GROUPS, percent
 
 STAGES = ("affinity", "matching", "reconstruction", "total")
@@ -23,26 +23,29 @@ class VariantScores:
     """Scores of one variant in all frames.
 
     Attributes:
-        frames: scores of the frames, all with the same P people in the same order.
+        frames: scores of the frames.
         timings: ``Estimate.timings`` of every timed frame, seconds by stage.
         tracking: scores over time, where people are tracked: :mod:`simharness.scoring.tracking.identity_figures`.
         whole_body: scores of feet and hands, where the detector reports them: :mod:`simharness.scoring.feet_and_hands`.
-
-    Raises:
-        ValueError: frames with different numbers of people.
     """
 
-    frames: tuple[FrameScore, ...]
+    frames: FrameScores
     timings: tuple[Mapping[str, float], ...] = ()
     tracking: Mapping[str, Any] | None = None
     whole_body: Mapping[str, float | None] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "frames", tuple(self.frames))
         object.__setattr__(self, "timings", tuple(self.timings))
-        counts = sorted({len(frame.parts) for frame in self.frames})
-        if len(counts) > 1:
-            raise ValueError(f"all frames must count the same people, got frames of {counts[0]} and of {counts[-1]}")
+
+    @classmethod
+    def pooled(cls, recordings: Sequence[VariantScores]) -> VariantScores:
+        """Return the scores of a variant in all frames of several recordings.
+
+        Raises:
+            ValueError: recordings of different numbers of people, or none.
+        """
+        timings = tuple(timing for each in recordings for timing in each.timings)
+        return cls(FrameScores.joined(each.frames for each in recordings), timings)
 
     def summary(self, *, actors: Sequence[int] | None = None) -> dict[str, Any]:
         """Return the summary of this variant.
@@ -57,10 +60,10 @@ class VariantScores:
             ``timings_ms`` by stage, ``tracking`` where there are scores over time, and ``whole_body`` where there are
             scores of feet or hands. None where a score does not apply; never NaN.
         """
-        pairings = [frame.pairing for frame in self.frames]
-        found, people = sum(p.found for p in pairings), sum(p.people for p in pairings)
-        estimates, ghosts = sum(p.estimates for p in pairings), sum(p.ghosts for p in pairings)
-        errors = np.concatenate([np.zeros(0), *(p.error for p in pairings)]) * 1000.0
+        scored, frames = self.frames, len(self.frames)
+        found, people = int(scored.found.sum()), int(scored.present.sum())
+        estimates, ghosts = int(scored.estimates.sum()), int(scored.ghosts.sum())
+        errors = scored.error.ravel() * 1000.0
         errors = errors[np.isfinite(errors)]
         table = self.pcp_table(actors=actors)
         more = {"tracking": self.tracking, "whole_body": self.whole_body}
@@ -70,8 +73,8 @@ class VariantScores:
             "pcp_actors": [row["all"] for row in table],
             "precision": found / estimates if estimates else None,
             "recall": found / people if people else None,
-            "ghosts_per_frame": ghosts / len(pairings) if pairings else None,
-            "missed_per_frame": (people - found) / len(pairings) if pairings else None,
+            "ghosts_per_frame": ghosts / frames if frames else None,
+            "missed_per_frame": (people - found) / frames if frames else None,
             "mpjpe_mm": {"mean": _statistic(np.mean, errors), "median": _statistic(np.median, errors)},
             "matching": self._matching(),
             "timings_ms": {stage: self._timing(stage) for stage in STAGES},
@@ -80,9 +83,7 @@ class VariantScores:
 
     def pcp_table(self, *, actors: Sequence[int] | None = None) -> list[dict[str, float | None]]:
         """Return PCP of every actor by group of parts and of all ten (``"all"``), percent; None where undefined."""
-        if not self.frames:
-            return []
-        parts = np.stack([frame.parts for frame in self.frames])
+        parts = self.frames.parts
         chosen = range(parts.shape[1]) if actors is None else actors
         return [
             {group: percent(parts[:, actor, list(index)]) for group, index in GROUPS.items()}
@@ -91,8 +92,7 @@ class VariantScores:
         ]
 
     def _matching(self) -> dict[str, float | None]:
-        counts = [frame.matching for frame in self.frames if frame.matching is not None]
-        total = reduce(add, counts) if counts else None
+        total = reduce(add, self.frames.matching) if self.frames.matching else None
         return {key: getattr(total, key, None) for key in ("precision", "recall", "f1")}
 
     def _timing(self, stage: str) -> dict[str, float | None]:

@@ -141,12 +141,7 @@ def _whole_body(result: TrialResult) -> Arrays:
 
 
 def score_table(scores: Mapping[str, VariantScores]) -> pl.DataFrame:
-    """A row for each frame and variant: :meth:`simharness.scoring.frame.FrameScore.row`."""
-    rows = [
-        {"variant": variant, "frame": index, **frame.row()}
-        for variant, scored in scores.items()
-        for index, frame in enumerate(scored.frames)
-    ]
+    """A row for each frame and variant: :meth:`simharness.scoring.frame_scores.FrameScores.columns`."""
     types: dict[str, Any] = {
         "pcp": pl.Float64,
         "mpjpe_mm": pl.Float64,
@@ -154,7 +149,14 @@ def score_table(scores: Mapping[str, VariantScores]) -> pl.DataFrame:
         "parts": pl.List(pl.Int8),
         **dict.fromkeys(("pairs_correct", "pairs_wrong", "pairs_lost"), pl.Int64),
     }
-    return pl.DataFrame(rows, schema_overrides=types, infer_schema_length=None)
+    tables = [
+        pl.DataFrame(
+            {"variant": [variant] * len(each.frames), "frame": list(range(len(each.frames))), **each.frames.columns()},
+            schema_overrides=types,
+        )
+        for variant, each in scores.items()
+    ]
+    return pl.concat(tables) if tables else pl.DataFrame()
 
 
 def _make_folder(out: Path) -> None:

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from simharness.reality.validation.evidence import Compared
-from simharness.reality.validation.frame_scores import RULES, HeadRule
 from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.validation import Validation
 from simharness.reality.validation.verdicts import GROUPS, BoundVerdict, VerdictState
 from simharness.runtime.number_text import fixed, signed
+from simharness.scoring.frame_scores import RULES, HeadRule
 from simharness.statistics.intervals import Interval
 
 NOTHING = "–"

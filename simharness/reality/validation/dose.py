@@ -9,10 +9,10 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.reality.validation.evidence import Compared, Evidence, Figure, rank_correlation
-from simharness.reality.validation.frame_scores import RULES, HeadRule
 from simharness.reality.validation.passes import Unchanged
-from simharness.reality.validation.tally import DEFAULT_RULE, Tally
+from simharness.reality.validation.score_sums import DEFAULT_RULE, ScoreSums
 from simharness.reality.validation.treatments import KINDS, Treatment
+from simharness.scoring.frame_scores import RULES, HeadRule
 from simharness.statistics.intervals import Interval
 
 _FILLED = RULES[2]
@@ -70,20 +70,20 @@ def compare_responses(evidence: Evidence, variants: Sequence[str]) -> list[DoseR
 def _response(evidence: Evidence, treatments: Sequence[Treatment], variant: str) -> DoseResponse:
     first = treatments[0]
 
-    def change(score: Callable[[Tally, HeadRule], Floats], sign: float, rule: HeadRule = DEFAULT_RULE) -> Compared:
+    def change(score: Callable[[ScoreSums, HeadRule], Floats], sign: float, rule: HeadRule = DEFAULT_RULE) -> Compared:
         return evidence.compare(_mean([_change(each, variant, score, sign, rule) for each in treatments]))
 
-    losses = [_change(each, variant, Tally.pcp, -1.0, DEFAULT_RULE) for each in treatments]
+    losses = [_change(each, variant, ScoreSums.pcp, -1.0, DEFAULT_RULE) for each in treatments]
     twins = [[float(loss(twin)) for twin in evidence.twins] for loss in losses]
     return DoseResponse(
         kind=first.kind,
         level=first.level,
         variant=variant,
-        loss=change(Tally.pcp, -1.0),
-        loss_filled=change(Tally.pcp, -1.0, _FILLED),
-        ghosts=change(Tally.ghosts, 1.0),
-        recall=change(Tally.recall, -1.0),
-        mpjpe=change(Tally.mpjpe, 1.0),
+        loss=change(ScoreSums.pcp, -1.0),
+        loss_filled=change(ScoreSums.pcp, -1.0, _FILLED),
+        ghosts=change(ScoreSums.ghosts, 1.0),
+        recall=change(ScoreSums.recall, -1.0),
+        mpjpe=change(ScoreSums.mpjpe, 1.0),
         draws=np.array([[float(loss(evidence.real)) for loss in losses], np.mean(twins, axis=1)]),
         resamples=np.stack([np.asarray(loss(evidence.resamples)) for loss in losses], axis=-1),
     )
@@ -92,7 +92,7 @@ def _response(evidence: Evidence, treatments: Sequence[Treatment], variant: str)
 def _change(
     treatment: Treatment,
     variant: str,
-    score: Callable[[Tally, HeadRule], Floats],
+    score: Callable[[ScoreSums, HeadRule], Floats],
     sign: float,
     rule: HeadRule,
 ) -> Figure:

@@ -13,14 +13,14 @@ from scipy.stats import rankdata
 from mvpose.arrays import Floats
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.validation.passes import RecordingChange, Tallies
-from simharness.reality.validation.tally import Tally
+from simharness.reality.validation.score_sums import ScoreSums
 from simharness.statistics.intervals import Interval, mean_interval
 from simharness.statistics.resampling import block_weights, interval
 
 RESAMPLES = 500
 """Number of bootstrap resamples of a recording's frames."""
 
-Sums = Mapping[RecordingChange, Mapping[str, Tally]]
+Sums = Mapping[RecordingChange, Mapping[str, ScoreSums]]
 """Tallies summed over frames, by change and variant: scalars, or one value for each of R resamples."""
 
 Figure = Callable[[Sums], "Floats | float"]
@@ -102,9 +102,9 @@ class Evidence:
         """
         weights = frame_weights(recording)
         return cls(
-            _each(real, Tally.total),
+            _each(real, ScoreSums.total),
             _each(real, lambda tally: tally.resampled(weights)),
-            tuple(_each(twin, Tally.total) for twin in twins),
+            tuple(_each(twin, ScoreSums.total) for twin in twins),
         )
 
     def compare(self, figure: Figure) -> Compared:
@@ -155,8 +155,8 @@ def _spearman(one: Floats, other: Floats) -> float:
 
 
 def _each(
-    tallies: Mapping[RecordingChange, Tallies], function: Callable[[Tally], Tally]
-) -> dict[RecordingChange, dict[str, Tally]]:
+    tallies: Mapping[RecordingChange, Tallies], function: Callable[[ScoreSums], ScoreSums]
+) -> dict[RecordingChange, dict[str, ScoreSums]]:
     return {change: {name: function(each) for name, each in of.items()} for change, of in tallies.items()}
 
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from mvpose import preset
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.validation.frame_scores import FrameScores, score_frames
-from simharness.reality.validation.tally import Tally
+from simharness.reality.validation.score_sums import ScoreSums
 from simharness.runtime.frame_pool import map_frames
+from simharness.scoring.frame_scores import ByRule, score_by_rules
 from simharness.trial.conditions import estimate_frames
 
 VARIANTS = ("full", "fast", "no-3dps", "no-matching")
@@ -61,7 +61,7 @@ def annotated(recording: AnnotatedRecording, *, every: int = 1) -> AnnotatedReco
     return recording.during(rows[::every])
 
 
-def frame_scores(recording: AnnotatedRecording, variant: str) -> FrameScores:
+def frame_scores(recording: AnnotatedRecording, variant: str) -> ByRule:
     """Return the scores of a variant in all frames of a recording.
 
     Args:
@@ -72,7 +72,7 @@ def frame_scores(recording: AnnotatedRecording, variant: str) -> FrameScores:
         ValueError: an unknown preset.
     """
     estimates = estimate_frames(preset(variant), recording.rig, recording.detections)
-    return score_frames(recording.truth, [each.joints for each in estimates])
+    return score_by_rules(recording.truth, [each.joints for each in estimates])
 
 
 def score_recordings(
@@ -81,7 +81,7 @@ def score_recordings(
     variants: Sequence[str] = VARIANTS,
     workers: int = 1,
     progress: Callable[[int], None] = lambda recordings: None,
-) -> list[dict[str, FrameScores]]:
+) -> list[dict[str, ByRule]]:
     """Return the scores of all frames by variant, for each recording.
 
     Args:
@@ -95,7 +95,7 @@ def score_recordings(
     return [each for chunk in chunks for each in chunk]
 
 
-Tallies = Mapping[str, Tally]
+Tallies = Mapping[str, ScoreSums]
 """Tallies of the frames of a recording by variant."""
 
 
@@ -130,7 +130,7 @@ class _Scores:
     recordings: tuple[AnnotatedRecording, ...]
     variants: tuple[str, ...]
 
-    def __call__(self, frames: range, /) -> list[dict[str, FrameScores]]:
+    def __call__(self, frames: range, /) -> list[dict[str, ByRule]]:
         """Return the scores of these recordings."""
         return [{name: frame_scores(self.recordings[index], name) for name in self.variants} for index in frames]
 
@@ -146,11 +146,11 @@ class _Passes:
     def __len__(self) -> int:
         return len(self.recordings) * len(self.changes)
 
-    def __call__(self, frames: range, /) -> list[dict[str, Tally]]:
+    def __call__(self, frames: range, /) -> list[dict[str, ScoreSums]]:
         """Return the tallies of these passes."""
         done = []
         for index in frames:
             change, recording = divmod(index, len(self.recordings))
             changed = self.changes[change](self.recordings[recording])
-            done.append({name: Tally.of(frame_scores(changed, name), changed.scored) for name in self.variants})
+            done.append({name: ScoreSums.of(frame_scores(changed, name), changed.scored) for name in self.variants})
         return done

@@ -12,8 +12,8 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.reality.validation.evidence import Compared, Evidence, Figure, Sums, rank_correlation
-from simharness.reality.validation.frame_scores import RULES, HeadRule
 from simharness.reality.validation.passes import CameraSubset
+from simharness.scoring.frame_scores import RULES, HeadRule
 from simharness.statistics.intervals import Interval
 from simharness.types.random_streams import stream
 

@@ -12,7 +12,6 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.validation.detection_figures import DetectionFigures, compare_detections, measure_detections
 from simharness.reality.validation.dose import DoseResponse, compare_responses
 from simharness.reality.validation.evidence import Compared, Evidence, compared, frame_weights
-from simharness.reality.validation.frame_scores import RULES, FrameScores, HeadRule
 from simharness.reality.validation.passes import (
     VARIANTS,
     CameraSubset,
@@ -23,8 +22,8 @@ from simharness.reality.validation.passes import (
     run_passes,
     score_recordings,
 )
+from simharness.reality.validation.score_sums import ScoreSums
 from simharness.reality.validation.subsets import SubsetComparison, camera_subsets, compare_subsets
-from simharness.reality.validation.tally import Tally
 from simharness.reality.validation.treatments import treatments
 from simharness.reality.validation.variant_comparison import (
     JointDifficulty,
@@ -44,6 +43,7 @@ from simharness.reality.validation.verdicts import (
     judge_scores,
     judge_subsets,
 )
+from simharness.scoring.frame_scores import RULES, ByRule, FrameScores, HeadRule
 
 
 @dataclass(frozen=True)
@@ -178,14 +178,14 @@ def _compare(
     twins: Sequence[AnnotatedRecording],
     plan: ValidationPlan,
     bounds: Bounds,
-    scores: Sequence[Mapping[str, FrameScores]],
+    scores: Sequence[Mapping[str, ByRule]],
     measurements: Sequence[DetectionFigures],
     evidence: Evidence,
 ) -> Validation:
     """Return the comparison, from the scores, the measurements and the passes of all recordings."""
     everyone = (real, *twins)
     tallies: list[dict[RecordingChange, Tallies]] = [
-        {Unchanged(): {name: Tally.of(of, each.scored) for name, of in variants.items()}}
+        {Unchanged(): {name: ScoreSums.of(of, each.scored) for name, of in variants.items()}}
         for each, variants in zip(everyone, scores, strict=True)
     ]
     whole = Evidence.of(real, tallies[0], tallies[1:])
@@ -208,14 +208,14 @@ def _compare(
         twin_frames=float(np.mean([len(twin) for twin in twins])),
         plan=plan,
         variants=variants,
-        medians={name: _plain([median_error(each[name]) for each in scores]) for name in plan.variants},
-        parts={name: _parts(everyone, [each[name] for each in scores]) for name in plan.variants},
+        medians={name: _plain([median_error(each[name][RULES[0]]) for each in scores]) for name in plan.variants},
+        parts={name: _parts(everyone, [each[name][RULES[0]] for each in scores]) for name in plan.variants},
         contrasts=contrasts,
         subsets=subsets,
         subsets_as_is=compare_subsets(evidence, cameras, plan.variants, rule=RULES[0]),
         responses=responses,
         bases={name: _base(evidence, name) for name in plan.variants},
-        joints=compare_joints(scores[0][first], [each[first] for each in scores[1:]]),
+        joints=compare_joints(scores[0][first][RULES[0]], [each[first][RULES[0]] for each in scores[1:]]),
         measured=measured,
         affinities={
             key: (real_shares, np.mean([each.affinities[key] for each in measurements[1:]], axis=0))

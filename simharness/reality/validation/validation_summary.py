@@ -9,11 +9,11 @@ from mvpose import SHELF14
 from simharness.reality.validation.detection_figures import AFFINITY_EDGES
 from simharness.reality.validation.dose import DoseResponse
 from simharness.reality.validation.evidence import Compared, number
-from simharness.reality.validation.frame_scores import RULES, HeadRule
 from simharness.reality.validation.subsets import SubsetComparison
 from simharness.reality.validation.validation import Validation
 from simharness.reality.validation.variant_comparison import SCORES
 from simharness.reality.validation.verdicts import BoundVerdict, VerdictState
+from simharness.scoring.frame_scores import RULES, HeadRule
 from simharness.statistics.intervals import Interval
 
 if TYPE_CHECKING:

@@ -10,18 +10,18 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.reality.validation.evidence import Compared, Evidence, Figure, rank_correlation
-from simharness.reality.validation.frame_scores import RULES, FrameScores, HeadRule
 from simharness.reality.validation.passes import Unchanged
-from simharness.reality.validation.tally import Tally
+from simharness.reality.validation.score_sums import ScoreSums
+from simharness.scoring.frame_scores import RULES, FrameScores, HeadRule
 from simharness.scoring.joint_errors import pck
 from simharness.scoring.pcp import GROUPS, Part
 
-SCORES: Mapping[str, Callable[[Tally, HeadRule], Floats]] = {
-    "pcp": Tally.pcp,
-    "mpjpe_mm": Tally.mpjpe,
-    "recall": Tally.recall,
-    "precision": Tally.precision,
-    "ghosts_per_frame": Tally.ghosts,
+SCORES: Mapping[str, Callable[[ScoreSums, HeadRule], Floats]] = {
+    "pcp": ScoreSums.pcp,
+    "mpjpe_mm": ScoreSums.mpjpe,
+    "recall": ScoreSums.recall,
+    "precision": ScoreSums.precision,
+    "ghosts_per_frame": ScoreSums.ghosts,
 }
 """Scores of a variant by key: PCP in percent, recall and precision from 0 to 1."""
 
@@ -53,7 +53,7 @@ def compare_contrasts(
     }
 
 
-def _figure(score: Callable[[Tally, HeadRule], Floats], variant: str, rule: HeadRule) -> Figure:
+def _figure(score: Callable[[ScoreSums, HeadRule], Floats], variant: str, rule: HeadRule) -> Figure:
     return lambda sums: score(sums[_UNCHANGED][variant], rule)
 
 
@@ -87,7 +87,7 @@ class JointDifficulty:
 
 
 def compare_joints(real: FrameScores, twins: Sequence[FrameScores]) -> JointDifficulty:
-    """Compare the errors of joints of one variant, by the first rule for the head."""
+    """Compare the errors of joints of one variant."""
     of_twins = [_joint_errors(each) for each in twins]
     real_mm, real_pck = _joint_errors(real)
     twin_mm, twin_pck = (np.mean(each, axis=0) for each in zip(*of_twins, strict=True))
@@ -96,25 +96,22 @@ def compare_joints(real: FrameScores, twins: Sequence[FrameScores]) -> JointDiff
 
 def _joint_errors(scores: FrameScores) -> tuple[Floats, Floats]:
     """Return the mean error, mm, and the share within :data:`PCK_LIMIT`, percent, of each joint, (14,)."""
-    errors = scores.errors[0].reshape(-1, scores.errors.shape[-1])
-    missed = (scores.present & ~scores.found[0]).ravel()
+    errors = scores.errors.reshape(-1, scores.errors.shape[-1])
+    missed = (scores.present & ~scores.found).ravel()
     counted = np.where(missed[:, None], np.inf, errors)
     mean = [1000.0 * column[np.isfinite(column)].mean() if np.isfinite(column).any() else np.nan for column in errors.T]
     return np.array(mean), np.array([pck(column, [PCK_LIMIT])[0] for column in counted.T])
 
 
-def median_error(scores: FrameScores, rule: HeadRule = RULES[0]) -> float:
+def median_error(scores: FrameScores) -> float:
     """Return the median over pairs of the mean joint error, mm; NaN without a pair."""
-    at = RULES.index(rule)
-    errors = scores.errors[at][scores.found[at]]
-    joints = np.isfinite(errors)
-    means = np.where(joints, errors, 0.0).sum(axis=-1) / np.maximum(joints.sum(axis=-1), 1)
+    means = scores.error[scores.found]
     return float(1000.0 * np.median(means)) if len(means) else float("nan")
 
 
-def pcp_of_parts(scores: FrameScores, actors: Sequence[int], rule: HeadRule = RULES[0]) -> dict[str, float]:
+def pcp_of_parts(scores: FrameScores, actors: Sequence[int]) -> dict[str, float]:
     """Return the PCP of each group of parts, percent, mean over the actors; NaN where undefined."""
-    parts = scores.parts[RULES.index(rule)][:, list(actors)]
+    parts = scores.parts[:, list(actors)]
     result = {}
     for group, index in GROUPS.items():
         chosen = parts[..., list(index)]

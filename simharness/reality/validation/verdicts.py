@@ -17,9 +17,9 @@ from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.validation.detection_figures import BONES, TREE
 from simharness.reality.validation.dose import DoseResponse
 from simharness.reality.validation.evidence import Compared
-from simharness.reality.validation.frame_scores import HeadRule
 from simharness.reality.validation.subsets import SubsetComparison
 from simharness.reality.validation.treatments import KINDS
+from simharness.scoring.frame_scores import HeadRule
 from simharness.statistics.intervals import Interval
 
 _ROUNDING = 1e-9  # correlations of few ranks are round numbers, such as 0.8

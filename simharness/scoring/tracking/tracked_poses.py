@@ -13,7 +13,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.skeleton import HeadMapping
-from simharness.scoring.frame import on_shelf14
+from simharness.scoring.frame_scores import on_shelf14
 from simharness.scoring.pcp import part_states, percent
 from simharness.scoring.score_registry import finite_mean
 from simharness.scoring.tracking.identity_scores import IdentityScores, identity_scores

@@ -5,7 +5,7 @@ import pytest
 
 from simharness.reality.seed_evaluation import annotate, evaluate_seeds, pcp_interval
 from simharness.scenario.load import load
-from simharness.scoring.frame import score_frame
+from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.score_summary import VariantScores
 from simharness.trial.run_trial import run_trial
 
@@ -47,12 +47,11 @@ def test_pcp_is_a_mean_over_people_and_intervals_widen_with_variance():
 
     def recording(correct):
         """Return frames in which person 0 is always correct and person 1 with probability ``correct``."""
-        frames = []
+        estimates = []
         for good in rng.random(100) < correct:
-            estimate = truth.copy()
-            estimate[1] += 0.0 if good else 50.0
-            frames.append(score_frame(truth, estimate))
-        return VariantScores(tuple(frames))
+            estimates.append(truth.copy())
+            estimates[-1][1] += 0.0 if good else 50.0
+        return VariantScores(score_frames(np.stack([truth] * 100), estimates))
 
     half = pcp_interval([recording(0.5)], (0, 1), rate=10.0)
     assert half.pcp == pytest.approx(75, abs=8)

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
 
-from mvpose.skeleton import coco17_to_shelf14
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.recording_file import read_recording
 from simharness.scenario.shipped import shipped_folder
-from simharness.scoring.pairing import pair
-from simharness.scoring.pcp import percent, score_parts
+from simharness.scoring.frame_scores import score_frames
+from simharness.scoring.pcp import percent
 
 
 @pytest.fixture(scope="module")
@@ -66,16 +65,13 @@ def test_detections_and_truth_belong_to_the_same_frames(shelf):
 )
 def test_true_correspondences_reach_the_published_scores(shelf, head, actors, average):
     """The whole protocol: detections assigned to true people by projection, then score-weighted DLT."""
-    parts, errors = [], []
-    for truth, detections in zip(shelf.truth, shelf.detections, strict=True):
-        estimate = coco17_to_shelf14(_triangulate_true_people(shelf, truth, detections), head=head)
-        parts.append(score_parts(truth, estimate))
-        errors.extend(pair(truth, estimate).error)
-    scores = [percent(np.stack(parts)[:, actor]) for actor in range(3)]
+    frames = zip(shelf.truth, shelf.detections, strict=True)
+    made = score_frames(shelf.truth, [_triangulate_true_people(shelf, *each) for each in frames], head=head)
+    scores = [percent(made.parts[:, actor]) for actor in range(3)]
     np.testing.assert_allclose(scores, actors, atol=0.3)
     assert np.mean(scores) == pytest.approx(average, abs=0.3)
     if head == "voxelpose":
-        assert 1000 * np.nanmedian(errors) == pytest.approx(47, abs=1)
+        assert 1000 * np.nanmedian(made.error) == pytest.approx(47, abs=1)
 
 
 _LIMBS = [16, 14, 12, 11, 13, 15, 10, 8, 6, 5, 7, 9]  # COCO-17 joints of SHELF14's first twelve

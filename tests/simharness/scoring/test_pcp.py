@@ -4,7 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mvpose import SHELF14
-from simharness.scoring.pcp import GROUPS, PARTS, Part, nearest, percent, score_parts
+from simharness.scoring.frame_scores import score_frames
+from simharness.scoring.pairing import mean_distances
+from simharness.scoring.pcp import GROUPS, PARTS, Part, nearest, percent
 
 # A person whose coordinates are multiples of 1/8 m, so that every length below is exact in floating point.
 # fmt: off
@@ -17,6 +19,11 @@ PERSON = np.array([
 ])
 # fmt: on
 LENGTHS = dict(zip(PARTS, (0.5, 0.5, 0.5, 0.5, 0.25, 0.375, 0.375, 0.25, 0.25, 0.5), strict=True))
+
+
+def score_parts(truth, estimate):
+    """Return the parts of the people of one frame, (P, 10)."""
+    return score_frames(truth[None], [estimate]).parts[0]
 
 
 def wrong_parts(truth, estimate):
@@ -82,10 +89,10 @@ def test_a_missing_joint_makes_its_parts_wrong_and_no_other():
 
 def test_a_missing_joint_does_not_count_in_the_distance():
     incomplete = moved("right_ankle", np.nan)
-    assert nearest(PERSON[None], np.stack([PERSON + 0.01, incomplete])).tolist() == [1]
+    assert nearest(mean_distances(PERSON[None], np.stack([PERSON + 0.01, incomplete]))).tolist() == [1]
     nothing = np.full((14, 3), np.nan)
-    assert nearest(PERSON[None], np.stack([nothing, PERSON + 3.0])).tolist() == [1]
-    assert nearest(PERSON[None], nothing[None]).tolist() == [-1]
+    assert nearest(mean_distances(PERSON[None], np.stack([nothing, PERSON + 3.0]))).tolist() == [1]
+    assert nearest(mean_distances(PERSON[None], nothing[None])).tolist() == [-1]
 
 
 def test_pcp_ignores_ghosts():
@@ -139,5 +146,5 @@ def test_agrees_with_the_protocol_written_as_loops(seed):
 
 
 def test_a_wrong_shape_is_named():
-    with pytest.raises(ValueError, match=r"estimate must be \(n, 14, 3\), got \(1, 17, 3\)"):
-        score_parts(PERSON[None], np.zeros((1, 17, 3)))
+    with pytest.raises(ValueError, match=r"estimate must be \(n, J, 3\), got \(17, 3\)"):
+        score_frames(PERSON[None, None], [np.zeros((17, 3))])

@@ -20,6 +20,7 @@ from simharness.scenario.sections.method_section import MethodSection
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import RenderingSection, Scenario
+from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.score_summary import VariantScores
 from simharness.trial import run_trial
 from simharness.trial.run_folder import read_run
@@ -195,7 +196,7 @@ class TestScoring:
         np.testing.assert_allclose(frame_costs(table, "a"), [530.0, 1002.0, 30.0])
 
     def test_a_table_without_frames_has_no_rows(self):
-        assert running.score_table({"full": VariantScores(())}).height == 0
+        assert running.score_table({"full": VariantScores(score_frames(np.zeros((0, 0, 17, 3)), []))}).height == 0
 
 
 def test_without_colour_there_is_no_film_and_the_same_detections(tmp_path, done):

@@ -9,9 +9,9 @@ import pytest
 from turning_people import walkers
 
 from simharness.reality.validation.evidence import Evidence
-from simharness.reality.validation.frame_scores import RULES
 from simharness.reality.validation.passes import CameraSubset, Unchanged, annotated, run_passes
 from simharness.reality.validation.subsets import camera_subsets, compare_subsets, subset_curve
+from simharness.scoring.frame_scores import RULES
 
 
 def test_five_cameras_have_26_subsets():

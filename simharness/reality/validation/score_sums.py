@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.reality.validation.frame_scores import RULES, FrameScores, HeadRule
+from simharness.scoring.frame_scores import RULES, ByRule, HeadRule
 from simharness.scoring.pcp import Part
 from simharness.statistics.resampling import resampled
 
@@ -16,7 +16,7 @@ DEFAULT_RULE = RULES[0]
 
 
 @dataclass(frozen=True)
-class Tally:
+class ScoreSums:
     """Sums of a variant's scores over frames, by the H rules of ``RULES``.
 
     The leading axes (...) are the frames, the resamples of a bootstrap, or absent.
@@ -40,33 +40,34 @@ class Tally:
     frames: Floats
 
     @classmethod
-    def of(cls, scores: FrameScores, actors: Sequence[int]) -> Tally:
-        """Return the tally of each frame.
+    def of(cls, scores: ByRule, actors: Sequence[int]) -> ScoreSums:
+        """Return the sums of each frame alone.
 
         Args:
-            scores: scores of F frames.
+            scores: scores of F frames by rule.
             actors: indices of the S actors whose PCP is averaged.
         """
-        parts = np.moveaxis(scores.parts[:, :, list(actors)], 0, 1)
-        joints = np.isfinite(scores.errors)
-        error = np.where(joints, scores.errors, 0.0).sum(axis=-1) / np.maximum(joints.sum(axis=-1), 1)
+        by_rule = [scores[rule] for rule in RULES]
+        first = by_rule[0]  # who is there, and how many estimates, does not depend on the rule
+        parts = np.stack([each.parts[:, list(actors)] for each in by_rule], axis=1)
+        error = np.stack([np.where(each.found, each.error, 0.0) for each in by_rule])
         return cls(
             correct=(parts == Part.CORRECT).sum(axis=-1, dtype=float),
             defined=(parts != Part.UNDEFINED).sum(axis=-1, dtype=float),
             error=1000.0 * error.sum(axis=-1).T,
-            found=scores.found.sum(axis=-1, dtype=float).T,
-            people=scores.present.sum(axis=-1, dtype=float),
-            estimates=scores.estimates.astype(float),
-            frames=np.ones(len(scores.estimates)),
+            found=np.stack([each.found.sum(axis=-1, dtype=float) for each in by_rule], axis=-1),
+            people=first.present.sum(axis=-1, dtype=float),
+            estimates=first.estimates.astype(float),
+            frames=np.ones(len(first)),
         )
 
-    def total(self) -> Tally:
+    def total(self) -> ScoreSums:
         """Return the sums over the first axis."""
-        return Tally(*(getattr(self, field.name).sum(axis=0) for field in fields(self)))
+        return ScoreSums(*(getattr(self, field.name).sum(axis=0) for field in fields(self)))
 
-    def resampled(self, weights: Floats) -> Tally:
+    def resampled(self, weights: Floats) -> ScoreSums:
         """Return the sums of R resamples of F frames, from :func:`~simharness.statistics.resampling.block_weights`."""
-        return Tally(*(resampled(getattr(self, field.name), weights) for field in fields(self)))
+        return ScoreSums(*(resampled(getattr(self, field.name), weights) for field in fields(self)))
 
     def pcp(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
         """Return PCP, percent (...), mean over the scored actors who are annotated in some frame."""
