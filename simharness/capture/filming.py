@@ -38,7 +38,7 @@ PREVIEW = 320  # width of the reduced pictures, pixels
 class Observation:
     """Ground truth of one picture of one camera: the arrays of :class:`Views` without the axes T and V.
 
-    ``lookalike_pixels`` (D, J, 2) and ``lookalike_visible`` (D, J) are those of ``Lookalikes.of(scene)``.
+    ``lookalike_pixels`` (D, J, 2) and ``lookalike_visible`` (D, J) are those of ``Lookalikes.from_scene(scene)``.
     """
 
     pixels: NDArray[np.float64]
@@ -73,7 +73,7 @@ class PictureObserver:
 
     def __init__(self, playback: Playback, renderer: Renderer) -> None:
         self._scene = playback.scene
-        self._lookalikes = Lookalikes.of(playback.scene)
+        self._lookalikes = Lookalikes.from_scene(playback.scene)
         self._renderer = renderer
         people = len(self._scene.bodies)
         radii = [body.joint_radii for body in self._scene.bodies]
@@ -135,7 +135,7 @@ def film(
     pixels = np.full((*shape, joints, 2), np.nan)
     visibility = np.full((*shape, joints), int(Visibility.OUTSIDE), np.int8)
     boxed, area = np.zeros((*shape, 4)), np.zeros(shape, np.int64)
-    lookalikes = Lookalikes.of(playback.scene)
+    lookalikes = Lookalikes.from_scene(playback.scene)
     names = lookalikes.names
     lookalike_pixels = np.full((*shape[:2], len(names), joints, 2), np.nan)
     lookalike_visible = np.zeros(lookalike_pixels.shape[:-1], bool)

@@ -50,7 +50,7 @@ class RayObserver:
         self._caster = RayCaster(playback.scene)
         self._radii = np.reshape([body.joint_radii for body in bodies], (len(bodies), 17))
         self._outlines = [Outline.of(body) for body in bodies]
-        self._lookalikes = Lookalikes.of(playback.scene)
+        self._lookalikes = Lookalikes.from_scene(playback.scene)
         self._cameras: CameraArrays | None = None  # those of the last observation
         self._allowed = np.concatenate([np.zeros(len(bodies)), self._lookalikes.allowed])
 

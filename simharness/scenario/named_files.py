@@ -24,9 +24,10 @@ def locate_files(data: dict[str, Any], folder: Path) -> None:
 
 def relative_files(settings: dict[str, Any]) -> Iterator[tuple[Key, str]]:
     """Yield the keys of a scenario that name files by relative paths, and those paths."""
-    for key, value in _file_values(settings):
-        if _is_file(key, value) and not Path(value).is_absolute():
-            yield key, value
+    for key, values in _file_values(settings):
+        for value in values if isinstance(values, list) else [values]:
+            if _is_file(key, value) and not Path(value).is_absolute():
+                yield key, value
 
 
 def _settings(data: dict[str, Any]) -> Iterator[Any]:
@@ -59,7 +60,7 @@ def _section(settings: Any, names: Sequence[str]) -> dict[str, Any] | None:
 
 
 def _located(key: Key, value: Any, folder: Path) -> Any:
-    if isinstance(value, list):  # of a sweep
+    if isinstance(value, list):  # of files, or of a sweep
         return [_located(key, each, folder) for each in value]
     return str(folder / value) if _is_file(key, value) else value
 

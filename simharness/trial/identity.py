@@ -37,11 +37,12 @@ from mvpose.formats.calibration.camera_folder import calibration_files
 from simharness.runtime.code_digest import digest_of_folders
 from simharness.scenario.sections.scenario import FILE_KEYS, Scenario
 from simharness.trial.stages.estimators import sources_of
+from simharness.world.scene.objects.object_files import object_dependencies
 
 PACKAGES = ("mujoco", "numpy", "scipy", "numba", "opencv-python-headless", "onnxruntime", "pyrender2", "pillow")
 """Distributions whose versions are part of a trial's identity."""
 
-SIMULATION = ("types", "scenario/sections", "world", "capture", "detector", "trial/stages")
+SIMULATION = ("types", "scenario/sections", "assets", "world", "capture", "detector", "trial/stages")
 """Folders of ``simharness`` that make detections and estimates. Scenarios count as resolved, not how they are read."""
 
 BORROWED = ("formats/calibration", "wholebody")
@@ -148,6 +149,9 @@ def _files(scenario: Scenario) -> dict[str, list[Path]]:
     for key, file in scenario.named_files.items():
         files[key] = [file]
         suffix = file.suffix.lower()
+        if key.startswith("clutter.objects"):
+            files[key] = list(object_dependencies(file))
+            continue
         if suffix == ".onnx":  # the card beside a network
             files[key].append(file.with_suffix(".json"))
         elif suffix == ".amc":  # the skeleton beside a motion

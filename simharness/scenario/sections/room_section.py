@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from simharness.scenario.sections.section import Count, Elements, Length, Section, Share
 
@@ -64,11 +64,27 @@ class ClutterSection(Section):
     partitions: Count = 0
     plants: Count = 0
     carts: Count = Field(0, description="carts that move about")
+    objects: tuple[str, ...] = Field(
+        (),
+        max_length=50,
+        description="files of further objects, each placed once: MJCF (.xml), or OBJ (.obj) with its MTL; in metres, "
+        "z up, front towards +x; paths relative to the scenario file",
+    )
     coverage: Share | None = Field(
         None,
         description="share of the joints in the pictures that clutter hides, including joints that people hide as "
         "well; objects are added until it is reached",
     )
+
+    @field_validator("objects")
+    @classmethod
+    def _objects(cls, objects: tuple[str, ...]) -> tuple[str, ...]:
+        for file in objects:
+            if not file.lower().endswith((".xml", ".obj")):
+                raise ValueError(
+                    f"{file!r} is no file of an object: expected a name that ends in .xml (MJCF) or .obj (OBJ)"
+                )
+        return objects
 
 
 class DecoysSection(Section):

@@ -21,12 +21,14 @@ from simharness.scenario.sections.section import Section, Share, Span, Spread
 FILE_KEYS: tuple[tuple[str, ...], ...] = (
     ("people", "motion", "file"),
     ("people", "motion", "skeleton"),
+    ("clutter", "objects"),
     ("cameras", "file"),
     ("detector", "onnx"),
     ("appearance", "network"),
 )
-"""Keys whose values name files: recorded motion, calibration, networks. All code that handles such files uses this
-list: the paths are relative to the scenario file, and the contents count in the identity of results."""
+"""Keys whose values name files, one or a list: recorded motion, objects, calibration, networks. All code that handles
+such files uses this list: the paths are relative to the scenario file, and the contents count in the identity of
+results."""
 
 
 class AnnotationSection(Section):
@@ -96,8 +98,16 @@ class Scenario(Section):
 
     @property
     def named_files(self) -> dict[str, Path]:
-        """Files that the scenario names, by dotted key: those of :data:`FILE_KEYS` that are not empty."""
-        values = {".".join(key): reduce(getattr, key, self) for key in FILE_KEYS}
+        """Files that the scenario names, by dotted key: those of :data:`FILE_KEYS` that are not empty.
+
+        Those of a list have its key and their number: "clutter.objects.0".
+        """
+        values: dict[str, object] = {}
+        for key in FILE_KEYS:
+            name, value = ".".join(key), reduce(getattr, key, self)
+            values |= (
+                {f"{name}.{k}": each for k, each in enumerate(value)} if isinstance(value, tuple) else {name: value}
+            )
         return {key: Path(str(value)) for key, value in values.items() if value}
 
     @property

@@ -42,7 +42,7 @@ class Lookalikes:
     mirrors: tuple[Mirror, ...]
 
     @classmethod
-    def of(cls, scene: Scene) -> Lookalikes:
+    def from_scene(cls, scene: Scene) -> Lookalikes:
         """Return the lookalikes of a scene."""
         people = len(scene.bodies)
         with_figure = [(people + k, s.name, s.figure) for k, s in enumerate(scene.solids) if s.figure is not None]

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.checks import seal
+from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.prints import PRINTS
 from simharness.world.scene.rooms.noise import smooth_noise
@@ -27,7 +28,8 @@ Material = Literal["plain", "wood", "fabric", "metal", "leaves"]
 
 RESOLUTION = 320  # pixels per metre of a material
 _BORDER = 6  # pixels around each patch, so that mipmaps do not mix neighbours
-_WIDTH = 1024  # pixels: width of the sheet
+_GOLDEN = (5**0.5 - 1) / 2
+_WIDTH = 1024  # pixels: least width of the sheet
 
 
 @dataclass(frozen=True)
@@ -63,32 +65,60 @@ class Sheet:
         patch = self.patches[name]
         return np.array([patch.width, patch.height]) / RESOLUTION
 
+    def projected(self, mesh: Mesh, material: str, number: int) -> NDArray[np.float32]:
+        """Return the texture coordinates of a material on a mesh, (k, 3, 2).
+
+        The material is projected along the main axes of the mesh, with the grain along its longest extent.
+
+        Args:
+            mesh: the mesh.
+            material: name of the material.
+            number: number of the mesh among those of an object, which decides where on the material it begins.
+        """
+        corners = mesh.vertices[mesh.faces].astype(float)
+        low = mesh.vertices.min(axis=0)
+        extent = mesh.vertices.max(axis=0) - low
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        main = np.abs(normal).argmax(axis=1)
+        across = np.array([[b, c] if extent[b] >= extent[c] else [c, b] for b, c in ((1, 2), (0, 2), (0, 1))])[main]
+        place = np.take_along_axis(corners - low, np.repeat(across[:, None], 3, axis=1), axis=2)
+        patch = self.extent(material)
+        scale = np.minimum(1.0, 0.98 * patch / np.maximum(extent[across], 1e-6))
+        place = place * scale[:, None] / patch
+        spare = 1.0 - place.reshape(-1, 2).max(axis=0)
+        start = spare * [(number * _GOLDEN) % 1.0, (number * _GOLDEN**2) % 1.0]
+        return self.uv(material, place + start)
+
+    @classmethod
+    def packed(cls, pictures: Mapping[str, Floats]) -> Sheet:
+        """Return the sheet of pictures (h, w, 3) with values from 0 to 1.
+
+        They are packed on shelves, the highest ones first, each with a border that repeats its edge.
+        """
+        wide = max(_WIDTH, *(picture.shape[1] + 2 * _BORDER for picture in pictures.values()))
+        patches: dict[str, Patch] = {}
+        left = top = shelf = 0
+        for name in sorted(pictures, key=lambda n: (-len(pictures[n]), n)):
+            height, width = pictures[name].shape[:2]
+            if left + width + 2 * _BORDER > wide:
+                left, top, shelf = 0, top + shelf, 0
+            patches[name] = Patch(left + _BORDER, top + _BORDER, width, height)
+            left, shelf = left + width + 2 * _BORDER, max(shelf, height + 2 * _BORDER)
+        texture = np.full((top + shelf, wide, 3), 255, np.uint8)
+        for name, patch in patches.items():
+            bordered = np.pad(pictures[name], ((_BORDER,) * 2, (_BORDER,) * 2, (0, 0)), mode="edge")
+            rows = slice(patch.top - _BORDER, patch.top + patch.height + _BORDER)
+            columns = slice(patch.left - _BORDER, patch.left + patch.width + _BORDER)
+            texture[rows, columns] = np.round(255 * np.clip(bordered, 0, 1))
+        seal(texture)  # all meshes share it: renderers pack it once
+        return cls(texture, MappingProxyType(patches))
+
 
 @lru_cache(maxsize=2)
 def draw_sheet(seed: int) -> Sheet:
     """Draw the sheet of a scene; every patch is drawn by its own stream, so one more changes no other."""
     pictures = {name: draw(stream(seed, "room", "sheet", name)) for name, draw in {**_MATERIALS, **PRINTS}.items()}
-    return _packed(pictures)
-
-
-def _packed(pictures: Mapping[str, Floats]) -> Sheet:
-    """Pack pictures on shelves, the highest ones first, each with a border that repeats its edge."""
-    patches: dict[str, Patch] = {}
-    left = top = shelf = 0
-    for name in sorted(pictures, key=lambda n: (-len(pictures[n]), n)):
-        height, width = pictures[name].shape[:2]
-        if left + width + 2 * _BORDER > _WIDTH:
-            left, top, shelf = 0, top + shelf, 0
-        patches[name] = Patch(left + _BORDER, top + _BORDER, width, height)
-        left, shelf = left + width + 2 * _BORDER, max(shelf, height + 2 * _BORDER)
-    texture = np.full((top + shelf, _WIDTH, 3), 255, np.uint8)
-    for name, patch in patches.items():
-        bordered = np.pad(pictures[name], ((_BORDER,) * 2, (_BORDER,) * 2, (0, 0)), mode="edge")
-        rows = slice(patch.top - _BORDER, patch.top + patch.height + _BORDER)
-        columns = slice(patch.left - _BORDER, patch.left + patch.width + _BORDER)
-        texture[rows, columns] = np.round(255 * np.clip(bordered, 0, 1))
-    seal(texture)  # all meshes share it: renderers pack it once
-    return Sheet(texture, MappingProxyType(patches))
+    return Sheet.packed(pictures)
 
 
 def _plain(rng: np.random.Generator) -> Floats:

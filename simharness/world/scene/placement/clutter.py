@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from simharness.world.scene.objects.laboratory import (
     draw_shelf,
     draw_table,
 )
+from simharness.world.scene.objects.object_files import load_object
 from simharness.world.scene.objects.plants import draw_plant
 from simharness.world.scene.objects.solids import ObjectModel, Solid
 from simharness.world.scene.placement.free_space import (
@@ -86,7 +88,7 @@ CLUTTER_KINDS = (
 
 
 def place_clutter(seed: int, clutter: ClutterSection, space: FreeSpace) -> tuple[Solid, ...]:
-    """Draw the clutter and find a place for each object.
+    """Draw the clutter and find a place for each object, for those of files first.
 
     Each object is drawn and placed by a separate stream, so one more box moves none of the objects placed before it.
     Objects keep 0.5 m from cameras, and all objects at rest together fill at most 60 % of any picture. If people keep
@@ -96,6 +98,8 @@ def place_clutter(seed: int, clutter: ClutterSection, space: FreeSpace) -> tuple
         ValueError: no place is found for an object, or ``clutter.coverage`` cannot be reached.
     """
     site = Site(space)
+    for k, file in enumerate(clutter.objects):
+        site.add(_place_file(seed, Path(file), k, site))
     for kind in CLUTTER_KINDS:
         for k in range(getattr(clutter, kind.plural)):
             site.add(_place(seed, kind, k, site))
@@ -107,12 +111,33 @@ def place_clutter(seed: int, clutter: ClutterSection, space: FreeSpace) -> tuple
     return tuple(site.solids[len(space.taken) :])
 
 
+def _place_file(seed: int, file: Path, k: int, site: Site) -> Solid:
+    """Read the object of a file and find a place for it near people."""
+    model = load_object(file).model()
+    solid = _find(seed, "object", k, model, site, near_people, name=f"object{k} {file.stem}")
+    if solid is None:
+        size = " x ".join(f"{2 * half:.2f}" for half in model.extent.half)
+        raise ValueError(
+            f"clutter.objects: found no place for {file}, {size} m large, in {TRIES} tries, clear of "
+            f"{len(site.solids)} other objects, of the paths of people and of the cameras, and with 40 % of each "
+            f"picture free, in room.size = {list(site.space.room.size)}: scale the object if its lengths are not "
+            "metres, name fewer objects, lower people.count, or enlarge room.size"
+        )
+    return solid
+
+
+def _find(
+    seed: int, kind: str, k: int, model: ObjectModel, site: Site, sample_place: PlaceSampler, *, name: str
+) -> Solid | None:
+    """Return object k of a kind at a drawn place; the first object stands where people keep the middle free."""
+    rng = stream(seed, "clutter", kind, k, "place")
+    first = site.space.around > 0 and not any(solid.kind == "clutter" for solid in site.solids)
+    return site.find(rng, model, near_origin if first else sample_place, kind="clutter", name=name)
+
+
 def _place(seed: int, kind: ClutterKind, k: int, site: Site) -> Solid:
     model = kind.draw(stream(seed, "clutter", kind.name, k), site.space.room)
-    rng = stream(seed, "clutter", kind.name, k, "place")
-    name = f"{kind.name}{k}"
-    first = site.space.around > 0 and not any(solid.kind == "clutter" for solid in site.solids)
-    solid = site.find(rng, model, near_origin if first else kind.sample_place, kind="clutter", name=name)
+    solid = _find(seed, kind.name, k, model, site, kind.sample_place, name=f"{kind.name}{k}")
     if solid is None:
         raise ValueError(
             f"clutter.{kind.plural}: found no place for {kind.name} {k} in {TRIES} tries, clear of {len(site.solids)} "

@@ -8,14 +8,14 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.types.random_streams import stream
-from simharness.world.scene.objects.furnishing import Furnishing
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.materials import draw_sheet
+from simharness.world.scene.objects.object_files import load_shipped, variants
 from simharness.world.scene.objects.solids import ObjectModel, Solid
 from simharness.world.scene.placement.free_space import FreeSpace, Site
 from simharness.world.scene.placement.occlusion import lines_in
 from simharness.world.scene.placement.sight_lines import SightLines
-from simharness.world.scene.rooms.kinds import ROOM_KINDS
+from simharness.world.scene.rooms.kinds import furniture_of_rooms
 from simharness.world.scene.rooms.openings import Opening, Wall, room_walls
 
 _TRIES = 40  # places tried for one piece
@@ -26,9 +26,9 @@ _LINES = 3000  # lines of sight on which that is measured
 
 
 def place_furniture(seed: int, space: FreeSpace, openings: Sequence[Opening]) -> tuple[Solid, ...]:
-    """Draw the furniture of a room and find places along its walls, or along the edge of an open floor.
+    """Choose the furniture of a room and find places along its walls, or along the edge of an open floor.
 
-    Every piece is drawn and placed by its own streams. It stands outside the square in which people stay
+    Variant and place of every piece are drawn by streams of its own. It stands outside the square in which people stay
     (``people.area``), obstructs no person, keeps 0.5 m from cameras, leaves doors and windows free, and hides at most
     1 % of the joints in the pictures. A piece that finds no place is left out.
 
@@ -40,24 +40,21 @@ def place_furniture(seed: int, space: FreeSpace, openings: Sequence[Opening]) ->
     Raises:
         ValueError: the room has furniture, and no piece finds a place.
     """
-    kind = ROOM_KINDS[space.room.kind]
-    if not kind.furniture:
+    furniture = furniture_of_rooms().get(space.room.kind)
+    if not furniture:
         return ()
     site, sheet, walls = Site(space), draw_sheet(seed), room_walls(space.room)
     lines = _thinned(lines_in(space))
     area = Box((0.0, 0.0, 1.0), (space.area, space.area, 1.0)) if space.pelvises.size else None
     share = sum(wall.length for wall in walls) / _WALLS
     placed: list[Solid] = []
-    for furniture in kind.furniture:
-        low, high = furniture.count
-        number = int(stream(seed, "room", "furniture", furniture.name).integers(low, high + 1))
+    for name, (low, high) in furniture.items():
+        number = int(stream(seed, "room", "furniture", name).integers(low, high + 1))
         for k in range(max(1, round(share * number))):
-            key = ("room", "furniture", furniture.name, k)
-            made = Furnishing(sheet)
-            furniture.draw(made, stream(seed, *key))
-            solid = _find(
-                stream(seed, *key, "place"), made.model(), f"{furniture.name}{k}", site, walls, openings, area, lines
-            )
+            key = ("room", "furniture", name, k)
+            files = variants(name)
+            model = load_shipped(files[stream(seed, *key).integers(len(files))]).model(sheet)
+            solid = _find(stream(seed, *key, "place"), model, f"{name}{k}", site, walls, openings, area, lines)
             if solid is not None:
                 site.add(solid)
                 placed.append(solid)

@@ -1,30 +1,19 @@
-"""Kinds of rooms: their finishes, furniture, windows, lamps and what hangs on their walls."""
+"""Kinds of rooms: their finishes, windows, lamps, what hangs on their walls, and their furniture."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Literal
 
-import numpy as np
-
+from mvpose.files.input_files import parse_toml
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
-from simharness.world.scene.objects import gym, home, office, park, shop, stage, ward
-from simharness.world.scene.objects.furnishing import Furnishing
+from simharness.world.scene.objects.object_files import ASSETS
 
-Draw = Callable[[Furnishing, np.random.Generator], None]
 LampKind = Literal["panels", "tubes", "downlights", "pendants", "spots", "none"]
-
-
-@dataclass(frozen=True)
-class Furniture:
-    """Furniture of one name: how it is drawn, and how many stand at 28 m of walls (a room of 7 by 7 m)."""
-
-    name: str
-    draw: Draw
-    count: tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -33,7 +22,6 @@ class RoomKind:
 
     Attributes:
         floors, walls: finishes from which one is drawn.
-        furniture: furniture along the walls, in the order in which it finds its places.
         least: least size of the room, x, y, z, metres.
         windows: numbers of walls with windows, least and most.
         sill: height of the lower edge of the windows, metres.
@@ -44,7 +32,6 @@ class RoomKind:
 
     floors: tuple[str, ...]
     walls: tuple[str, ...]
-    furniture: tuple[Furniture, ...] = ()
     least: tuple[float, float, float] = (3.0, 3.0, 2.2)
     windows: tuple[int, int] = (1, 1)
     sill: float = 0.95
@@ -67,14 +54,6 @@ ROOM_KINDS: Mapping[str, RoomKind] = MappingProxyType(
         "office": RoomKind(
             floors=("carpet", "linoleum", "carpet_tiles"),
             walls=("plain", "tinted"),
-            furniture=(
-                Furniture("workstation", office.workstation, (2, 4)),
-                Furniture("cabinet", office.cabinet, (1, 3)),
-                Furniture("bookcase", office.bookcase, (1, 2)),
-                Furniture("printer", office.printer, (1, 1)),
-                Furniture("water cooler", office.water_cooler, (1, 1)),
-                Furniture("potted plant", office.potted_plant, (1, 3)),
-            ),
             windows=(1, 2),
             sill=0.8,
             prints=(("whiteboard", 1.9, 1.0), ("clock", 0.30, 0.30), *_NOTICES, *_POSTERS),
@@ -82,15 +61,6 @@ ROOM_KINDS: Mapping[str, RoomKind] = MappingProxyType(
         "living_room": RoomKind(
             floors=("parquet", "wood"),
             walls=("wallpaper", "tinted", "tinted", "stripes"),
-            furniture=(
-                Furniture("sofa", home.sofa, (1, 1)),
-                Furniture("television", home.television, (1, 1)),
-                Furniture("bookshelf", home.bookshelf, (1, 2)),
-                Furniture("dining table", home.dining_table, (1, 1)),
-                Furniture("armchair", home.armchair, (1, 1)),
-                Furniture("sideboard", home.sideboard, (1, 2)),
-                Furniture("potted plant", office.potted_plant, (1, 2)),
-            ),
             windows=(1, 2),
             sill=0.75,
             lamps="pendants",
@@ -99,16 +69,6 @@ ROOM_KINDS: Mapping[str, RoomKind] = MappingProxyType(
         "gym": RoomKind(
             floors=("sports_floor",),
             walls=("tinted", "brick", "panels"),
-            furniture=(
-                Furniture("wall bars", gym.wall_bars, (1, 2)),
-                Furniture("vaulting box", gym.vaulting_box, (1, 1)),
-                Furniture("gym bench", gym.bench, (1, 3)),
-                Furniture("mats", gym.mats, (1, 1)),
-                Furniture("ball trolley", gym.balls, (1, 1)),
-                Furniture("dumbbells", gym.dumbbells, (1, 1)),
-                Furniture("treadmill", gym.treadmill, (0, 2)),
-                Furniture("punching bag", gym.punching_bag, (0, 1)),
-            ),
             least=(4.0, 4.0, 2.6),
             windows=(1, 2),
             sill=1.5,
@@ -118,28 +78,12 @@ ROOM_KINDS: Mapping[str, RoomKind] = MappingProxyType(
         "ward": RoomKind(
             floors=("linoleum",),
             walls=("tinted", "tiled"),
-            furniture=(
-                Furniture("bed", ward.bed, (1, 3)),
-                Furniture("bedside cabinet", ward.bedside, (1, 3)),
-                Furniture("monitor", ward.monitor, (1, 1)),
-                Furniture("visitors' chairs", ward.visitors, (1, 1)),
-                Furniture("wardrobe", ward.wardrobe, (1, 1)),
-                Furniture("screen on wheels", ward.screen_on_wheels, (0, 1)),
-            ),
             windows=(1, 2),
             prints=(("clock", 0.32, 0.32), ("landscape1", 0.8, 0.53), ("landscape0", 0.6, 0.4), *_NOTICES),
         ),
         "shop": RoomKind(
             floors=("tiles", "wood", "concrete"),
             walls=("plain", "tinted", "brick"),
-            furniture=(
-                Furniture("counter", shop.counter, (1, 1)),
-                Furniture("goods", shop.goods, (3, 6)),
-                Furniture("fridge", shop.fridge, (1, 1)),
-                Furniture("clothes rail", shop.clothes, (1, 2)),
-                Furniture("display table", shop.display, (1, 1)),
-                Furniture("stock", shop.stock, (1, 2)),
-            ),
             windows=(1, 1),
             sill=0.4,
             lamps="downlights",
@@ -148,15 +92,6 @@ ROOM_KINDS: Mapping[str, RoomKind] = MappingProxyType(
         "stage": RoomKind(
             floors=("stage_boards",),
             walls=("curtain",),
-            furniture=(
-                Furniture("drums", stage.drums, (1, 1)),
-                Furniture("loudspeaker", stage.loudspeaker, (2, 2)),
-                Furniture("piano", stage.piano, (1, 1)),
-                Furniture("amplifier", stage.amplifier, (1, 2)),
-                Furniture("microphone", stage.microphone, (1, 2)),
-                Furniture("flight cases", stage.cases, (1, 2)),
-                Furniture("floodlight", stage.floodlight, (1, 2)),
-            ),
             least=(4.0, 4.0, 2.6),
             windows=(0, 0),
             lamps="spots",
@@ -165,15 +100,6 @@ ROOM_KINDS: Mapping[str, RoomKind] = MappingProxyType(
         "outdoors": RoomKind(
             floors=("paving", "asphalt", "grass"),
             walls=("plain",),
-            furniture=(
-                Furniture("lamp post", park.lamp_post, (1, 2)),
-                Furniture("park bench", park.park_bench, (1, 3)),
-                Furniture("planter", park.planter, (1, 3)),
-                Furniture("hedge", park.hedge, (1, 3)),
-                Furniture("small tree", park.small_tree, (1, 2)),
-                Furniture("litter bin", park.litter_bin, (1, 1)),
-                Furniture("bicycle", park.bicycle, (1, 2)),
-            ),
             windows=(0, 0),
             lamps="none",
             doors=False,
@@ -216,3 +142,16 @@ def check_size(room: RoomSection) -> None:
             f'room.kind = "{room.kind}" needs a room of at least {least[0]:g} by {least[1]:g} m, {least[2]:g} m high, '
             f'got room.size = {list(room.size)}: enlarge room.size, or use room.kind = "laboratory", which fits any'
         )
+
+
+@lru_cache(maxsize=1)
+def furniture_of_rooms() -> Mapping[str, Mapping[str, tuple[int, int]]]:
+    """Return the furniture by the kind of its room, from ``rooms.toml`` of the shipped objects.
+
+    The pieces are in the order in which they find their places along the walls, each with the least and largest number
+    at 28 m of walls (a room of 7 by 7 m). A laboratory has no furniture.
+    """
+    table = parse_toml((ASSETS / "rooms.toml").read_text(encoding="utf-8"))
+    return MappingProxyType(
+        {kind: {name: (low, high) for name, (low, high) in each.items()} for kind, each in table.items()}
+    )

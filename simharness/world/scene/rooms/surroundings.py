@@ -16,11 +16,10 @@ from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.light_sources import Vector
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
-from simharness.world.scene.objects.foliage import crown, leaf_color, put_tree, sprays
-from simharness.world.scene.objects.furnishing import Furnishing
-from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.geoms import Box, carried
 from simharness.world.scene.objects.materials import draw_sheet
-from simharness.world.scene.objects.shapes import quad_mesh
+from simharness.world.scene.objects.object_files import load_shipped, variants
+from simharness.world.scene.objects.shapes import joined, quad_mesh
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.noise import smooth_noise
 
@@ -37,6 +36,7 @@ _CLEAR = 3.0  # metres between the circle around floor and cameras, and trees an
 _RINGS, _PER_SIDE = 22, 22  # cells of the meadow outwards, and along each side
 _PATCH, _PIXELS = 30.0, 512  # metres and pixels of the texture of the meadow
 _TREES, _SHRUBS = (9, 16), (8, 14)
+_TREE_SCALE, _SHRUB_SCALE = (0.75, 1.5), (0.6, 1.3)  # of trees of 6 m and shrubs of about 1 m
 
 
 def make_surroundings(room: RoomSection, seed: int, rig: Rig) -> tuple[Solid, ...]:
@@ -90,20 +90,17 @@ def _lawn(rng: np.random.Generator) -> np.ndarray:
 
 def _plants(seed: int, clear: float) -> Mesh:
     """Return trees and shrubs outside a circle around the origin."""
-    made = Furnishing(draw_sheet(seed))
-    rng = stream(seed, "room", "far plants")
+    sheet, rng = draw_sheet(seed), stream(seed, "room", "far plants")
     trees, shrubs = (int(rng.integers(low, high + 1)) for low, high in (_TREES, _SHRUBS))
-    for k in range(trees):
-        rng = stream(seed, "room", "far tree", k)
-        tall, far, turn = rng.uniform(4.5, 9.0), rng.uniform(0, 1) ** 1.3 * 24.0, rng.uniform(0, 2 * np.pi)
-        away = clear + 0.45 * tall + far
-        put_tree(made, rng, tall, at=(away * np.cos(turn), away * np.sin(turn)), leaves=45, rows=6, sides=9)
-    for k in range(shrubs):
-        rng = stream(seed, "room", "far shrub", k)
-        half = (rng.uniform(0.5, 1.3), rng.uniform(0.5, 1.3), rng.uniform(0.4, 0.9))
-        far, turn, color = rng.uniform(0, 18), rng.uniform(0, 2 * np.pi), leaf_color(rng)
-        away = clear + 1.5 + far
-        place = (away * np.cos(turn), away * np.sin(turn), 0.75 * half[2])
-        made.part(crown(rng, half, color, rows=6, sides=10), "leaves", center=place)
-        made.part(sprays(rng, half, color, 60, 0.16), "leaves", center=place)
-    return made.mesh()
+    plants = [(stream(seed, "room", "far tree", k), "far_tree", _TREE_SCALE, 24.0, 3.0) for k in range(trees)]
+    plants += [(stream(seed, "room", "far shrub", k), "far_shrub", _SHRUB_SCALE, 18.0, 1.5) for k in range(shrubs)]
+    meshes = []
+    for rng, name, scales, reach, crown in plants:
+        files = variants(name)
+        mesh = load_shipped(files[rng.integers(len(files))]).mesh(sheet)
+        scale, far, turn, yaw = rng.uniform(*scales), rng.uniform() ** 1.3 * reach, *rng.uniform(0, 2 * np.pi, 2)
+        away = clear + scale * crown + far
+        place = (away * np.cos(turn), away * np.sin(turn))
+        meshes.append(mesh.moved(carried(scale * mesh.vertices, place, yaw)))
+    uv = np.concatenate([mesh.uv for mesh in meshes if mesh.uv is not None])
+    return replace(joined(*meshes), texture=sheet.texture, uv=uv)

@@ -19,11 +19,11 @@ from simharness.world.scene.placement.free_space import LENS
 from simharness.world.scene.placement.furniture import place_furniture
 from simharness.world.scene.playback import simulate
 from simharness.world.scene.rooms.fittings import make_fittings
-from simharness.world.scene.rooms.kinds import ROOM_KINDS, check_size, settled
+from simharness.world.scene.rooms.kinds import ROOM_KINDS, check_size, furniture_of_rooms, settled
 from simharness.world.scene.rooms.openings import draw_openings
 from simharness.world.scene.rooms.shell import make_room
 
-KINDS = [name for name, kind in ROOM_KINDS.items() if kind.furniture]
+KINDS = list(furniture_of_rooms())
 
 
 def furnished(kind, *, size=(7.0, 7.0, 3.0), people=3, area=1.8, seed=1):

@@ -66,7 +66,7 @@ def compared(seed):
 
 class TestInSpace:
     def test_figures_come_first_and_then_everyone_in_every_mirror(self):
-        lookalikes = Lookalikes.of(played()[0].scene)
+        lookalikes = Lookalikes.from_scene(played()[0].scene)
         assert lookalikes.names == (
             *("poster0", "mannequin0", "coat stand0"),
             *(f"mirror{m}/person{p}" for m in range(2) for p in range(PEOPLE)),
@@ -75,14 +75,14 @@ class TestInSpace:
         assert [names[k] for k in lookalikes.mesh] == [name.split("/")[0] for name in lookalikes.names]
 
     def test_only_the_poster_has_a_front(self):
-        lookalikes = Lookalikes.of(played()[0].scene)
+        lookalikes = Lookalikes.from_scene(played()[0].scene)
         assert lookalikes.fronts.any(axis=1).tolist() == [True, False, False]
 
     def test_a_reflection_is_a_person_whose_left_is_left(self):
         """Seen from where the nose points, the left shoulder is to the right: of people and of their reflections."""
         playback, _ = played()
         people = playback.at(0.3).joints
-        joints = Lookalikes.of(playback.scene).joints(people[None])[0]
+        joints = Lookalikes.from_scene(playback.scene).joints(people[None])[0]
         assert joints.shape == (3 + 2 * PEOPLE, 17, 3)
         for figure in (*people, *joints[1:]):  # the first is flat
             nose, ears = figure[0], figure[3:5].mean(axis=0)
@@ -91,7 +91,7 @@ class TestInSpace:
     def test_reflections_lie_as_far_behind_the_glass_as_people_before_it(self):
         playback, _ = played()
         people = playback.at(0.3).joints
-        lookalikes = Lookalikes.of(playback.scene)
+        lookalikes = Lookalikes.from_scene(playback.scene)
         joints = lookalikes.joints(people[None])[0, 3:].reshape(2, PEOPLE, 17, 3)
         for mirror, images in zip(lookalikes.mirrors, joints, strict=True):
             behind = np.sort(mirror.in_front(images), axis=1)
@@ -101,7 +101,7 @@ class TestInSpace:
     def test_the_way_to_a_reflection_goes_over_the_glass(self, yaw, seed):
         mirror = Mirror((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.6, 0.9)).moved((0.5, -1.0), yaw)
         solid = SimpleNamespace(name="mirror0", figure=None, mirror=mirror)
-        lookalikes = Lookalikes.of(SimpleNamespace(bodies=(None,) * 2, solids=(solid,)))
+        lookalikes = Lookalikes.from_scene(SimpleNamespace(bodies=(None,) * 2, solids=(solid,)))
         rng = np.random.default_rng(seed)
         eye, people = rng.uniform(-3, 3, 3), rng.uniform(-3, 3, (1, 2, 17, 3))
         joints = lookalikes.joints(people)[0]
@@ -114,7 +114,7 @@ class TestInSpace:
         np.testing.assert_allclose(np.cross(way, whole), 0.0, atol=1e-8)
 
     def test_a_poster_is_seen_from_its_front_alone(self):
-        lookalikes = Lookalikes.of(played()[0].scene)
+        lookalikes = Lookalikes.from_scene(played()[0].scene)
         joints = lookalikes.joints(played()[0].at(0.0).joints[None])[0]
         for side, seen in ((1.0, True), (-1.0, False)):
             eye = lookalikes.figures[0].mean(axis=0) + 2.0 * side * lookalikes.fronts[0]
@@ -125,7 +125,7 @@ class TestInPictures:
     def test_pixels_are_where_the_joints_appear(self):
         playback, rig = played()
         state = playback.at(0.2)
-        joints = Lookalikes.of(playback.scene).joints(state.joints[None])[0]
+        joints = Lookalikes.from_scene(playback.scene).joints(state.joints[None])[0]
         for camera, (by_rays, by_picture) in zip(rig, compared(1), strict=False):
             np.testing.assert_array_equal(by_rays.lookalike_pixels, by_picture.lookalike_pixels)
             on = camera.inside(by_rays.lookalike_pixels)
@@ -146,7 +146,7 @@ class TestInPictures:
         for k in (0, 1):
             seen = 0
             for seed in SEEDS:
-                mine = [name.startswith(kind) for name in Lookalikes.of(played(seed)[0].scene).names]
+                mine = [name.startswith(kind) for name in Lookalikes.from_scene(played(seed)[0].scene).names]
                 seen += sum(pair[k].lookalike_visible[mine].sum() for pair in compared(seed))
             assert seen >= 15
 
@@ -155,7 +155,7 @@ class TestInPictures:
         hidden = 0
         for seed in SEEDS:
             playback, rig = played(seed)
-            state, lookalikes = playback.at(0.2), Lookalikes.of(playback.scene)
+            state, lookalikes = playback.at(0.2), Lookalikes.from_scene(playback.scene)
             joints = lookalikes.joints(state.joints[None])[0]
             for camera, (_, seen) in zip(rig, compared(seed), strict=False):
                 inside = camera.inside(seen.lookalike_pixels)
@@ -171,7 +171,7 @@ class TestInPictures:
 
     def test_what_stands_alone_before_the_camera_is_seen_whole(self):
         playback, _ = played()
-        lookalikes = Lookalikes.of(playback.scene)
+        lookalikes = Lookalikes.from_scene(playback.scene)
         figure = lookalikes.figures[1]
         front = np.cross(figure[5] - figure[6], [0, 0, 1])
         camera = looking(figure.mean(axis=0) + 1.2 * front / np.linalg.norm(front), figure.mean(axis=0))
@@ -181,7 +181,7 @@ class TestInPictures:
 
     def test_through_a_wall_nothing_is_seen(self):
         playback, _ = played()
-        figures = Lookalikes.of(playback.scene).figures[1:]  # solid figures, so only the wall occludes them
+        figures = Lookalikes.from_scene(playback.scene).figures[1:]  # solid figures, so only the wall occludes them
         for figure in figures:
             aim = figure.mean(axis=0)
             camera = looking(np.array([0.0, 1.4 * 4.0 * np.sign(aim[1]), 1.2]), aim)
@@ -217,7 +217,7 @@ class TestFilms:
         exposures = schedule_exposures(rig, FaultsSection(dead=(1,)), np.array([0.0, 0.5, 1.0]), seed=0)
         observer = RayObserver(playback)
         whole = film(playback, exposures, observer)
-        names = Lookalikes.of(playback.scene).names
+        names = Lookalikes.from_scene(playback.scene).names
         assert whole.lookalikes.names == names
         assert whole.lookalikes.pixels.shape == (3, 4, len(names), 17, 2)
         assert whole.lookalikes.visible[:, [0, 2, 3]].any()

@@ -1,0 +1,101 @@
+"""Write the MJCF files and textures of all objects: see :mod:`tools.objects`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from simharness.types.random_streams import stream
+from simharness.world.scene.objects.materials import draw_sheet
+from tools.objects import gym, home, office, park, shop, stage, ward
+from tools.objects.builder import ObjectBuilder
+
+Draw = Callable[[ObjectBuilder, np.random.Generator], None]
+
+OBJECTS: dict[str, tuple[Draw, int]] = {
+    "workstation": (office.workstation, 4),
+    "cabinet": (office.cabinet, 3),
+    "bookcase": (office.bookcase, 4),
+    "printer": (office.printer, 1),
+    "water_cooler": (office.water_cooler, 1),
+    "potted_plant": (office.potted_plant, 4),
+    "sofa": (home.sofa, 4),
+    "television": (home.television, 2),
+    "bookshelf": (home.bookshelf, 4),
+    "dining_table": (home.dining_table, 3),
+    "armchair": (home.armchair, 3),
+    "sideboard": (home.sideboard, 3),
+    "wall_bars": (gym.wall_bars, 2),
+    "vaulting_box": (gym.vaulting_box, 1),
+    "gym_bench": (gym.bench, 3),
+    "mats": (gym.mats, 3),
+    "ball_trolley": (gym.balls, 1),
+    "dumbbells": (gym.dumbbells, 1),
+    "treadmill": (gym.treadmill, 2),
+    "punching_bag": (gym.punching_bag, 2),
+    "bed": (ward.bed, 3),
+    "bedside_cabinet": (ward.bedside, 2),
+    "monitor": (ward.monitor, 1),
+    "visitors_chairs": (ward.visitors, 2),
+    "wardrobe": (ward.wardrobe, 2),
+    "screen_on_wheels": (ward.screen_on_wheels, 2),
+    "counter": (shop.counter, 2),
+    "goods": (shop.goods, 4),
+    "fridge": (shop.fridge, 2),
+    "clothes_rail": (shop.clothes, 3),
+    "display_table": (shop.display, 2),
+    "stock": (shop.stock, 3),
+    "drums": (stage.drums, 2),
+    "loudspeaker": (stage.loudspeaker, 1),
+    "piano": (stage.piano, 2),
+    "amplifier": (stage.amplifier, 3),
+    "microphone": (stage.microphone, 1),
+    "flight_cases": (stage.cases, 3),
+    "floodlight": (stage.floodlight, 1),
+    "lamp_post": (park.lamp_post, 1),
+    "park_bench": (park.park_bench, 2),
+    "planter": (park.planter, 3),
+    "hedge": (park.hedge, 3),
+    "small_tree": (park.small_tree, 3),
+    "litter_bin": (park.litter_bin, 2),
+    "bicycle": (park.bicycle, 3),
+    "far_tree": (park.far_tree, 5),
+    "far_shrub": (park.far_shrub, 4),
+}
+"""Functions that draw the objects, and the number of variants of each, by name."""
+
+
+def write_objects(folder: Path) -> None:
+    """Write all objects, the first variant as ``NAME.xml``, further ones as ``NAME.2.xml`` and so on, and textures."""
+    (folder / "textures").mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.xml"):
+        old.unlink()
+    for name, (draw, variants) in OBJECTS.items():
+        for k in range(variants):
+            builder = ObjectBuilder()
+            draw(builder, stream(0, "objects", name, k))
+            (folder / (f"{name}.{k + 1}.xml" if k else f"{name}.xml")).write_text(builder.mjcf(name), encoding="utf-8")
+    sheet = draw_sheet(0)
+    used = {
+        line.split('"')[1]
+        for file in folder.glob("*.xml")
+        for line in file.read_text().splitlines()
+        if "<texture" in line
+    }
+    for name in used:
+        patch = sheet.patches[name]
+        picture = sheet.texture[patch.top : patch.top + patch.height, patch.left : patch.left + patch.width]
+        if name in ("wood", "fabric", "metal", "leaves"):  # a texture of a cube is a square
+            side = min(picture.shape[:2])
+            picture = picture[:side, :side]
+        cv2.imwrite(str(folder / "textures" / f"{name}.png"), picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    write_objects(parser.parse_args().folder)
