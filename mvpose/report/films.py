@@ -38,7 +38,6 @@ FOLDER = "films"
 _WIDEST = 768  # pixels
 _BROAD = 2.0  # times as large a face as for thin lines has room for broad limbs
 _OPACITY = 0.6  # of people in 3D
-_FINER = 2  # mask pixels: films have many pictures, which are seen for a moment
 _GROUND = (236, 238, 240)  # where a picture is missing
 _SLOWEST = 1.0  # frames per second that players can be relied on to show
 
@@ -123,7 +122,7 @@ class _Pen:
             canvas = np.full((size[1], size[0], 3), _GROUND, np.uint8)
         else:
             canvas = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
-        overlay = Overlay(canvas, scale=self._unit, finer=_FINER)
+        overlay = Overlay(canvas, scale=self._unit)
         self._draw_people(overlay, int(self._recording.seen.frames[row]))
         self._draw_detections(overlay, row, plain=picture is None)
         return overlay.rgb
@@ -158,8 +157,8 @@ class _Pen:
             line = UNMATCHED if owner < 0 else INK if plain else TRUTH
             points = self._placed(recording.rig[self._view], detections.keypoints[index])
             points = plain_face(points, least=SMALL_FACE * self._unit, face=face)
-            overlay.skeleton(points, color=line, edges=edges, width=1.2, dots=0)
-            overlay.skeleton(points, color=color, edges=(), dots=2.6)
+            overlay.skeleton(points, color=line, edges=edges, width=1.5, dots=0)
+            overlay.skeleton(points, color=color, edges=(), dots=2.8)
 
     def _placed(self, camera: Camera, points: Floats) -> Floats:
         """Return pixels of the camera (J, 2) as pixels of the film; NaN far outside of the picture."""

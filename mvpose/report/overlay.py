@@ -1,6 +1,6 @@
 """Drawing on pictures: anti-aliased skeletons, boxes and labels at any resolution, mosaics, and legends.
 
-Everything is painted through coverage masks that are drawn several times as large and averaged. So lines may have any
+Everything is painted through coverage masks that are drawn four times as large and averaged. So lines may have any
 width and position, and a translucent skeleton is evenly translucent where its limbs meet.
 """
 
@@ -22,6 +22,7 @@ from mvpose.report.palette import INK, OUTLINE, PAPER, Color
 if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
+_FINER = 4  # mask pixels for each pixel of the picture, in each direction
 _SUBPIXEL_BITS = 4  # of cv2's fixed-point coordinates
 _RIM = 0.5  # pixels of the mask: cv2 fills every pixel that an outline touches
 USUAL_HEIGHT = 600.0
@@ -49,7 +50,6 @@ class Overlay:
     Args:
         rgb: picture, (h, w, 3) uint8; it is copied.
         scale: factor of all widths and sizes; by default height / 600.
-        finer: mask pixels for each pixel of the picture, in each direction: 4 for pictures, 2 for films.
 
     Attributes:
         rgb: picture with everything drawn so far, (h, w, 3) uint8.
@@ -58,12 +58,11 @@ class Overlay:
         ValueError: the picture is not (h, w, 3) uint8.
     """
 
-    def __init__(self, rgb: NDArray[np.uint8], *, scale: float | None = None, finer: int = 4) -> None:
+    def __init__(self, rgb: NDArray[np.uint8], *, scale: float | None = None) -> None:
         if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8:
             raise ValueError(f"rgb must be (h, w, 3) uint8, got {rgb.shape} {rgb.dtype}")
         self.rgb = rgb.copy()
         self.scale = rgb.shape[0] / USUAL_HEIGHT if scale is None else scale
-        self._finer = finer
 
     def skeleton(
         self,
@@ -186,11 +185,11 @@ class Overlay:
         columns, rows = np.maximum(high - low, 0)
         if not (rows and columns):
             return 0, 0, np.zeros((0, 0), np.float32)
-        large = np.zeros((rows * self._finer, columns * self._finer), np.uint8)
-        half = max(width * self._finer / 2 - _RIM, 0.25)
+        large = np.zeros((rows * _FINER, columns * _FINER), np.uint8)
+        half = max(width * _FINER / 2 - _RIM, 0.25)
         if lines:
             starts, ends = (
-                (np.concatenate(each) - low + 0.5) * self._finer - 0.5
+                (np.concatenate(each) - low + 0.5) * _FINER - 0.5
                 for each in ([line[:-1] for line in lines], [line[1:] for line in lines])
             )
             across = (ends - starts)[:, ::-1] * (-1.0, 1.0)
@@ -200,7 +199,7 @@ class Overlay:
             if width > 1.5:  # rounded ends and corners, where they show
                 self._dots(large, np.unique(np.concatenate([starts, ends]), axis=0), half)
         if radius:
-            self._dots(large, (points - low + 0.5) * self._finer - 0.5, radius * self._finer - _RIM)
+            self._dots(large, (points - low + 0.5) * _FINER - 0.5, radius * _FINER - _RIM)
         small = cv2.resize(large, (int(columns), int(rows)), interpolation=cv2.INTER_AREA)
         return int(top), int(left), small.astype(np.float32) / np.float32(255)
 
