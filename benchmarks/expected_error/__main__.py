@@ -20,7 +20,7 @@ import simharness
 from mvpose import COCO17, SHELF14, Detections, Estimate, Rig, preset
 from mvpose.arrays import Floats
 from mvpose.estimators import Estimator, SequenceEstimator
-from mvpose.report.expected_error import expected_median
+from mvpose.report.examined_recording import expected_median
 from simharness.reality.recording_file import read_recording
 from simharness.scoring.pairing import pair
 

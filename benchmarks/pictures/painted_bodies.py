@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simharness.capture.rendering.renderer import Image
-from simharness.outputs.benchmark.cameras import hd_names
+from simharness.outputs.benchmark.panoptic_sequence import hd_names
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import picture_source_of

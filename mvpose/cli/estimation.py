@@ -1,19 +1,45 @@
-"""People of a recording: the estimator over all frames, with progress, and the check that the cameras agree."""
+"""People of a recording: the estimator over all frames, and the check that the people agree with their detections.
+
+A wrong calibration, exchanged cameras or another picture size still give people, confident ones; but these miss the
+keypoints from which they were made, which needs no truth to see.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from mvpose.cli.agreement import agreement, check
+import numpy as np
+
+from mvpose.arrays import Floats, Integers
+from mvpose.camera import Rig
 from mvpose.cli.inputs import Inputs
 from mvpose.commands.errors import failing
 from mvpose.commands.programs import note
 from mvpose.commands.progress import single_stage
+from mvpose.detections import Detections
+from mvpose.estimate import Estimate
 from mvpose.estimators import Estimator, SequenceEstimator
+from mvpose.files.message_text import listed
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS, preset
 from mvpose.recording import People
 from mvpose.skeleton import COCO17
 from mvpose.wholebody import body_of, body_part, whole_body
+
+GOOD = 0.57
+"""Residual below which a keypoint is good, in standard deviations of annotators: OKS 0.85 (Ronchi, ICCV 2017)."""
+
+MISS = 1.18
+"""Residual above which a keypoint is missed: OKS 0.5, the loosest threshold of COCO's evaluation."""
+
+
+_SEEN = 0.3  # score above which a keypoint counts: those below are guesses of the detector
+_AREA = 0.53  # of a box that a person covers, as in COCO's evaluation without masks
+_FEWEST = 30  # keypoints of a camera from which a median is known
+_APART = 0.05  # share of a camera's detections in people below which it sees other people than the others
+_BODIES = (0.4, 2.2)  # metres from shoulder to ankle, along the bones: from a baby to beyond the tallest
+_LONG = ((5, 11), (11, 13), (13, 15), (6, 12), (12, 14), (14, 16))  # trunk, thigh and shank of both sides in COCO-17
 
 
 def check_method(method: str, *, lag: float) -> None:
@@ -50,7 +76,7 @@ def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -
         trust: accept people who contradict their detections.
 
     Raises:
-        ValueError: people who contradict their detections, :func:`mvpose.cli.agreement.check`.
+        ValueError: people who contradict their detections, :func:`mvpose.cli.estimation.check`.
         RunError: the estimator failed.
     """
     estimates = []
@@ -75,3 +101,99 @@ def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -
     for remark in remarks:
         note(remark)
     return People.of_estimates(estimates, inputs.skeleton, inputs.period, untracked=not tracks)
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Agreement of people with the detections of every camera.
+
+    Attributes:
+        residuals: median distance of keypoints from the projected joints, (V,), in standard deviations of annotators
+            (twice OKS's sigma times the root of the person's area); NaN where there are too few.
+        shares: share of the detections that belong to a person whom other cameras see, too, (V,).
+        body: median length from shoulder to ankle, metres; NaN where nobody is complete.
+    """
+
+    residuals: Floats
+    shares: Floats
+    body: float
+
+
+def agreement(rig: Rig, frames: Sequence[Detections], estimates: Sequence[Estimate]) -> Agreement:
+    """Measure the agreement of the people of all frames with their detections."""
+    found: list[tuple[Integers, Floats]] = []
+    counts, matched = np.zeros(len(rig)), np.zeros(len(rig))
+    bodies = []
+    for frame, estimate in zip(frames, estimates, strict=True):
+        labels = estimate.matching.labels_of(len(frame))
+        counts += np.bincount(frame.view, minlength=len(rig))
+        rows = np.flatnonzero(labels >= 0)
+        matched += np.bincount(frame.view[rows], minlength=len(rig))
+        if len(estimate):
+            found.append((frame.view[rows], _residuals(rig, frame, estimate, rows, labels[rows])))
+            bodies.append(_lengths(estimate.joints))
+    shares = matched / np.maximum(counts, 1)
+    if not found:
+        return Agreement(np.full(len(rig), np.nan), shares, float("nan"))
+    view, residual = (np.concatenate(each) for each in zip(*found, strict=True))
+    medians = [_median(residual[view == k]) for k in range(len(rig))]
+    return Agreement(np.array(medians), shares, _median(np.concatenate(bodies), fewest=1))
+
+
+def check(rig: Rig, agreed: Agreement) -> list[str]:
+    """Return remarks about people who agree with their detections loosely.
+
+    Raises:
+        ValueError: cameras whose keypoints the people miss, or bodies of impossible size.
+    """
+    mend = "`mvpose doctor` tells what is wrong; --trust writes these people nevertheless"
+    if np.isfinite(agreed.body) and not _BODIES[0] < agreed.body < _BODIES[1]:
+        raise ValueError(
+            f"the people measure {agreed.body:.2g} m from shoulder to ankle, expected {_BODIES[0]} to {_BODIES[1]} m: "
+            f"the translations of the calibration are not in metres; {mend}"
+        )
+    wrong = [k for k in range(len(rig)) if agreed.residuals[k] > MISS]
+    if wrong:
+        raise ValueError(
+            "the calibration contradicts the detections: people miss the keypoints from which they were made, in "
+            f"camera {_with_residuals(rig, agreed, wrong)} times the spread of annotators (expected below {GOOD}). "
+            f"Check which detections belong to which camera, the picture size, units and conventions; {mend}"
+        )
+    remarks = []
+    loose = [k for k in range(len(rig)) if agreed.residuals[k] > GOOD]
+    if loose:
+        remarks.append(
+            f"people miss the keypoints of camera {_with_residuals(rig, agreed, loose)} times the spread of annotators "
+            f"(expected below {GOOD}): errors are larger than the covariances say; `mvpose doctor` tells why"
+        )
+    apart = [rig[k].name for k in range(len(rig)) if agreed.shares[k] < _APART]
+    if apart:
+        remarks.append(
+            f"no other camera sees the people of camera {listed(apart)}, which therefore adds nothing: it looks "
+            "elsewhere, its detections are of another camera or time, or it has moved; `mvpose doctor` tells which"
+        )
+    return remarks
+
+
+def _with_residuals(rig: Rig, agreed: Agreement, views: Sequence[int]) -> str:
+    return listed([f"{rig[k].name} by {agreed.residuals[k]:.2g}" for k in views])
+
+
+def _residuals(rig: Rig, frame: Detections, estimate: Estimate, rows: Integers, people: Integers) -> Floats:
+    """Return the residual of every keypoint of some detections, (n, J); NaN for those that do not count."""
+    projected = rig.project(estimate.joints)[frame.view[rows], people]
+    distance = np.linalg.norm(projected - frame.keypoints[rows], axis=-1)
+    area = _AREA * frame.boxes[rows, 2] * frame.boxes[rows, 3]
+    spread = np.sqrt(np.maximum(area, 1.0))[:, None] * np.sqrt(frame.skeleton.variances)
+    return np.where(frame.scores[rows] > _SEEN, distance / spread, np.nan)
+
+
+def _lengths(joints: Floats) -> Floats:
+    """Return the length from shoulder to ankle of each person, mean of both sides, (n,), metres."""
+    bones = [np.linalg.norm(joints[:, a] - joints[:, b], axis=-1) for a, b in _LONG]
+    return np.sum(bones, axis=0) / 2.0
+
+
+def _median(values: Floats, fewest: int = _FEWEST) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) >= fewest else float("nan")

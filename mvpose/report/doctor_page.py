@@ -21,7 +21,6 @@ from mvpose.detections import Detections
 from mvpose.files.atomic_files import write_atomic
 from mvpose.recording import PERIOD
 from mvpose.report import doctor_drawings as drawings
-from mvpose.report import doctor_plots as plots
 from mvpose.report.documents import fill_template, program_version
 from mvpose.report.leave_one_out import Missing, leave_one_out, mean_field
 from mvpose.report.picture_drawings import Pictures, picture_element
@@ -163,8 +162,8 @@ def _above(case: DoctorCase) -> dict[str, Any]:
     moved = case.accused
     if repaired is not None and not moved:
         moved = [view for view in range(len(case.rig)) if np.any(repaired[view].P != case.rig[view].P)]
-    factor = 1.0 if repaired is None or not moved else plots.motion_factor(case.rig, repaired)
-    svg = plots.rig_from_above(
+    factor = 1.0 if repaired is None or not moved else drawings.motion_factor(case.rig, repaired)
+    svg = drawings.rig_from_above(
         "rig-from-above", case.rig, repaired=repaired, moved=moved, points=case.before.point, factor=factor
     )
     return {"svg": Markup(svg), "factor": f"{factor:g}" if factor > 1 else ""}
@@ -276,16 +275,16 @@ def _lines(case: DoctorCase, pictures: Pictures | None) -> dict[str, Any] | None
 
 def _clocks(case: DoctorCase) -> Markup | None:
     """Return the plot of clock offsets of the repair and of findings; None where nothing is known of any."""
-    offsets: dict[int, plots.ClockOffset] = {}
+    offsets: dict[int, drawings.ClockOffset] = {}
     if case.repair is not None and case.repair.refused is None and np.any(case.repair.offsets):
         spread = _NINETY * case.repair.offset_sigmas
         for view, (value, half) in enumerate(zip(case.repair.offsets.tolist(), spread.tolist(), strict=True)):
             low, high = (value - half, value + half) if half > 0 else (math.nan, math.nan)
-            offsets[view] = plots.ClockOffset(case.names[view], 1000.0 * value, 1000.0 * low, 1000.0 * high)
+            offsets[view] = drawings.ClockOffset(case.names[view], 1000.0 * value, 1000.0 * low, 1000.0 * high)
     for finding in case.diagnosis.findings:
         if finding.kind == "clock-offset" and finding.view is not None and "ms" in finding.size:
             low, high = finding.interval.get("ms", (math.nan, math.nan))
-            offsets[finding.view] = plots.ClockOffset(case.names[finding.view], finding.size["ms"], low, high)
+            offsets[finding.view] = drawings.ClockOffset(case.names[finding.view], finding.size["ms"], low, high)
     if not offsets:
         return None
-    return Markup(plots.clock_offsets("clock-offsets", [offsets[view] for view in sorted(offsets)]))
+    return Markup(drawings.clock_offsets("clock-offsets", [offsets[view] for view in sorted(offsets)]))

@@ -19,8 +19,7 @@ from mvpose.recording import People
 from mvpose.report import recording_plots as plots
 from mvpose.report import tables
 from mvpose.report.documents import fill_template, program_version
-from mvpose.report.examined_recording import ExaminedRecording
-from mvpose.report.expected_error import expected_error
+from mvpose.report.examined_recording import ExaminedRecording, expected_error
 from mvpose.report.films import MovingPictures, write_films
 from mvpose.report.measures import median_by, share_on_one_view
 from mvpose.report.palette import identity_color

@@ -1,9 +1,11 @@
-"""Cameras from above, on the axes of a plot."""
+"""Cameras from above on the axes of a plot, and labels of places, each where it hides no other label, place or line."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,10 +13,20 @@ from matplotlib.patches import Polygon
 
 from mvpose.arrays import Floats
 from mvpose.camera import Camera
-from mvpose.report.map_labels import MapLabel, write_labels
 from mvpose.report.svg_plots import FAINT, INK, Color
 
 _LEVEL = 1e-6  # horizontal part of a viewing direction below which the camera looks straight down
+
+
+_POINTS = 72.0  # in an inch
+_LETTER, _LINE = 0.58, 1.15  # mean width of a letter and height of a line, as shares of the font size
+_DOT = 4.0  # points: half the side of the square around a place that labels keep free
+_GAPS = (3.0, 9.0, 16.0)  # points between a place and its label
+_TURNS = np.radians([0, 30, -30, 60, -60, 90, -90, 135, -135, 180])  # from the preferred direction
+_TURN_COST = 12.0  # of a label in the opposite direction; points squared, as all costs
+_GAP_COST = 1.5  # of a point between a place and its label
+_LINE_COST = 14.0  # of a point of a line behind a label
+_OUTSIDE = 6.0  # factor of an area outside of the map
 
 
 def camera_from_above(axes: Axes, camera: Camera, *, color: Color = INK, reach: float = 1.2) -> None:
@@ -46,7 +58,7 @@ def name_cameras(
     Args:
         axes: plot in metres with its final limits.
         cameras: the cameras.
-        lines: polylines that names do not cross, as in :func:`mvpose.report.map_labels.write_labels`.
+        lines: polylines that names do not cross, as in :func:`mvpose.report.rig_plots.write_labels`.
         areas: rectangles that names keep free, likewise.
     """
     labels = [MapLabel(each.name, each.center[:2], -each.R[2, :2], color=FAINT) for each in cameras]
@@ -75,3 +87,124 @@ def cone_from_above(camera: Camera, reach: float) -> Floats:
         for turn in (side, -side)
     ]
     return np.array([camera.center[:2], *ends])
+
+
+@dataclass(frozen=True)
+class MapLabel:
+    """Label of a place.
+
+    Attributes:
+        text: one line or more.
+        place: what the label is for, (2,), in the units of the axes.
+        away: preferred direction of the label from the place, (2,).
+        color: colour of the letters.
+        size: font size, points.
+    """
+
+    text: str
+    place: Floats
+    away: Floats
+    color: Color = INK
+    size: float = 8.0
+
+    @property
+    def extent(self) -> Floats:
+        """Width and height, points."""
+        lines = self.text.split("\n")
+        return self.size * np.array([_LETTER * max(map(len, lines)), _LINE * len(lines)])
+
+
+def write_labels(
+    axes: Axes,
+    labels: Sequence[MapLabel],
+    *,
+    lines: Iterable[Floats] = (),
+    areas: Iterable[tuple[Floats, Floats]] = (),
+) -> list[tuple[Floats, Floats]]:
+    """Write labels beside their places, one after the other, each where it hides the least.
+
+    Args:
+        axes: map with its final limits.
+        labels: labels; those before have the better choice.
+        lines: polylines that labels do not cross where there is room, each (k, 2) in the units of the axes.
+        areas: lower left and upper right corners of rectangles to keep free, (2,) each, in the units of the axes.
+
+    Returns:
+        Lower left and upper right corner of each label, points from the lower left corner of the figure.
+    """
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()  # fixes where the axes lie in the figure
+    frame = axes.get_window_extent()
+    low, high = (_points(axes, np.array(corner)) for corner in (frame.min, frame.max))
+    segments = [
+        np.stack([start, end])
+        for line in lines
+        for path in [_points(axes, axes.transData.transform(line))]
+        for start, end in pairwise(path)
+    ]
+    dots = [_points(axes, axes.transData.transform(label.place)) for label in labels]
+    taken = [(dot - _DOT, dot + _DOT) for dot in dots]
+    for corners in areas:
+        lower, upper = _points(axes, axes.transData.transform(np.array(corners)))
+        taken.append((lower, upper))
+    placed = []
+    for label, dot in zip(labels, dots, strict=True):
+        box = _best_box(label, dot, taken, segments, (low, high))
+        taken.append(box)
+        placed.append(box)
+        axes.annotate(
+            label.text, tuple(label.place), xytext=tuple((box[0] + box[1]) / 2 - dot), textcoords="offset points",
+            ha="center", va="center", fontsize=label.size, color=label.color, linespacing=1.0, zorder=7,
+            annotation_clip=False,
+        )  # fmt: skip
+    return placed
+
+
+def _points(axes: Axes, pixels: Floats) -> Floats:
+    return np.asarray(pixels, float) * _POINTS / axes.figure.dpi
+
+
+def _best_box(
+    label: MapLabel,
+    dot: Floats,
+    taken: Sequence[tuple[Floats, Floats]],
+    segments: Sequence[Floats],
+    inside: tuple[Floats, Floats],
+) -> tuple[Floats, Floats]:
+    """Return the corners of the box of a label with the least cost, all in points."""
+    half = label.extent / 2
+    bearing = np.arctan2(label.away[1], label.away[0])
+    best, least = (dot, dot), np.inf
+    for gap in _GAPS:
+        for turn in _TURNS.tolist():
+            way = np.array([np.cos(bearing + turn), np.sin(bearing + turn)])
+            center = dot + way * (_DOT + gap + min(half / np.maximum(np.abs(way), 1e-9)))
+            box = (center - half, center + half)
+            cost = _TURN_COST * abs(turn) / np.pi + _GAP_COST * gap
+            cost += sum(shared_area(box, other) for other in taken)
+            cost += _LINE_COST * sum(length_within(segment, box) for segment in segments)
+            cost += _OUTSIDE * (float(np.prod(box[1] - box[0])) - shared_area(box, inside))
+            if cost < least:
+                best, least = box, cost
+    return best
+
+
+def shared_area(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> float:
+    """Return the area that two rectangles, given by their lower left and upper right corners, (2,), have in common."""
+    sides = np.minimum(one[1], other[1]) - np.maximum(one[0], other[0])
+    return float(np.prod(np.maximum(sides, 0.0)))
+
+
+def length_within(segment: Floats, box: tuple[Floats, Floats]) -> float:
+    """Return the length of the part of a segment, (2, 2), that lies within a rectangle (Liang and Barsky, 1984)."""
+    start, step = segment[0], segment[1] - segment[0]
+    first, last = 0.0, 1.0
+    for axis in range(2):
+        if abs(step[axis]) < 1e-12:
+            if not box[0][axis] <= start[axis] <= box[1][axis]:
+                return 0.0
+            continue
+        ends = sorted((corner[axis] - start[axis]) / step[axis] for corner in box)
+        first, last = max(first, ends[0]), min(last, ends[1])
+    return max(last - first, 0.0) * float(np.hypot(*step))

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
+from typer.core import TyperGroup
 
 from mvpose.commands.errors import failing
 from mvpose.commands.output_files import write_json
 from simharness.cli.options import JsonFile, Overrides, RecordingFile, RecordingFolder, ScenarioFile
 from simharness.cli.program import PROGRAM
-from simharness.cli.recording_group import recording_group
 
 if TYPE_CHECKING:
     from mvpose.estimators import Estimator
@@ -26,6 +26,29 @@ class HeadMapping(enum.StrEnum):
 
     VOXELPOSE = "voxelpose"
     Y2019 = "2019"
+
+
+_COMMAND = "recording"
+
+
+class RecordingGroup(TyperGroup):
+    """Group that runs its command ``recording`` where the first word is no other command, but a recording."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
+        """Put the command before the words of a call that names none."""
+        if args and args[0] not in self.commands and args[0] not in ctx.help_option_names:
+            args = [_COMMAND, *args]
+        return super().parse_args(ctx, args)
+
+
+def recording_group(help_text: str) -> typer.Typer:
+    """Return a group of commands, to which a command ``recording`` has to be added."""
+    return typer.Typer(
+        cls=RecordingGroup,
+        no_args_is_help=True,
+        help=help_text,
+        subcommand_metavar="RECORDING [FOLDER] | COMMAND [ARGS]...",
+    )
 
 
 app = recording_group("Score methods on a recording with truth, or compare a recording with simulation.")

@@ -311,7 +311,7 @@ def blame_results(results: Results, *, seeds: int, workers: int = 1) -> None:
     """Find what cost a study its score, write it into its folder, and print it."""
     from mvpose.commands.progress import reporter
     from simharness.cli.blame_command import print_blame
-    from simharness.outputs.study.blame_study import blame_study
+    from simharness.outputs.study.losses import blame_study
     from simharness.study.causes.blame_file import write_blame
 
     with reporter() as bars:

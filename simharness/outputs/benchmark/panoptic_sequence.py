@@ -1,11 +1,16 @@
-"""Export of a scenario as a sequence on disk: pictures, true poses, detections and calibration, frame by frame."""
+"""Export of a scenario as a sequence on disk: pictures, true poses, detections and calibration, frame by frame.
+
+Cameras have names that loaders of Panoptic know, and the sequence is described as a recording as well, for
+``simharness evaluate`` and the other commands on recordings.
+"""
 
 from __future__ import annotations
 
 import json
+import re
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,22 +18,29 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose import Detections, Rig
+from mvpose import SHELF14, Detections, Rig
+from mvpose.arrays import Floats
 from mvpose.commands.progress import Reporter, Silence, Stages
 from mvpose.files.atomic_files import atomic_folder
+from mvpose.formats.calibration.panoptic import write_calibration
 from mvpose.formats.detections.openpose import people_file
 from mvpose.skeleton import PANOPTIC19
+from simharness.formats.npz_joints import write_tracks
 from simharness.formats.panoptic_poses import body_scene, confidences
-from simharness.outputs.benchmark.cameras import hd_names, renamed, write_cameras
 from simharness.outputs.benchmark.layout import Layout, check_place
 from simharness.outputs.benchmark.manifest import manifest
-from simharness.outputs.benchmark.recording_description import write_description
+from simharness.reality.annotation_errors import annotate_simulation
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.toml_files import dumps
+from simharness.scenario.toml_files import dumps, dumps_keys
 from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback
 
+_HD = re.compile(r"00_\d\d")
+_HEAD = (
+    "# The detections and the truth of this sequence as a recording: simharness evaluate FOLDER\n"
+    "# Frames are counted as they were written: frame k is the k-th file of each camera.\n"
+)
 _JPEG_QUALITY = 95
 _FINER = 2  # samples per pixel along each axis, against aliasing
 
@@ -94,7 +106,7 @@ def export_sequence(
         write_cameras(layout.calibration, true_rig, source=scenario.name)
         if faulty := not _same_cameras(true_rig, believed_rig):
             write_cameras(layout.believed, believed_rig, source=f"{scenario.name}, as believed")
-        write_description(layout, scenario, sequence, true_rig, frames=frames, believed=faulty)
+        _write_description(layout, scenario, annotate_simulation(scenario, sequence, true_rig), frames, believed=faulty)
         for frame in frames:
             current, here = detected[frame], sequence.present[frame]
             bodies = body_scene(
@@ -150,3 +162,63 @@ def _write_picture(path: Path, rgb: NDArray[np.uint8]) -> None:
     if not encoded:
         raise RuntimeError(f"OpenCV cannot encode a picture of shape {rgb.shape} as JPEG")
     path.write_bytes(data.tobytes())
+
+
+def hd_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names of HD cameras (00_00, 00_01, ...) in the order of the rig; existing names of this form are kept.
+
+    So loaders that list Panoptic cameras by number (0 3, 0 6, ...) find them in a twin of a Panoptic sequence.
+    """
+    if all(map(_HD.fullmatch, names)):
+        return tuple(names)
+    return tuple(f"00_{view:02d}" for view in range(len(names)))
+
+
+def renamed(rig: Rig, names: Sequence[str]) -> Rig:
+    """Return the same cameras with other names."""
+    return Rig([replace(camera, name=name) for camera, name in zip(rig, names, strict=True)])
+
+
+def write_cameras(path: Path, rig: Rig, *, source: str) -> None:
+    """Write a Panoptic calibration with ``panel`` and ``node``, by which loaders select cameras.
+
+    Args:
+        path: path of the JSON file.
+        rig: cameras with names of HD cameras.
+        source: value of ``calibDataSource``.
+    """
+    write_calibration(path, rig)
+    entries = json.loads(path.read_text(encoding="utf-8"))["cameras"]
+    for entry in entries:
+        entry["panel"], entry["node"] = map(int, entry["name"].split("_"))
+    text = json.dumps({"calibDataSource": source, "cameras": entries}, indent=1)
+    path.write_text(text + "\n", encoding="utf-8")
+
+
+def _write_description(layout: Layout, scenario: Scenario, joints: Floats, frames: range, *, believed: bool) -> None:
+    """Write ``recording.toml`` and the truth that it names.
+
+    Args:
+        layout: paths of the sequence.
+        scenario: the scenario.
+        joints: joints of all people in all frames as annotated, (T, P, 14, 3), metres.
+        frames: exported frames.
+        believed: whether the layout has a believed calibration, which is then the calibration of the recording.
+    """
+    numbers = list(range(len(frames)))
+    write_tracks(layout.truth, joints[list(frames)], names=SHELF14.joints, frames=numbers)
+    keys: dict[str, Any] = {
+        "name": scenario.name,
+        "rate": scenario.rate / frames.step,
+        "frames": [[0, len(frames) - 1]],
+        "calibration": {"file": (layout.believed if believed else layout.calibration).name},
+        "detections": {
+            "format": "openpose",
+            "path": "openpose",
+            "first": 0,
+            "skeleton": "body25",
+            "kind": scenario.detector.kind,
+        },
+        "truth": {"format": "npz", "file": layout.truth.name, "skeleton": "shelf14"},
+    }
+    layout.recording.write_text(f"{_HEAD}{dumps_keys(keys)}", encoding="utf-8")

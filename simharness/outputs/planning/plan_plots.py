@@ -11,8 +11,7 @@ from matplotlib.patches import Polygon, Rectangle
 
 from mvpose import Camera
 from mvpose.arrays import Floats
-from mvpose.report.map_labels import MapLabel, write_labels
-from mvpose.report.rig_plots import cone_from_above
+from mvpose.report.rig_plots import MapLabel, cone_from_above, write_labels
 from mvpose.report.svg_plots import FAINT, INK, LINE, svg_plot
 from simharness.planning.plan_result import RigPlan
 from simharness.planning.room import Room

@@ -17,7 +17,7 @@ from mvpose.report.tables import NOTHING
 from mvpose.skeleton import COCO17
 from simharness.outputs import TEMPLATES
 from simharness.outputs.blame_section import blame_section
-from simharness.outputs.run import findings, plots
+from simharness.outputs.run import plots, standard_figures
 from simharness.outputs.run.figures import draw_figures
 from simharness.outputs.run.headline import COLUMNS, WHOLE_BODY_COLUMNS, has_whole_body
 from simharness.outputs.run.pictures import PagePicture
@@ -170,9 +170,9 @@ def _stage_times(record: Record) -> dict[str, dict[str, float]]:
 def _findings(record: Record, main: str, errors: Mapping[str, Floats]) -> dict[str, str]:
     """Return what each figure shows, a sentence, by name; empty where there is nothing to tell."""
     return {
-        "parts": findings.of_parts(record.summary["variants"][main], GROUPS),
-        "times": findings.of_times(_stage_times(record)),
-        "distribution": findings.of_joint_errors(errors),
+        "parts": standard_figures.parts_finding(record.summary["variants"][main], GROUPS),
+        "times": standard_figures.times_finding(_stage_times(record)),
+        "distribution": standard_figures.joint_errors_finding(errors),
     }
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from simharness.outputs.run.headline import Column
-from simharness.outputs.run.identities import identities_of
-from simharness.outputs.run.identity_plots import timeline, trajectories
+from simharness.outputs.run.identity_plots import identities_of, timeline, trajectories
 from simharness.scoring.catalogue import SCORES
 from simharness.scoring.tracking.identity_figures import DISTANCE
 from simharness.trial.run_folder import Record

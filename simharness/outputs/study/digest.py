@@ -19,7 +19,7 @@ from mvpose.report.svg_plots import plot_sheet
 from simharness.outputs.study import plots, tables
 from simharness.outputs.study.curves import Factor, cases_of, factor_breaking_points, factors, factors_by_case, panels
 from simharness.outputs.study.digest_text import HEADS, HEADS_OVER_TIME, PRINTED, markdown
-from simharness.outputs.study.failure_rates import failure_rates
+from simharness.outputs.study.failure_section import failure_rates
 from simharness.outputs.study.page import THRESHOLDS
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval, mean_interval
@@ -69,7 +69,7 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
         ``means`` by variant, and ``cases`` with such means by case; ``factors`` with the scores at every value, and
         with the keys that these are means over; ``breaking`` points; ``by_case`` with factors and breaking points of
         each case separately, while the ones above pool all cases; ``failures``, see
-        :func:`simharness.outputs.study.failure_rates.failure_rates`; ``time_ms`` of each stage.
+        :func:`simharness.outputs.study.failure_section.failure_rates`; ``time_ms`` of each stage.
     """
     info, trials = results.info, results.trials
     names: list[str] = info["variants"]

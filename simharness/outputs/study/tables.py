@@ -10,7 +10,7 @@ import polars as pl
 
 from mvpose.report.tables import NOTHING, Cell
 from simharness.outputs.study.curves import FactorBreakingPoint
-from simharness.outputs.study.failure_rates import NOT_BLAMED
+from simharness.outputs.study.failure_section import NOT_BLAMED
 from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES, ScoreInfo
 from simharness.statistics.intervals import Interval, mean_interval
@@ -174,7 +174,7 @@ def failures_per_100_frames(
         failures: table of failures of the study.
         frames: scored frames of each variant.
         variants: variants in the order of the result.
-        column: ``kind`` or ``stage``; null becomes :data:`simharness.outputs.study.failure_rates.NOT_BLAMED`.
+        column: ``kind`` or ``stage``; null becomes :data:`simharness.outputs.study.failure_section.NOT_BLAMED`.
     """
     rates: dict[str, dict[str, float]] = {}
     for variant in variants:

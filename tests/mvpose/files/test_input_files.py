@@ -115,7 +115,7 @@ AROUND = {
     "simharness/trial/stages/estimators.py": "code",
     "simharness/scenario/load.py": "digests of regular files",
     "simharness/gate/suite.py": "digests of regular files",
-    "simharness/outputs/benchmark/cameras.py": "a file that was just written",
+    "simharness/outputs/benchmark/panoptic_sequence.py": "a file that was just written",
     "simharness/cli/run_command.py": "a file that was just written",
     "simharness/outputs/study/page.py": "a file of a result folder, if regular",
 }

@@ -19,11 +19,12 @@ from mvpose.report.doctor_drawings import (
     best_partner,
     distance_from_line,
     epipolar_curve,
+    exaggerated,
     matched_joints,
+    motion_factor,
     nice_factor,
 )
 from mvpose.report.doctor_page import write_doctor_page
-from mvpose.report.doctor_plots import exaggerated, motion_factor
 from mvpose.report.leave_one_out import leave_one_out, mean_field
 from mvpose.report.verdict import quantities, sentence_of
 

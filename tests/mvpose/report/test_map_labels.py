@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from mvpose.report.map_labels import MapLabel, length_within, shared_area, write_labels
+from mvpose.report.rig_plots import MapLabel, length_within, shared_area, write_labels
 from mvpose.report.svg_plots import svg_plot
 
 UP = np.array([0.0, 1.0])

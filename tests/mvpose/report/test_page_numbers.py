@@ -11,7 +11,7 @@ from synthetic_recording import recording
 from mvpose import COCO17, Detections
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.recording import People
-from mvpose.report.expected_error import expected_error, expected_median
+from mvpose.report.examined_recording import expected_error, expected_median
 from mvpose.report.measures import bones, median_by, share_on_one_view, supporting_views, views_of_people
 from mvpose.report.reprojection import reproject
 

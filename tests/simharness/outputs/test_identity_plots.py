@@ -10,9 +10,8 @@ from test_page import make_record
 
 from mvpose import Estimate, Matching
 from mvpose.report.palette import UNMATCHED, css, identity_color, line_color
-from mvpose.report.track_plots import runs_of
-from simharness.outputs.run.identities import identities_of
-from simharness.outputs.run.identity_plots import timeline, trajectories
+from mvpose.report.recording_plots import runs_of
+from simharness.outputs.run.identity_plots import identities_of, timeline, trajectories
 from simharness.outputs.run.page import render
 from simharness.scoring.tracking.identity_figures import tracking_summary
 

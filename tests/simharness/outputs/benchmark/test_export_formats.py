@@ -15,8 +15,7 @@ from mvpose.formats.joint_names import BODY_25
 from mvpose.skeleton import PANOPTIC19
 from mvpose.wholebody import skeleton_by_name
 from simharness.formats.panoptic_poses import body_scene, confidences
-from simharness.outputs.benchmark.cameras import hd_names
-from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
+from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence, hd_names
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.views import Visibility
 
