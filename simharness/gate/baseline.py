@@ -13,9 +13,9 @@ from mvpose.commands.output_files import write_text
 from mvpose.files.input_files import MIB, parse_json, read_bytes
 from mvpose.files.message_text import one_line, shown
 from simharness.gate.trial_command import TrialKey
-from simharness.scenario.sections.gate_section import Tolerance
+from simharness.scoring.catalogue import TOLERANCES
 
-GATED = tuple(Tolerance.model_fields)
+GATED = tuple(TOLERANCES)
 """Keys of the scores that are compared."""
 
 FRAMES = "frames"
@@ -25,8 +25,6 @@ TIME = "time_ratio"
 """Score beside the gated ones: time of a frame divided by the time of the reference kernel."""
 
 KEPT = (*GATED, FRAMES, TIME)
-
-_ADDED = ("hota", "idf1")  # scores that baselines of version 0.1 lack
 
 _LARGEST = 64 * MIB  # bytes of a baseline; 200,000 trials
 _DIGITS = 4  # decimals: finer than any tolerance, short enough to read in a diff
@@ -96,7 +94,9 @@ def read_baseline(path: Path) -> Measurement:
     try:
         data = parse_json(content)
         head = {key: _text(data, key) for key in _HEAD}
-        return Measurement(**head, scores=dict(map(_row, data["trials"])))
+        rows = data["trials"]
+        given = {key for row in rows if isinstance(row, dict) for key in row} | {FRAMES, TIME}
+        return Measurement(**head, scores=dict(_row(row, given) for row in rows))
     except json.JSONDecodeError as error:
         raise ValueError(
             f"--baseline {path}, line {error.lineno}: not valid JSON: {one_line(error.msg, 160)}; restore it, or {mend}"
@@ -114,8 +114,12 @@ def _text(data: Any, key: str) -> str:
     return str(data[key])
 
 
-def _row(row: Any) -> tuple[TrialKey, dict[str, float | None]]:
+def _row(row: Any, given: set[str]) -> tuple[TrialKey, dict[str, float | None]]:
     """Return trial and scores of one row.
+
+    Args:
+        row: the row.
+        given: keys of all rows; the others are scores that were not yet gated when the baseline was written.
 
     Raises:
         TypeError, KeyError: the row is not valid.
@@ -125,7 +129,7 @@ def _row(row: Any) -> tuple[TrialKey, dict[str, float | None]]:
     trial = TrialKey(row["case"], row["seed"], row["variant"])
     if not (isinstance(trial.case, str) and isinstance(trial.seed, int) and isinstance(trial.variant, str)):
         raise TypeError(f"trials: expected case, seed and variant, got {shown(list(trial))}")
-    scores = {key: row.get(key) if key in _ADDED else row[key] for key in KEPT}
+    scores = {key: row[key] if key in given else None for key in KEPT}
     for key, value in scores.items():
         number = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
         if value is not None and not number:

@@ -36,7 +36,7 @@ def scenario_schema() -> Schema:
     schema = ScenarioFile.model_json_schema(schema_generator=_Generator)
     definitions: dict[str, Schema] = schema["$defs"]
     properties: dict[str, Schema] = schema["properties"]
-    for name in ("Shares", "Amounts"):
+    for name in ("Shares", "Amounts", "Factors", "Means"):
         definitions[name] = _by_joint(definitions[name])
     varied = {key for key in properties if (key,) not in NOT_VARIED} - {"method"}  # its only values are the variants
     case = {key: {"$ref": f"#/properties/{key}"} for key in properties if key in varied}

@@ -13,7 +13,7 @@ from simharness.scoring.feet_and_hands import WHOLE_BODY_MM
 from simharness.scoring.pcp import GROUPS
 from simharness.scoring.score_registry import ScoreInfo, registered_scores
 
-__all__ = ["AP_MM", "HEADLINE", "PCK_MM", "SCORES", "ScoreInfo"]
+__all__ = ["AP_MM", "HEADLINE", "PCK_MM", "SCORES", "TOLERANCES", "ScoreInfo"]
 
 AP_MM = (25, 50, 75, 100, 125, 150)
 """Thresholds of average precision, mm."""
@@ -112,4 +112,26 @@ SCORES: Mapping[str, ScoreInfo] = MappingProxyType(
 """Descriptions of all scores by key, in the order of the columns of a study's table of trials."""
 
 HEADLINE = ("pcp", "recall", "precision", "mpjpe_mm", "match_f1", "ghosts")
-"""Keys of the headline scores of tables; a gate checks them and others (:data:`simharness.gate.baseline.GATED`)."""
+"""Keys of the headline scores of tables; a gate checks those of :data:`TOLERANCES`."""
+
+TOLERANCES: Mapping[str, float] = MappingProxyType(
+    {
+        "pcp": 0.5,
+        "recall": 0.5,
+        "precision": 0.5,
+        "mpjpe_mm": 0.5,
+        "match_f1": 0.5,
+        "ghosts": 0.02,
+        "missed": 0.01,
+        "map": 0.5,  # sees the order of the scores of people
+        "coverage_90": 1.0,  # further from 90 %
+        "score_brier": 0.005,
+        "hota": 1.0,
+        "idf1": 1.0,
+    }
+)
+"""Scores that a gate compares, in the order of the columns of its baseline, each with the largest loss of its mean that
+is no regression by default, in the unit of the score.
+
+Between processors, means over the shipped suite differ by less than a hundredth of these values, and means over one of
+its conditions by less than a third. Scores of people over time (HOTA, IDF1) apply to variants that give identities."""

@@ -10,7 +10,7 @@ Distances are in units of OKS sigma x sqrt(area), the area 0.53 of the box (Ronc
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -34,100 +34,86 @@ ByHiddenShare = Annotated[tuple[Share, ...], Field(min_length=5, max_length=5)]
 Metres = Annotated[float, Field(ge=-1.0, le=1.0)]  # in the frame of a body
 Offset = Annotated[tuple[Metres, Metres, Metres], Elements(("forward", "outward", "up"))]
 
+Value = TypeVar("Value")
+_OF_SUBCLASS: Any = None  # default of the fields of the generic class, which has no instances
+
 
 def _expanded(given: Any, names: tuple[str, ...]) -> Any:
     """Return a number of the file as the value of each name, and anything else as it is."""
     return dict.fromkeys(names, given) if isinstance(given, int | float) and not isinstance(given, bool) else given
 
 
-class _ByJoint(Section):
-    """Value for each kind of joint; a single number in the file applies to all kinds."""
+class ByJoint(Section, Generic[Value]):
+    """Value for each kind of joint of COCO-17.
+
+    A subclass has in ``default`` the value of the kinds that a file leaves out.
+    """
+
+    default: ClassVar[Any] = None
+
+    nose: Value = _OF_SUBCLASS
+    eyes: Value = _OF_SUBCLASS
+    ears: Value = _OF_SUBCLASS
+    shoulders: Value = _OF_SUBCLASS
+    elbows: Value = _OF_SUBCLASS
+    wrists: Value = _OF_SUBCLASS
+    hips: Value = _OF_SUBCLASS
+    knees: Value = _OF_SUBCLASS
+    ankles: Value = _OF_SUBCLASS
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **options: Any) -> None:
+        super().__pydantic_init_subclass__(**options)
+        if cls.default is not None:
+            for kind in KINDS:
+                cls.model_fields[kind].default = cls.default
+            cls.model_rebuild(force=True)
+
+    def by_joint(self) -> tuple[Value, ...]:
+        """Return the value of each joint of COCO-17, (17,)."""
+        return tuple(getattr(self, KINDS[kind]) for kind in KIND_OF_JOINT)
+
+
+class NumberByJoint(ByJoint[Value], Generic[Value]):
+    """Number for each kind of joint; a single number in the file applies to all kinds."""
 
     @model_validator(mode="before")
     @classmethod
     def _expand_number(cls, given: Any) -> Any:
         return _expanded(given, KINDS)
 
-    def by_joint(self) -> tuple[Any, ...]:
-        """Return the value of each joint of COCO-17, (17,)."""
-        return tuple(getattr(self, KINDS[kind]) for kind in KIND_OF_JOINT)
 
-
-class Shares(_ByJoint):
+class Shares(NumberByJoint[Share]):
     """Share for each kind of joint."""
 
-    nose: Share = 0.0
-    eyes: Share = 0.0
-    ears: Share = 0.0
-    shoulders: Share = 0.0
-    elbows: Share = 0.0
-    wrists: Share = 0.0
-    hips: Share = 0.0
-    knees: Share = 0.0
-    ankles: Share = 0.0
+    default = 0.0
 
 
-class Amounts(_ByJoint):
+class Amounts(NumberByJoint[Factor]):
     """Factor or multiple of a unit for each kind of joint."""
 
-    nose: Factor = 0.0
-    eyes: Factor = 0.0
-    ears: Factor = 0.0
-    shoulders: Factor = 0.0
-    elbows: Factor = 0.0
-    wrists: Factor = 0.0
-    hips: Factor = 0.0
-    knees: Factor = 0.0
-    ankles: Factor = 0.0
+    default = 0.0
 
 
-class Factors(_ByJoint):
+class Factors(NumberByJoint[Multiple]):
     """Factor for each kind of joint; 1 changes nothing."""
 
-    nose: Multiple = 1.0
-    eyes: Multiple = 1.0
-    ears: Multiple = 1.0
-    shoulders: Multiple = 1.0
-    elbows: Multiple = 1.0
-    wrists: Multiple = 1.0
-    hips: Multiple = 1.0
-    knees: Multiple = 1.0
-    ankles: Multiple = 1.0
+    default = 1.0
 
 
-class Means(_ByJoint):
+class Means(NumberByJoint[Share]):
     """Mean for each kind of joint of something between 0 and 1; 0.5: all values are equally likely."""
 
-    nose: Share = 0.5
-    eyes: Share = 0.5
-    ears: Share = 0.5
-    shoulders: Share = 0.5
-    elbows: Share = 0.5
-    wrists: Share = 0.5
-    hips: Share = 0.5
-    knees: Share = 0.5
-    ankles: Share = 0.5
+    default = 0.5
 
 
-class BiasSection(Section):
+class BiasSection(ByJoint[Offset]):
     """Systematic offset of the detector's joints from the anatomical ones: forward, outward, up, metres, body frame.
 
     Up points from the hips to the shoulders, outward away from the middle of the body (for the nose: to the left).
     """
 
-    nose: Offset = (0.0, 0.0, 0.0)
-    eyes: Offset = (0.0, 0.0, 0.0)
-    ears: Offset = (0.0, 0.0, 0.0)
-    shoulders: Offset = (0.0, 0.0, 0.0)
-    elbows: Offset = (0.0, 0.0, 0.0)
-    wrists: Offset = (0.0, 0.0, 0.0)
-    hips: Offset = (0.0, 0.0, 0.0)
-    knees: Offset = (0.0, 0.0, 0.0)
-    ankles: Offset = (0.0, 0.0, 0.0)
-
-    def by_joint(self) -> tuple[Offset, ...]:
-        """Return the offset of each joint of COCO-17, (17, 3)."""
-        return tuple(getattr(self, KINDS[kind]) for kind in KIND_OF_JOINT)
+    default = (0.0, 0.0, 0.0)
 
     def of_face(self) -> BiasSection:
         """Return the bias of nose, eyes and ears alone."""

@@ -1,59 +1,52 @@
-"""[gate]: what ``simharness check`` counts as a regression, and what as an unexpected improvement."""
+"""[gate]: what ``simharness check`` counts as a regression, and what as an unexpected improvement.
+
+Its tables of limits have the gated scores of the catalogue, :data:`simharness.scoring.catalogue.TOLERANCES`, as keys.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, create_model
 
-from simharness.scenario.sections.section import Percent, Section
-
-Size = Annotated[float, Field(ge=0.0, le=1000.0)]
+from simharness.scenario.sections.section import Section
+from simharness.scoring.catalogue import SCORES, TOLERANCES
 
 BOUND = 2.0
 """Default bound of an improvement, in tolerances."""
 
-
-class Tolerance(Section):
-    """Largest loss in the mean of a score that is not a regression, however significant it is.
-
-    Between processors, means over the shipped suite differ by less than a hundredth of these values, and means over one
-    of its conditions by less than a third.
-    """
-
-    pcp: Percent = Field(0.5, description="percentage points")
-    recall: Percent = Field(0.5, description="percentage points")
-    precision: Percent = Field(0.5, description="percentage points")
-    mpjpe_mm: Size = Field(0.5, description="millimetres")
-    match_f1: Percent = Field(0.5, description="percentage points")
-    ghosts: Size = Field(0.02, description="ghosts per frame")
-    missed: Size = Field(0.01, description="missed people per frame")
-    map: Percent = Field(0.5, description="percentage points; sees the order of the scores of people")
-    coverage_90: Percent = Field(1.0, description="percentage points further from 90 %")
-    score_brier: Size = Field(0.005, description="mean squared error of joint scores as probabilities")
-    hota: Percent = Field(1.0, description="percentage points; of variants that give identities")
-    idf1: Percent = Field(1.0, description="percentage points; of variants that give identities")
+_MOST = {"%": 100.0}  # largest limit by the unit of the score
+_UNITS = {"%": "percentage points", "mm": "millimetres", "": "in the unit of the score"}
 
 
-class Improvement(Section):
-    """Largest gain in the mean of a score that needs no acceptance; by default twice the tolerance.
+def _limits(name: str, about: str, defaults: Mapping[str, float | None]) -> Any:
+    """Return a section with a limit for each gated score of the catalogue."""
+    fields: dict[str, Any] = {}
+    for key, default in defaults.items():
+        score = SCORES[key]
+        kind = Annotated[float, Field(ge=0.0, le=_MOST.get(score.unit, 1000.0))]
+        about_score = f"{score.title}: {_UNITS.get(score.unit, score.unit)}"
+        fields[key] = (kind if default is not None else kind | None, Field(default, description=about_score))
+    return create_model(name, __base__=Section, __module__=__name__, __doc__=about, **fields)
 
-    A larger gain is either an improvement that belongs in the baseline, or a suite that became easier. For a score with
-    a best value, such as coverage, this is the largest change in either direction.
-    """
 
-    pcp: Percent | None = Field(None, description="percentage points")
-    recall: Percent | None = Field(None, description="percentage points")
-    precision: Percent | None = Field(None, description="percentage points")
-    mpjpe_mm: Size | None = Field(None, description="millimetres")
-    match_f1: Percent | None = Field(None, description="percentage points")
-    ghosts: Size | None = Field(None, description="ghosts per frame")
-    missed: Size | None = Field(None, description="missed people per frame")
-    map: Percent | None = Field(None, description="percentage points")
-    coverage_90: Percent | None = Field(None, description="percentage points, in either direction")
-    score_brier: Size | None = Field(None, description="mean squared error of joint scores as probabilities")
-    hota: Percent | None = Field(None, description="percentage points")
-    idf1: Percent | None = Field(None, description="percentage points")
+if TYPE_CHECKING:
+    Tolerances = Improvements = Section
+else:
+    Tolerances = _limits(
+        "Tolerances",
+        "Largest loss in the mean of a score that is not a regression, however significant it is.",
+        TOLERANCES,
+    )
+    Improvements = _limits(
+        "Improvements",
+        """Largest gain in the mean of a score that needs no acceptance; by default twice the tolerance.
+
+A larger gain is either an improvement that belongs in the baseline, or a suite that became easier. For a score with a
+best value, such as coverage, this is the largest change in either direction.""",
+        dict.fromkeys(TOLERANCES),
+    )
 
 
 class GateSection(Section):
@@ -71,8 +64,8 @@ class GateSection(Section):
     slowdown_elsewhere: float = Field(
         2.0, gt=1.0, le=100.0, description="the same on another kind of processor than that of the baseline"
     )
-    tolerance: Tolerance = Tolerance()
-    improvement: Improvement = Improvement()
+    tolerance: Tolerances = Tolerances()
+    improvement: Improvements = Improvements()
 
     def tolerance_of(self, score: str) -> float:
         """Return the tolerance of a score."""
