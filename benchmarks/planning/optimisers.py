@@ -21,8 +21,8 @@ from benchmarks.planning.rooms import draw_room
 from mvpose.arrays import Floats
 from simharness.planning.candidates import Candidate, candidates_in, far_enough
 from simharness.planning.limits import Limits
+from simharness.planning.planned_room import Room
 from simharness.planning.rig_value import RigValue
-from simharness.planning.room import Room
 from simharness.planning.search import CandidateSet, exchange_search, refine
 from simharness.planning.value_fit import fit_value
 

@@ -15,7 +15,7 @@ import numpy as np
 import yaml
 
 from simharness.planning.candidates import Candidate, candidate
-from simharness.planning.room import Room
+from simharness.planning.planned_room import Room
 
 PROGRAM = "lab-camera-optimizer"
 

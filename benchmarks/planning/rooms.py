@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from simharness.planning.planned_room import Room, make_room, rectangle
 from simharness.planning.polygons import contains
-from simharness.planning.room import Room, make_room, rectangle
 from simharness.planning.room_keys import RoomKeys
 from simharness.types.random_streams import stream
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from mvpose import Camera
 from mvpose.arrays import Floats
+from simharness.planning.planned_room import Room
 from simharness.planning.polygons import contains
-from simharness.planning.room import Room
 
 _AIM_HEIGHT = 0.95  # metres: the height of the hips, about which people are centred
 _AIM_SPACING = 1.5  # metres between the points of the volume at which candidates look

@@ -10,7 +10,7 @@ import numpy as np
 from mvpose.arrays import Bools, Floats, Integers
 from simharness.planning.candidates import Candidate
 from simharness.planning.mounts import MountKind
-from simharness.planning.room import Room
+from simharness.planning.planned_room import Room
 
 _KINDS: tuple[MountKind, ...] = ("wall", "ceiling", "tripod")
 _ROUNDING = 1e-9

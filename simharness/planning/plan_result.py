@@ -12,7 +12,7 @@ import numpy as np
 from mvpose import Rig
 from simharness.planning.candidates import Candidate
 from simharness.planning.fast_layer import Prediction
-from simharness.planning.room import Room
+from simharness.planning.planned_room import Room
 from simharness.planning.room_keys import TargetKeys
 
 

@@ -28,9 +28,9 @@ from simharness.planning.candidates import Candidate, alike, around, candidates_
 from simharness.planning.fast_layer import FastLayer, Prediction
 from simharness.planning.limits import Limits
 from simharness.planning.plan_result import Alternative, CurvePoint, Figures, PlannedCamera, RigPlan
+from simharness.planning.planned_room import Room
 from simharness.planning.rig_comparison import corner_rig, rig_of, ring_rig, simulate_rigs
 from simharness.planning.rig_value import RigValue
-from simharness.planning.room import Room
 from simharness.planning.room_file import read_room
 from simharness.planning.scene_results import interval_of
 from simharness.planning.search import CandidateSet, Ledger, exchange_search, refine

@@ -11,8 +11,8 @@ from mvpose import Camera, Rig
 from mvpose.arrays import Floats
 from mvpose.commands.progress import Reporter, Silence
 from simharness.planning.candidates import Candidate, candidate, places_in
+from simharness.planning.planned_room import Room
 from simharness.planning.rehearsal_scene import SceneSettings
-from simharness.planning.room import Room
 from simharness.planning.scene_results import Condition, SceneResult
 from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
 from simharness.planning.value_fit import VARIANT, obstacles_of

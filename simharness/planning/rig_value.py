@@ -23,7 +23,7 @@ from mvpose.kernels import njit
 from simharness.detector.conditions import oks_units
 from simharness.planning.candidates import Candidate
 from simharness.planning.fast_layer import FastLayer
-from simharness.planning.room import Room
+from simharness.planning.planned_room import Room
 from simharness.planning.visibility import see
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.views import Views, Visibility

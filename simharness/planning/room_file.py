@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from mvpose.files.message_text import all_in_one_line, listed, one_line
-from simharness.planning.room import Room, make_room
+from simharness.planning.planned_room import Room, make_room
 from simharness.planning.room_keys import RoomKeys
 from simharness.scenario.layers import Origins, merge, nested, set_origin
 from simharness.scenario.shipped import shipped_folder

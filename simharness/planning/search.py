@@ -25,7 +25,7 @@ from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import read_json_object
 from simharness.planning.candidates import Candidate, far_enough, moved
 from simharness.planning.limits import Limits
-from simharness.planning.room import Room
+from simharness.planning.planned_room import Room
 from simharness.types.random_streams import stream
 
 Terms = TypeVar("Terms")

@@ -9,8 +9,8 @@ import numpy as np
 from mvpose.arrays import Floats, Integers
 from simharness.planning.candidates import Candidate
 from simharness.planning.fast_layer import FastLayer
+from simharness.planning.planned_room import Room
 from simharness.planning.rig_value import Correction, RigValue, SightingOdds
-from simharness.planning.room import Room
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.types.random_streams import stream

@@ -16,8 +16,8 @@ from simharness.outputs import TEMPLATES
 from simharness.outputs.planning.plan_plots import buying_curve, place_map, rig_bars, room_from_above, room_from_side
 from simharness.planning.candidates import candidates_in, places_in
 from simharness.planning.plan_result import RigPlan, sentences
+from simharness.planning.planned_room import Room
 from simharness.planning.rig_file import write_rig
-from simharness.planning.room import Room
 from simharness.runtime.version import code_version
 
 _SPACING, _LEVELS = 0.4, 0.5  # metres between the drawn places

@@ -14,7 +14,7 @@ from mvpose.arrays import Floats
 from mvpose.report.rig_plots import MapLabel, cone_from_above, write_labels
 from mvpose.report.svg_plots import FAINT, INK, LINE, svg_plot
 from simharness.planning.plan_result import RigPlan
-from simharness.planning.room import Room
+from simharness.planning.planned_room import Room
 
 _COLORS = LinearSegmentedColormap.from_list("quality", ["#b3261e", "#e8a33d", "#f2e3a0", "#7cc4a4", "#1f7a51"])
 _SIZE = (5.2, 3.1)

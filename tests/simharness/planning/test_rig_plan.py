@@ -15,10 +15,10 @@ from mvpose import Rig
 from simharness.cli import app
 from simharness.planning.candidates import candidates_in
 from simharness.planning.plan_rig import plan_rig
+from simharness.planning.planned_room import Room, make_room
 from simharness.planning.rig_comparison import corner_rig, rig_of, ring_rig
 from simharness.planning.rig_file import CALIBRATION, write_rig
 from simharness.planning.rig_value import RigValue, SightingOdds
-from simharness.planning.room import Room, make_room
 from simharness.planning.room_file import read_room
 from simharness.planning.room_keys import RoomKeys
 from simharness.planning.search import Ledger

@@ -11,8 +11,8 @@ import pytest
 from simharness.planning.candidates import candidates_in, moved, places_in
 from simharness.planning.limits import Limits
 from simharness.planning.plan_rig import plan_rig
+from simharness.planning.planned_room import Room, make_room
 from simharness.planning.polygons import contains, counter_clockwise, crossing_edges, signed_area
-from simharness.planning.room import Room, make_room
 from simharness.planning.room_file import read_room
 from simharness.planning.room_keys import RoomKeys
 
