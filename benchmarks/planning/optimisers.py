@@ -110,7 +110,7 @@ def _camera(room: Room, x: Floats) -> Candidate | None:
     place = mount.at([(x[0] - start) / (ends[index] - start), 0.5, x[1]])
     if not room.may_hang(mount, place):
         return None
-    middle = room.volume.mean(axis=0) - place[:2]
+    middle = room.volume.outline.mean(axis=0) - place[:2]
     bearing = float(np.arctan2(middle[1], middle[0]) + _TURN * (2 * x[2] - 1))
     lens = int(min(x[4] * len(room.lenses), len(room.lenses) - 1))
     a, b, c = place.tolist()

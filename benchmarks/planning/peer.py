@@ -35,9 +35,9 @@ def settings_of(room: Room, count: int) -> dict[str, Any]:
     clearance = walls.clearance
     low, high = walls.heights
     wide, tall = lens.fov
-    corner = room.volume.min(axis=0)
+    corner = room.volume.bounds[0]
     return {
-        "room": {"corners": _shrunk(room.outline, clearance).round(4).tolist(), "height": room.height},
+        "room": {"corners": _shrunk(room.space.outline, clearance).round(4).tolist(), "height": room.space.height},
         "obstacles": [
             {
                 "type": "rect",
@@ -75,7 +75,7 @@ def settings_of(room: Room, count: int) -> dict[str, Any]:
                 "type": "polygon",
                 "priority": 1.0,
                 "grid_step": 0.25,
-                "vertices": (room.volume - corner).tolist(),
+                "vertices": (room.volume.outline - corner).tolist(),
                 "placement": {"x_offsets": [float(corner[0])], "y_offsets": [float(corner[1])]},
             }
         ],

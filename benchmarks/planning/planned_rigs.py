@@ -17,7 +17,7 @@ from benchmarks.method.report import table
 from benchmarks.planning.peer import PROGRAM, peer_rig
 from benchmarks.planning.rooms import draw_room
 from simharness.planning.candidates import Candidate
-from simharness.planning.plan_rig import plan_rig
+from simharness.planning.plan_rig import PlanEffort, plan_rig
 from simharness.planning.rig_comparison import corner_rig, rig_of, ring_rig, simulate_rigs
 from simharness.planning.scene_results import interval_of
 from simharness.planning.search import Ledger
@@ -57,7 +57,8 @@ def _compare(seed: int, options: argparse.Namespace, program: str) -> dict[str, 
     count = room.keys.cameras.count
     assert count is not None
     start = time.perf_counter(), time.process_time()
-    planned = plan_rig(room, count, simulate=0, curve=(), starts=options.starts, most=options.candidates, seed=seed)
+    effort = PlanEffort(scenes=0, curve=(), starts=options.starts, candidates=options.candidates)
+    planned = plan_rig(room, count, effort=effort, seed=seed)
     seconds = time.perf_counter() - start[0]
     begun = time.perf_counter()
     folder = Path.cwd() if options.out is None else options.out.parent
@@ -76,7 +77,7 @@ def _compare(seed: int, options: argparse.Namespace, program: str) -> dict[str, 
         "people": room.keys.people.count,
         "pcp": dict(zip(RIGS, pcp, strict=True)),
         "mpjpe_mm": dict(zip(RIGS, error, strict=True)),
-        "predicted": planned.best.predicted.pcp[0],
+        "predicted": planned.best.predicted.pcp.mean,
         "seconds": {"plan": seconds, "peer": peer_seconds, "plan_processor": time.process_time() - start[1]},
     }
 

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from simharness.planning.planned_room import Room, make_room, rectangle
-from simharness.planning.polygons import contains
+from simharness.planning.planned_room import Room
+from simharness.planning.room_file import make_room
 from simharness.planning.room_keys import RoomKeys
+from simharness.types.floor import Floor, Volume
 from simharness.types.random_streams import stream
 
 LENS_SIZES = ((1280, 960), (1280, 800), (1920, 1080))
@@ -21,7 +22,7 @@ def draw_room(seed: int) -> Room:
     rng = stream(seed, "benchmark", "room")
     size = rng.uniform([6.0, 5.5], [11.0, 9.0]).round(1)
     height = round(float(rng.uniform(2.6, 3.4)), 1)
-    outline = rectangle((size[0], size[1]))
+    outline = Volume.box(size[0], size[1]).outline
     if rng.random() < 0.3:  # an L: one corner is cut away
         x, y = (size / 2).tolist()
         cut = rng.uniform(0.2, 0.35, 2) * size
@@ -55,9 +56,9 @@ def _volume(
     for _ in range(_TRIES):
         extent = rng.uniform(0.65, 0.88, 2) * size
         center = rng.uniform(-0.5, 0.5, 2) * (size - extent - 1.0)
-        grown = rectangle((extent[0] + 1.0, extent[1] + 1.0), (center[0], center[1]))
+        grown = Volume.box(extent[0] + 1.0, extent[1] + 1.0, center=(center[0], center[1])).outline
         sides = np.linspace(grown, np.roll(grown, -1, axis=0), 9).reshape(-1, 2)
-        if (extent >= 2.8).all() and contains(1.0001 * outline, sides).all():
+        if (extent >= 2.8).all() and Floor(1.0001 * outline).contains(sides).all():
             break
     else:
         extent = np.array([2.6, 2.6])  # in the corner from which nothing is cut
@@ -80,12 +81,12 @@ def _obstacles(
         kind = list(_KINDS)[rng.integers(len(_KINDS))]
         extent = np.array(_KINDS[kind])[:: 1 if rng.random() < 0.5 else -1]
         place = rng.uniform(low + extent / 2, high - extent / 2)
-        corners = rectangle((extent[0], extent[1]), (place[0], place[1]))
+        corners = Volume.box(extent[0], extent[1], center=(place[0], place[1])).outline
         clear = (np.abs(place - center) - volume / 2 - extent / 2).max() > 0.05
         apart = all(
             (np.abs(place - each["center"]) - extent / 2 - np.array(each["size"][:2]) / 2).max() > 0.3 for each in found
         )
-        if clear and apart and contains(outline, corners).all():
+        if clear and apart and Floor(outline).contains(corners).all():
             top = height if kind == "pillar" else round(float(rng.uniform(1.5, 2.1)), 1)
             u, v = place.round(2).tolist()
             found.append({"name": kind, "center": (u, v), "size": (float(extent[0]), float(extent[1]), top)})

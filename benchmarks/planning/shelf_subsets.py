@@ -167,7 +167,13 @@ def predicted_pcp(
         seed: seed of all draws.
         repeats: number of people at each place.
     """
-    layer = FastLayer.of(Volume.around(people.joints), detector=read_profile(detector), orientations=repeats, seed=seed)
+    layer = FastLayer.of(
+        Volume.around(people.joints),
+        detector=read_profile(detector),
+        orientations=repeats,
+        tracks=people.joints,
+        seed=seed,
+    )
     scenes, terms, result = layer.scenes, [layer.terms(camera) for camera in people.cameras], {}
     truth = coco17_to_shelf14(scenes.joints)
     if annotation is not None:

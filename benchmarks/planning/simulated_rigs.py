@@ -158,10 +158,10 @@ def trials(count: int, first: int) -> None:
             continue
         figure = predicted(scenario).summary(seconds=SECONDS)["pcp"]
         done, inside = done + 1, inside + (figure.low <= real <= figure.high)
-        apart.append(abs(real - figure.value))
+        apart.append(abs(real - figure.mean))
         print(
             f"seed {scenario.seed}: {len(scenario.cameras.positions)} cameras, {scenario.people.count} people: PCP "
-            f"{real:.1f}, predicted {figure.value:.1f} ({figure.low:.1f} to {figure.high:.1f}); so far {inside} of "
+            f"{real:.1f}, predicted {figure.mean:.1f} ({figure.low:.1f} to {figure.high:.1f}); so far {inside} of "
             f"{done} inside, {100 * inside / done:.1f} % (bound 85 to 95), mean difference {np.mean(apart):.2f}",
             flush=True,
         )

@@ -140,7 +140,7 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
         raise ValueError(f"--joints must be body or all, got {choices.joints!r}")
     if choices.fps is not None and not 0.0 < choices.fps < 1e6:
         raise ValueError(f"--fps must be above 0, got {choices.fps}")
-    frames, size = _frames(choices.frames), _size(choices.size)
+    frames, size = _frames(choices.frames), picture_size(choices.size)
     skeleton = _skeleton(choices.skeleton) if choices.skeleton else None
     rig = read_calibration(calibration, size=plausibility.UNKNOWN_SIZE, only=choices.only, key="--cameras")
     names = [camera.name for camera in rig]
@@ -242,7 +242,12 @@ def _frames(given: str | None) -> tuple[int, int] | None:
     return int(first), int(last)
 
 
-def _size(given: str | None) -> tuple[int, int] | None:
+def picture_size(given: str | None) -> tuple[int, int] | None:
+    """Return the width and height of pictures, pixels, of the text of an option: "1920x1080"; None without a text.
+
+    Raises:
+        ValueError: not two whole numbers above 0.
+    """
     if given is None:
         return None
     sides = given.lower().replace("×", "x").replace(",", "x").split("x")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 
+from mvpose.commands.option_groups import grouped
 from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:
@@ -18,7 +20,51 @@ INTERRUPTED = 130
 
 def add_to(app: typer.Typer) -> None:
     """Add the command."""
-    app.command()(plan)
+    app.command()(grouped()(plan))
+
+
+@dataclass(frozen=True)
+class RoomOptions:
+    """Options that choose among the lenses of a room file, or replace its keys."""
+
+    cameras: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Number of cameras, with those that hang already; instead of the file's."),
+    ] = None
+    lens: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="A lens of the room file that may be used. Repeatable. [dim]\\[default: all][/]"
+        ),
+    ] = None
+    people: Annotated[int | None, typer.Option(metavar="N", help="Number of people, instead of the file's.")] = None
+    detector: Annotated[
+        str | None, typer.Option(metavar="PROFILE", help="Detector profile, instead of the file's.")
+    ] = None
+    objective: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help="What is maximised: [cyan]share[/], [cyan]mean[/] or [cyan]worst[/]; instead of the file's.",
+        ),
+    ] = None
+    failing: Annotated[
+        int | None, typer.Option(metavar="K", help="Number of cameras that may fail, instead of the file's.")
+    ] = None
+    budget: Annotated[
+        float | None, typer.Option(metavar="SUM", help="Largest cost of the lenses, instead of the file's.")
+    ] = None
+
+    def changes(self) -> dict[tuple[str, ...], Any]:
+        """Return the keys that are replaced, with their values."""
+        changes = {
+            ("people", "count"): self.people,
+            ("detector",): self.detector,
+            ("objective", "kind"): self.objective,
+            ("objective", "failing"): self.failing,
+            ("cameras", "budget"): self.budget,
+        }
+        return {key: value for key, value in changes.items() if value is not None}
 
 
 def plan(
@@ -26,33 +72,7 @@ def plan(
         Path,
         typer.Argument(help="A room file (TOML), or the name of a shipped room: [cyan]lab[/].", metavar="ROOM"),
     ],
-    cameras: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Number of cameras, with those that hang already; instead of the file's."),
-    ] = None,
-    lens: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME", help="A lens of the room file that may be used. Repeatable. [dim]\\[default: all][/]"
-        ),
-    ] = None,
-    people: Annotated[int | None, typer.Option(metavar="N", help="Number of people, instead of the file's.")] = None,
-    detector: Annotated[
-        str | None, typer.Option(metavar="PROFILE", help="Detector profile, instead of the file's.")
-    ] = None,
-    objective: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND",
-            help="What is maximised: [cyan]share[/], [cyan]mean[/] or [cyan]worst[/]; instead of the file's.",
-        ),
-    ] = None,
-    failing: Annotated[
-        int | None, typer.Option(metavar="K", help="Number of cameras that may fail, instead of the file's.")
-    ] = None,
-    budget: Annotated[
-        float | None, typer.Option(metavar="SUM", help="Largest cost of the lenses, instead of the file's.")
-    ] = None,
+    options: RoomOptions,
     scenes: Annotated[
         int, typer.Option(metavar="N", min=0, max=1000, help="Simulated scenes that confirm the plan; 0: none.")
     ] = 8,
@@ -80,14 +100,7 @@ def plan(
         from mvpose.commands.progress import reporter
         from simharness.planning.room_file import read_room
 
-        changes = {
-            ("people", "count"): people,
-            ("detector",): detector,
-            ("objective", "kind"): objective,
-            ("objective", "failing"): failing,
-            ("cameras", "budget"): budget,
-        }
-        loaded = read_room(room, changes={key: value for key, value in changes.items() if value is not None})
+        loaded = read_room(room, changes=options.changes())
         folder = out / (Path(loaded.file).stem or loaded.name)
         if preview:
             from simharness.outputs.planning.plan_page import write_preview
@@ -96,13 +109,13 @@ def plan(
             typer.echo(f"preview: {page}")
             return
         from simharness.outputs.planning.plan_page import write_plan
-        from simharness.planning.plan_rig import plan_rig
+        from simharness.planning.plan_rig import PlanEffort, plan_rig
 
         try:
             with reporter() as bars:
                 planned = plan_rig(
-                    loaded, cameras, lenses=lens or (), simulate=scenes, seed=seed, workers=workers, folder=folder,
-                    reporter=bars,
+                    loaded, options.cameras, lenses=options.lens or (), seed=seed, folder=folder, reporter=bars,
+                    effort=PlanEffort(scenes=scenes, workers=workers),
                 )  # fmt: skip
         except KeyboardInterrupt:
             typer.echo("interrupted; the same command goes on where this one stopped", err=True)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated
@@ -10,12 +12,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
+from mvpose.commands.option_groups import grouped
 from mvpose.commands.output_files import make_folder, write_json, write_text
 from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:
-    from simharness.planning.visibility import Obstacle
-    from simharness.planning.volume import Volume
+    from mvpose import Rig
+    from simharness.planning.planned_room import Room
+    from simharness.planning.rehearsal_setup import RehearsalSetup
+    from simharness.types.floor import Volume
 
 _MOST_PEOPLE = 40
 _PEOPLE = 4
@@ -25,7 +30,46 @@ _CROWD = 6  # scenes of other numbers of people
 
 def add_to(app: typer.Typer) -> None:
     """Add the command."""
-    app.command()(rehearse)
+    app.command()(grouped()(rehearse))
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """Options that say where people are, and who finds them."""
+
+    room: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="A room file (TOML) as of [cyan]simharness plan[/], or the name of a shipped room: walls, volume, "
+            "obstacles, people, clutter, detector and target. Cameras have to be in it.",
+        ),
+    ] = None
+    volume: Annotated[
+        str,
+        typer.Option(
+            metavar="XxY",
+            help="Where people are, metres: a rectangle around the origin, [cyan]4x3[/]; instead of the room file's. "
+            "[dim]\\[default: what three cameras see][/]",
+        ),
+    ] = ""
+    people: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=1,
+            max=_MOST_PEOPLE,
+            help="People in the volume, instead of the file's. [dim]\\[default: 4][/]",
+        ),
+    ] = None
+    detector: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PROFILE",
+            help="A detector profile, a shipped name or a TOML file, instead of the room file's. "
+            "[dim]\\[default: typical][/]",
+        ),
+    ] = None
 
 
 def rehearse(
@@ -36,54 +80,11 @@ def rehearse(
             metavar="CALIBRATION",
         ),
     ],
-    room: Annotated[
-        str,
-        typer.Option(
-            metavar="ROOM",
-            help="Size of the room around the origin, metres, as [cyan]8x6x3[/], or a room file of "
-            "[cyan]simharness plan[/], with its volume, obstacles, people and detector. Cameras have to be in it.",
-        ),
-    ] = "",
-    volume: Annotated[
-        str,
-        typer.Option(
-            metavar="XxY[@X,Y]",
-            help="Where people are, metres: [cyan]4x3[/] around the origin, [cyan]4x3@1,0.5[/] around a point, or "
-            "corners [cyan]0,0 4,0 4,3[/]. [dim]\\[default: what three cameras see][/]",
-        ),
-    ] = "",
-    people: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, max=_MOST_PEOPLE, help="People in the volume. [dim]\\[default: 4][/]"),
-    ] = None,
-    detector: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PROFILE", help="A detector profile: a shipped name or a TOML file. [dim]\\[default: typical][/]"
-        ),
-    ] = None,
-    obstacle: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="X,Y,W,D,H",
-            help="A box that hides people: its middle on the floor, width along x, depth along y, height. Repeatable.",
-        ),
-    ] = None,
-    clutter: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KIND=N",
-            help="Objects that the simulator places around the people, in the simulation alone: [cyan]boxes=6[/], "
-            "[cyan]shelves=1[/] and other kinds of a scenario. Repeatable.",
-        ),
-    ] = None,
-    target: Annotated[
-        str, typer.Option(metavar="PCP,MM", help="What a place must reach: PCP, and joint error in mm.")
-    ] = "95,40",
+    surroundings: Surroundings,
     size: Annotated[
-        str,
+        str | None,
         typer.Option(metavar="WxH", help="Size of the pictures, pixels, where the calibration does not state it."),
-    ] = "",
+    ] = None,
     subsets: Annotated[bool, typer.Option("--subsets", help="Also score every set of two cameras and more.")] = False,
     scenes: Annotated[int, typer.Option(metavar="N", min=2, max=1000, help="Number of simulated scenes.")] = 16,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of all draws.")] = 0,
@@ -107,56 +108,25 @@ def rehearse(
     """
     with PROGRAM.exit_on_error():
         start = perf_counter()
+        from mvpose.cli.inputs import picture_size
         from mvpose.commands.progress import reporter
-        from simharness.cli.rehearse_values import (
-            clutter_of,
-            obstacle_of,
-            picture_size,
-            surroundings_of,
-            target_of,
-            volume_of,
-        )
         from simharness.outputs.planning.rehearsal_page import render_rehearsal
         from simharness.planning.rehearse_rig import RehearsalEffort, rehearse_rig
         from simharness.planning.rig_file import read_rig
-        from simharness.scenario.presets import read_profile
         from simharness.trial.provenance import provenance
 
-        around = surroundings_of(room) if room else None
-        walls: Volume | None = None if around is None else around.room
-        where: Volume | None = volume_of(volume) if volume else None if around is None else around.volume
-        boxes: list[Obstacle] = [obstacle_of(each) for each in obstacle or ()]
-        boxes += () if around is None else around.obstacles
-        wanted, objects = target_of(target), clutter_of(clutter or ())
-        rig = read_rig(
-            calibration,
-            size=picture_size(size) if size else None,
-            room=None if walls is None else (*(2 * walls.outline.max(axis=0)).tolist(), walls.height),
-        )
-        profile = None if around is None or detector is not None else around.detector
-        profile = read_profile(detector or _DETECTOR) if profile is None else profile
-        count = people or (None if around is None else around.people) or _PEOPLE
+        room = _room(surroundings)
+        corners = None if room is None else (*(2 * room.space.bounds[1]).tolist(), room.space.height)
+        rig = read_rig(calibration, size=picture_size(size), room=corners)
+        setup = _setup(rig, room, surroundings)
         name = calibration.stem or calibration.resolve().name
         place = out or Path("results/rehearsal") / name
         make_folder(place)
+        effort = RehearsalEffort(
+            scenes=scenes, crowd_scenes=min(_CROWD, scenes), workers=workers or os.cpu_count() or 1
+        )
         with reporter() as bars:
-            rehearsal = rehearse_rig(
-                rig,
-                detector=profile,
-                volume=where,
-                people=count,
-                room=walls,
-                obstacles=boxes,
-                clutter=objects,
-                target=wanted,
-                subsets=subsets,
-                seed=seed,
-                effort=RehearsalEffort(
-                    scenes=scenes, crowd_scenes=min(_CROWD, scenes), workers=workers or os.cpu_count() or 1
-                ),
-                name=name,
-                reporter=bars,
-            )
+            rehearsal = rehearse_rig(rig, setup, subsets=subsets, seed=seed, effort=effort, name=name, reporter=bars)
         made = provenance(
             command=PROGRAM.command_line(),
             seeds=range(seed, seed + scenes),
@@ -169,3 +139,44 @@ def rehearse(
     for sentence in rehearsal.sentences:
         console.print(sentence, highlight=False, markup=False)
     console.print(f"report: {place / 'rehearsal.html'}", soft_wrap=True, highlight=False, markup=False)
+
+
+def _room(given: Surroundings) -> Room | None:
+    from simharness.planning.room_file import read_room
+
+    changes = {("people", "count"): given.people, ("detector",): given.detector}
+    known = {key: value for key, value in changes.items() if value is not None}
+    return None if given.room is None else read_room(given.room, changes=known)
+
+
+def _setup(rig: Rig, room: Room | None, given: Surroundings) -> RehearsalSetup:
+    """Return what the rig is rehearsed for: the room file's, or the defaults, as the options change it."""
+    from simharness.planning.floor_coverage import covered_volume
+    from simharness.planning.rehearsal_setup import RehearsalSetup
+    from simharness.scenario.presets import read_profile
+
+    if room is not None:
+        setup = RehearsalSetup.in_room(room)
+        return replace(setup, volume=rectangle_of(given.volume)) if given.volume else setup
+    volume = rectangle_of(given.volume) if given.volume else covered_volume(rig)[0]
+    return RehearsalSetup(volume, read_profile(given.detector or _DETECTOR), given.people or _PEOPLE)
+
+
+def rectangle_of(text: str) -> Volume:
+    """Return the volume over a rectangle around the origin: "4x3", metres.
+
+    Raises:
+        ValueError: not two sides above 0 m.
+    """
+    from simharness.types.floor import Volume
+
+    try:
+        sides = [float(each) for each in text.split("x")]
+    except ValueError:
+        sides = []
+    if len(sides) != 2 or not all(math.isfinite(each) and each > 0 for each in sides):
+        raise ValueError(
+            f"--volume {text}: expected two sides above 0 m, 4x3, of a rectangle around the origin; another place or "
+            "shape, and a height, stand in the section [volume] of a room file: --room FILE"
+        )
+    return Volume.box(*sides)

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from mvpose import Camera
 from mvpose.arrays import Floats
 from simharness.planning.planned_room import Room
-from simharness.planning.polygons import contains
 
 _AIM_HEIGHT = 0.95  # metres: the height of the hips, about which people are centred
 _AIM_SPACING = 1.5  # metres between the points of the volume at which candidates look
@@ -62,12 +61,12 @@ def candidate(mount: int, lens: int, place: ArrayLike, aim: ArrayLike) -> Candid
 
 def aims_in(room: Room, *, spacing: float = _AIM_SPACING) -> Floats:
     """Return points of the volume at which candidates look, (n, 3), metres: its middle first, then a grid."""
-    low, high = room.volume.min(axis=0), room.volume.max(axis=0)
+    low, high = room.volume.bounds
     counts = np.maximum(np.round((high - low) / spacing).astype(int), 1) + 1
     x, y = (np.linspace(a, b, n + 2)[1:-1] for a, b, n in zip(low, high, counts, strict=True))
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    grid = grid[contains(room.volume, grid)]
-    middle = grid.mean(axis=0) if len(grid) else room.volume.mean(axis=0)
+    grid = grid[room.volume.contains(grid)]
+    middle = grid.mean(axis=0) if len(grid) else room.volume.outline.mean(axis=0)
     return np.column_stack([np.vstack([middle, grid]), np.full(1 + len(grid), _AIM_HEIGHT)])
 
 
@@ -163,7 +162,7 @@ def far_enough(room: Room, candidates: Sequence[Candidate], fixed: Sequence[Came
 
 def around(room: Room, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     """Return candidates in the order of their bearings from the middle of the volume, counter-clockwise."""
-    x, y = room.volume.mean(axis=0).tolist()
+    x, y = room.volume.outline.mean(axis=0).tolist()
     return tuple(sorted(candidates, key=lambda each: math.atan2(each.place[1] - y, each.place[0] - x) % (2 * math.pi)))
 
 

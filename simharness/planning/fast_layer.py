@@ -20,11 +20,13 @@ from simharness.detector.conditions import VISIBLE, oks_units
 from simharness.planning.camera_terms import CameraTerms, covariance, detect_in
 from simharness.planning.reconstruction import Reconstruction, reconstruct
 from simharness.planning.standing_people import ACTIVITIES, StandingScenes, pose_pool, standing_scenes
-from simharness.planning.visibility import Obstacle, see, seen_joints
-from simharness.planning.volume import Volume
+from simharness.planning.visibility import see, seen_joints
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scoring.pcp import Part, part_states
+from simharness.statistics.intervals import Interval
+from simharness.types.floor import Volume
 from simharness.types.random_streams import stream
+from simharness.world.scene.objects.geoms import Box
 
 _LEAST_DEVIATION = 0.5  # pixels: no keypoint is more exact than the grid from which it is read
 _FIRST_MOMENTS, _MOMENT = 1.0, 1.0
@@ -49,7 +51,7 @@ class FastLayer:
     volume: Volume
     scenes: StandingScenes = field(repr=False)
     detector: DetectorSection = field(repr=False)
-    obstacles: tuple[Obstacle, ...] = ()
+    obstacles: tuple[Box, ...] = ()
     seed: int = 0
 
     @classmethod
@@ -62,9 +64,9 @@ class FastLayer:
         spacing: float = 0.5,
         orientations: int = 8,
         draws: int = 1,
-        obstacles: Sequence[Obstacle] = (),
+        obstacles: Sequence[Box] = (),
         activities: Sequence[str] = ACTIVITIES,
-        children: float = 0.0,
+        tracks: Floats | None = None,
         seed: int = 0,
     ) -> FastLayer:
         """Draw the scenes of a volume.
@@ -72,26 +74,27 @@ class FastLayer:
         Args:
             volume: where people stand.
             detector: profile of the detector (:func:`simharness.scenario.presets.read_profile`).
-            people: number of people at a time; where the volume has tracks, those people stand as recorded.
+            people: number of people at a time; with tracks, those people stand as recorded.
             spacing: metres between the places of the map.
             orientations: number of directions in which somebody stands at each place, per draw.
             draws: number of draws of everything else at each place and direction.
             obstacles: boxes that hide people; nobody stands in them.
             activities: activities of the simulator from which poses are taken.
-            children: share of children.
+            tracks: joints of recorded people who walk in the volume, COCO-17, (T, P, 17, 3), metres, NaN where a
+                person is absent.
             seed: seed of all draws.
 
         Raises:
             ValueError: no people, or no place where a person can stand.
         """
-        pool = pose_pool(activities, children=children)
         scenes = standing_scenes(
             volume,
-            pool,
+            pose_pool(activities),
             people=people,
             spacing=spacing,
             repeats=orientations * draws,
-            blocked=[each.floor for each in obstacles if each.blocks],
+            obstacles=obstacles,
+            tracks=tracks,
             seed=seed,
         )
         return cls(volume, scenes, detector, tuple(obstacles), seed)
@@ -164,7 +167,7 @@ class Prediction:
     person_pcp: Floats
     person_error_mm: Floats
 
-    def summary(self, *, seconds: float = 10.0) -> dict[str, Figure]:
+    def summary(self, *, seconds: float = 10.0) -> dict[str, Interval]:
         """Return ``pcp`` and ``mpjpe_mm`` of the volume, with the 90 % intervals of a recording of some seconds.
 
         The interval is that of the mean over as many moments as are independent in so many seconds: people stay
@@ -207,26 +210,12 @@ def _prediction(scenes: StandingScenes, terms: Sequence[CameraTerms], made: Reco
     )
 
 
-def _figure(values: Floats, moments: float) -> Figure:
+def _figure(values: Floats, moments: float) -> Interval:
     """Return the mean of values of people (S, Q) and the interval of the mean of some scenes, drawn from all."""
     known = np.isfinite(values).any(axis=1)
     if not known.any():
-        return Figure(np.nan, np.nan, np.nan)
+        return Interval(np.nan, np.nan, np.nan, 0)
     scenes = np.nanmean(values[known], axis=1)
     drawn = stream(0, "planning", "interval").choice(scenes, (_RESAMPLES, max(round(moments), 1))).mean(axis=1)
     low, high = np.quantile(drawn, [0.05, 0.95])
-    return Figure(float(np.nanmean(values)), float(low), float(high))
-
-
-@dataclass(frozen=True)
-class Figure:
-    """Expected value with its 90 % interval.
-
-    Attributes:
-        value: expected value.
-        low, high: interval in which the figure of one recording lies with probability 0.9.
-    """
-
-    value: float
-    low: float
-    high: float
+    return Interval(float(np.nanmean(values)), float(low), float(high), len(scenes))

@@ -9,6 +9,7 @@ import numpy as np
 
 from mvpose import Rig
 from mvpose.arrays import Bools, Floats, Integers
+from simharness.types.floor import Volume
 
 STANDING = (0.05, 1.75)
 """Heights of the soles and the crown of a standing person, metres."""
@@ -59,13 +60,13 @@ def whole_people(rig: Rig, places: Floats) -> Bools:
     return result
 
 
-def covered_rectangle(rig: Rig) -> tuple[Floats, int]:
-    """Return the largest upright rectangle in which enough cameras have a standing person whole in the picture.
+def covered_volume(rig: Rig) -> tuple[Volume, int]:
+    """Return the volume over the largest upright rectangle in which enough cameras see a standing person whole.
 
     Enough are three, or two where there is no such rectangle or the rig has no more than three cameras.
 
     Returns:
-        Corners (4, 2), metres, and the number of cameras that see every place of it.
+        The volume, and the number of cameras that see every place of it.
 
     Raises:
         ValueError: two cameras nowhere see one person whole.
@@ -80,7 +81,7 @@ def covered_rectangle(rig: Rig) -> tuple[Floats, int]:
         found = largest_rectangle(count >= needed, longest=round(_LARGEST / _STEP))
         if found is not None and min(found[1] - found[0], found[3] - found[2]) * _STEP >= _SMALLEST:
             x0, x1, y0, y1 = xs[found[0]], xs[found[1]], ys[found[2]], ys[found[3]]
-            return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), needed
+            return Volume(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])), needed
     raise ValueError(
         "nowhere on the floor do two cameras see one standing person whole: the cameras look past each other, or the "
         "floor of the calibration is not at z = 0; give --volume to rehearse anyway, or check the calibration"

@@ -14,6 +14,7 @@ from simharness.planning.candidates import Candidate
 from simharness.planning.fast_layer import Prediction
 from simharness.planning.planned_room import Room
 from simharness.planning.room_keys import TargetKeys
+from simharness.statistics.intervals import Interval
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,8 @@ class Figures:
         worst: least PCP of a place, percent; NaN where it was not computed.
     """
 
-    pcp: tuple[float, float, float]
-    error_mm: tuple[float, float, float]
+    pcp: Interval
+    error_mm: Interval
     share: float = math.nan
     worst: float = math.nan
 
@@ -47,10 +48,9 @@ class Figures:
         figures = prediction.summary()
         within = (prediction.pcp >= target.pcp) & (prediction.error_mm <= target.error)
         known = np.isfinite(prediction.pcp)
-        pcp, error = figures["pcp"], figures["mpjpe_mm"]
         return cls(
-            (float(pcp.value), float(pcp.low), float(pcp.high)),
-            (float(error.value), float(error.low), float(error.high)),
+            figures["pcp"],
+            figures["mpjpe_mm"],
             100.0 * float(within[known].mean()),
             float(prediction.pcp[known].min()),
         )
@@ -63,7 +63,7 @@ class Figures:
     def of_row(cls, row: Sequence[Any]) -> Self:
         """Return the figures of a row of the ledger."""
         pcp, error, share, worst = row
-        return cls((pcp[0], pcp[1], pcp[2]), (error[0], error[1], error[2]), share, worst)
+        return cls(Interval(*pcp), Interval(*error), share, worst)
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,7 @@ def sentences(plan: RigPlan) -> list[str]:
     people = "1 person" if room.keys.people.count == 1 else f"{room.keys.people.count} people"
     how = f"in {plan.simulated_scenes} simulated scenes" if plan.best.simulated is not None else "by the fast layer"
     lines = [
-        f"{len(plan.rig)} cameras give {figures.pcp[0]:.1f} PCP and {figures.error_mm[0]:.0f} mm for {people} "
+        f"{len(plan.rig)} cameras give {figures.pcp.mean:.1f} PCP and {figures.error_mm.mean:.0f} mm for {people} "
         f"within {area}, {how}."
     ]
     share = plan.best.predicted.share
@@ -219,7 +219,7 @@ def sentences(plan: RigPlan) -> list[str]:
     more = next((p for p in plan.curve if p.cameras == now + 1), None)
     same = next((p for p in plan.curve if p.cameras == now), None)
     if more is not None and same is not None:
-        gain = more.figures.pcp[0] - same.figures.pcp[0]
+        gain = more.figures.pcp.mean - same.figures.pcp.mean
         lines.append(
             f"One more camera would add {max(gain, 0.0):.1f} PCP."
             if gain >= 0.05
@@ -244,7 +244,7 @@ def _names(names: Sequence[str]) -> str:
 
 
 def _extent(room: Room) -> str:
-    x, y = (room.volume.max(axis=0) - room.volume.min(axis=0)).tolist()
+    x, y = room.volume.size.tolist()
     return f"{x:.1f} by {y:.1f} m"
 
 
@@ -252,8 +252,8 @@ def _numbers(values: Sequence[float]) -> list[float | None]:
     return [number(value) for value in values]
 
 
-def _interval(values: tuple[float, float, float]) -> dict[str, float | None]:
-    return {"value": number(values[0]), "low": number(values[1]), "high": number(values[2])}
+def _interval(values: Interval) -> dict[str, float | None]:
+    return {"value": number(values.mean), "low": number(values.low), "high": number(values.high)}
 
 
 def number(value: float) -> float | None:

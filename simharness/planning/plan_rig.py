@@ -15,6 +15,7 @@ import json
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -37,15 +38,30 @@ from simharness.planning.search import CandidateSet, Ledger, exchange_search, re
 from simharness.planning.value_fit import VARIANT, fit_value, layer_of
 from simharness.runtime.version import code_version
 
-_MOST_CANDIDATES = 1200
-_STARTS = 6  # of the search for the requested number of cameras
-_CURVE_STARTS = 2  # of the searches for other numbers
-_CURVE = (-2, -1, 0, 1, 2)
+_CURVE_STARTS = 2  # of the searches for other numbers of cameras
 _REFINED = 2  # sets that are refined, judged and simulated
-_SCENES = 8  # simulated scenes
 _JUDGED_PLACES, _JUDGED_REPEATS = 60, 8
 _NEAR_BEST = 1.0  # points of the objective within which a set is as good as the best
 _PREVIEW_SHARE = 1e-3  # of seen joints: less is nothing
+
+
+@dataclass(frozen=True)
+class PlanEffort:
+    """How much is searched and simulated.
+
+    Attributes:
+        scenes: simulated scenes that confirm the plan; 0: none.
+        starts: greedy starts of the search.
+        curve: numbers of cameras beyond the requested one for which the curve is computed.
+        candidates: largest number of cameras from which the search chooses.
+        workers: processes of the simulation; the results do not depend on it.
+    """
+
+    scenes: int = 8
+    starts: int = 6
+    curve: tuple[int, ...] = (-2, -1, 0, 1, 2)
+    candidates: int = 1200
+    workers: int = 1
 
 
 def plan_rig(
@@ -53,12 +69,8 @@ def plan_rig(
     cameras: int | None = None,
     *,
     lenses: Sequence[str] = (),
-    simulate: int = _SCENES,
-    starts: int = _STARTS,
-    curve: Sequence[int] = _CURVE,
-    most: int = _MOST_CANDIDATES,
+    effort: PlanEffort | None = None,
     seed: int = 0,
-    workers: int = 1,
     folder: Path | None = None,
     reporter: Reporter | None = None,
 ) -> RigPlan:
@@ -69,12 +81,8 @@ def plan_rig(
         cameras: number of cameras, those that hang already included; by default that of the room file, or as many as
             its budget buys.
         lenses: names of the lenses to choose from; all by default.
-        simulate: number of simulated scenes that confirm the plan; 0: none.
-        starts: number of greedy starts of the search.
-        curve: numbers of cameras beyond the requested one for which the curve is computed.
-        most: largest number of candidates from which the search chooses.
+        effort: how much is searched and simulated.
         seed: seed of all draws.
-        workers: number of processes for the simulation.
         folder: folder in which finished steps are kept, so that an interrupted plan goes on; None: nowhere.
         reporter: receiver of progress.
 
@@ -85,7 +93,7 @@ def plan_rig(
     room = read_room(room) if isinstance(room, str | Path) else room
     room = room.with_lenses(tuple(lenses)) if lenses else room
     count = _count(room, cameras)
-    work = _Work(room, count, simulate, starts, tuple(curve), most, seed, workers, folder, reporter or Silence())
+    work = _Work(room, count, effort or PlanEffort(), seed=seed, folder=folder, reporter=reporter or Silence())
     return work.plan()
 
 
@@ -117,28 +125,24 @@ class _Work:
         self,
         room: Room,
         count: int | None,
-        simulate: int,
-        starts: int,
-        curve: tuple[int, ...],
-        most: int,
+        effort: PlanEffort,
+        *,
         seed: int,
-        workers: int,
         folder: Path | None,
         reporter: Reporter,
     ) -> None:
-        self.room, self.count, self.seed, self.workers = room, count, seed, workers
-        self.scenes, self.starts, self.offsets, self.reporter = simulate, starts, curve, reporter
-        self.candidates = candidates_in(room, most=most)
+        self.room, self.count, self.effort, self.seed, self.reporter = room, count, effort, seed, reporter
+        self.candidates = candidates_in(room, most=effort.candidates)
         self.limits = Limits.of(room, self.candidates, count)
         path = None if folder is None else folder / "search.json"
-        self.ledger = Ledger(path, _identity(room, seed, most))
+        self.ledger = Ledger(path, _identity(room, seed, effort.candidates))
         self.seconds: dict[str, float] = {}
         self._terms: list[Floats] = []
 
     def plan(self) -> RigPlan:
         """Return the plan."""
         with self._timed("search"):
-            sets = self._search(self.limits, self.starts, "search")
+            sets = self._search(self.limits, self.effort.starts, "search")
             near = [each for each in sets if each.value >= sets[0].value - _NEAR_BEST]
             refined = self._refined(sets)
         with self._timed("curve"):
@@ -159,7 +163,7 @@ class _Work:
             curve=curve,
             near_best=len(near),
             candidates=len(self.candidates),
-            simulated_scenes=self.scenes,
+            simulated_scenes=self.effort.scenes,
             seed=self.seed,
             seconds=self.seconds,
         )
@@ -227,7 +231,7 @@ class _Work:
         results = []
         with self.reporter.stage("refine", len(best)) as advance:
             for k, each in enumerate(best):
-                key = f"refined {self.count} {self.starts} {k}"
+                key = f"refined {self.count} {self.effort.starts} {k}"
 
                 def work(each: CandidateSet = each, key: str = key) -> Any:
                     fixed = self.fixed_terms
@@ -243,11 +247,11 @@ class _Work:
     def _curve(self, best: CandidateSet) -> tuple[CurvePoint, ...]:
         fixed, now = len(self.room.fixed), len(best.candidates)
         points = []
-        for offset in sorted(set(self.offsets)):
+        for offset in sorted(set(self.effort.curve)):
             free = now + offset
             if free < max(1, 2 - fixed) or free > len(self.candidates):
                 continue
-            name = f"curve {self.count} {self.starts} {free}"
+            name = f"curve {self.count} {self.effort.starts} {free}"
             if name not in self.ledger and offset:
                 try:
                     limits = Limits.of(self.room, self.candidates, free + fixed)
@@ -281,7 +285,7 @@ class _Work:
         results = []
         for k, each in enumerate(refined):
             figures = self.ledger.result(
-                f"judged {self.count} {self.starts} {k}",
+                f"judged {self.count} {self.effort.starts} {k}",
                 partial(self._figures_of, self._rig(each.candidates)),
             )
             results.append((each, Figures.of_row(figures)))
@@ -291,7 +295,7 @@ class _Work:
         """Return the objective of the room by figures; ties are broken by the mean PCP."""
         kind = self.room.keys.objective.kind
         main = {"mean": 0.0, "share": figures.share, "worst": figures.worst}[kind]
-        return main + (1.0 if kind == "mean" else 1e-3) * figures.pcp[0]
+        return main + (1.0 if kind == "mean" else 1e-3) * figures.pcp.mean
 
     def _usual(self, free: int) -> list[tuple[str, Rig, Figures]]:
         """Return the rigs that people hang without a plan, with their figures by the fast layer."""
@@ -314,10 +318,10 @@ class _Work:
         predicted = [figures for _, figures in judged] + [figures for _, _, figures in usual]
         simulated: list[Figures | None] = [None] * len(rigs)
         order = list(range(len(judged)))
-        if self.scenes:
+        if self.effort.scenes:
             simulated = list(self._simulated(rigs))
             # The simulation chooses among the best few, by its mean PCP.
-            order.sort(key=lambda k: -(simulated[k] or predicted[k]).pcp[0])
+            order.sort(key=lambda k: -(simulated[k] or predicted[k]).pcp.mean)
         names = list(titles[: len(judged)]) + [title for title, _, _ in usual]
         order += range(len(judged), len(rigs))
         alternatives = tuple(Alternative(names[n], rigs[k], predicted[k], simulated[k]) for n, k in enumerate(order))
@@ -331,14 +335,20 @@ class _Work:
 
         def work() -> Any:
             results, conditions = simulate_rigs(
-                self.room, rigs, seeds=range(self.scenes), seed=self.seed, workers=self.workers, reporter=self.reporter
+                self.room,
+                rigs,
+                seeds=range(self.effort.scenes),
+                seed=self.seed,
+                workers=self.effort.workers,
+                reporter=self.reporter,
             )
             return [
-                [_triple(interval_of(results, each, score)) for score in ("pcp", "mpjpe_mm")] for each in conditions
+                Figures(interval_of(results, each, "pcp"), interval_of(results, each, "mpjpe_mm")).to_row()
+                for each in conditions
             ]
 
-        found = self.ledger.result(f"simulated {self.scenes} {key}", work)
-        return [Figures(tuple(pcp), tuple(error)) for pcp, error in found]
+        found = self.ledger.result(f"simulated {self.effort.scenes} {key}", work)
+        return [Figures.of_row(row) for row in found]
 
     def _worth(self, best: CandidateSet) -> tuple[Prediction, list[float]]:
         """Return the maps of the plan, and the loss of PCP without each of its cameras."""
@@ -383,7 +393,3 @@ def _identity(room: Room, seed: int, most: int) -> str:
     lenses = [(lens.name, lens.turned) for lens in room.lenses]
     values = [room.keys.model_dump(mode="json"), room.detector.model_dump(mode="json"), lenses, seed, most]
     return hashlib.blake2b(json.dumps([*values, code_version()], sort_keys=True).encode(), digest_size=16).hexdigest()
-
-
-def _triple(interval: Any) -> tuple[float, float, float]:
-    return float(interval.mean), float(interval.low), float(interval.high)

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mvpose import Camera, Rig
-from mvpose.arrays import Bools, Floats, Integers
+from mvpose.arrays import Bools, Integers
+from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.tolerance import CLIFF, FaultTolerance
-from simharness.planning.visibility import Obstacle
-from simharness.planning.volume import Volume
 from simharness.statistics.intervals import Interval
 
 if TYPE_CHECKING:
@@ -21,25 +20,6 @@ if TYPE_CHECKING:
 
 HEIGHTS = (0.1, 0.9, 1.7, 2.2)
 """Heights of coverage maps, metres: feet, hips, crown, and a raised hand."""
-
-
-@dataclass(frozen=True)
-class Target:
-    """What a place must reach to be good.
-
-    Attributes:
-        pcp: least PCP, percent.
-        error_mm: largest expected joint error, mm.
-    """
-
-    pcp: float = 95.0
-    error_mm: float = 40.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.pcp <= 100.0:
-            raise ValueError(f"target: PCP must be above 0 and at most 100 percent, got {self.pcp:g}")
-        if not self.error_mm > 0.0:
-            raise ValueError(f"target: the joint error must be above 0 mm, got {self.error_mm:g}")
 
 
 @dataclass(frozen=True)
@@ -136,11 +116,7 @@ class Rehearsal:
     Attributes:
         name: name of the rig.
         rig: its cameras.
-        volume: where people are.
-        room: polygon of the room, (n, 2), metres; empty where it is unknown.
-        people: number of people.
-        detector: name of the detector profile.
-        target: what a place must reach.
+        setup: what it is rehearsed for.
         prediction: fast layer, all cameras.
         coverage: number of cameras that have a point over each place in the picture, by :data:`HEIGHTS`, (H, P).
         good: which places reach the target, (P,) (fast layer).
@@ -154,16 +130,11 @@ class Rehearsal:
         mixed: simulated percentage of matched groups that hold two people, all cameras.
         seconds: time that the fast layer and the simulation took.
         sentences: the result in plain sentences, the most important first.
-        obstacles: boxes that hide people.
     """
 
     name: str
     rig: Rig
-    volume: Volume
-    room: Floats
-    people: int
-    detector: str
-    target: Target
+    setup: RehearsalSetup
     prediction: Prediction
     coverage: Integers
     good: Bools
@@ -177,7 +148,6 @@ class Rehearsal:
     mixed: Interval
     seconds: Mapping[str, float] = field(default_factory=dict)
     sentences: tuple[str, ...] = ()
-    obstacles: tuple[Obstacle, ...] = ()
 
     @property
     def good_share(self) -> float:
@@ -186,14 +156,14 @@ class Rehearsal:
 
     def to_json(self) -> dict[str, Any]:
         """Return the rehearsal as JSON: see ``docs/guide/rehearse.md``. A value that does not apply is null."""
-        prediction = self.prediction
+        prediction, setup = self.prediction, self.setup
         return {
             "name": self.name,
             "sentences": list(self.sentences),
-            "people": self.people,
-            "detector": self.detector,
-            "target": {"pcp": self.target.pcp, "mpjpe_mm": self.target.error_mm, "share": _plain(self.good_share)},
-            "volume": {"outline": _plain(self.volume.outline), "height": self.volume.height},
+            "people": setup.people,
+            "detector": setup.detector.name,
+            "target": {"pcp": setup.target.pcp, "mpjpe_mm": setup.target.error, "share": _plain(self.good_share)},
+            "volume": {"outline": _plain(setup.volume.outline), "height": setup.volume.height},
             **_estimated(self.whole),
             "mixed": _interval(self.mixed),
             "map": {

@@ -13,12 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from mvpose import Rig
 from mvpose.arrays import Floats
-from simharness.planning.visibility import Obstacle
-from simharness.planning.volume import Volume
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.frame_scores import RULES, HeadRule
+from simharness.types.floor import Volume
 from simharness.world.humans.accessories import take_off
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.scene.build import Scene, build, compile_model
@@ -61,7 +60,7 @@ class SceneSettings:
     people: int
     detector: DetectorSection
     clutter: ClutterSection = field(default_factory=ClutterSection)
-    obstacles: tuple[Obstacle, ...] = ()
+    obstacles: tuple[Box, ...] = ()
     activities: tuple[str, ...] = ACTIVITIES
     frames: int = 8
     rate: float = 2.0
@@ -207,11 +206,10 @@ def has_objects(clutter: ClutterSection) -> bool:
     return any(clutter.model_dump().values())
 
 
-def _solid(obstacle: Obstacle, frame: SceneFrame, number: int) -> Solid:
+def _solid(obstacle: Box, frame: SceneFrame, number: int) -> Solid:
     """Return an obstacle of the world as a solid of the scene."""
-    x, y = frame.to_scene(obstacle.center[:2]).tolist()
-    half = (float(obstacle.size[0]) / 2, float(obstacle.size[1]) / 2, float(obstacle.size[2]) / 2)
-    box = Box((x, y, float(obstacle.center[2])), half, obstacle.yaw - frame.bearing)
+    x, y = frame.to_scene(np.array(obstacle.center[:2])).tolist()
+    box = Box((x, y, obstacle.center[2]), obstacle.half, obstacle.yaw - frame.bearing)
     return Solid("clutter", f"obstacle{number}", box_mesh([box], [_OBSTACLE]), (box,), box)
 
 

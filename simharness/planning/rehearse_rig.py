@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TypeVar
 
@@ -12,7 +12,7 @@ import numpy as np
 from mvpose import Camera, Rig
 from mvpose.commands.progress import Reporter, Silence
 from simharness.planning.fast_layer import CameraTerms, FastLayer, Prediction
-from simharness.planning.floor_coverage import coverage, covered_rectangle
+from simharness.planning.floor_coverage import coverage
 from simharness.planning.rehearsal_result import (
     HEIGHTS,
     CameraWorth,
@@ -20,19 +20,14 @@ from simharness.planning.rehearsal_result import (
     Estimated,
     ExtraCamera,
     Rehearsal,
-    Target,
 )
 from simharness.planning.rehearsal_scene import SceneSettings
-from simharness.planning.rig_checks import check_rig
+from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.scene_results import Condition, SceneResult, interval_of, loss_of
 from simharness.planning.sentences import sentences
 from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
 from simharness.planning.tolerance import fault_conditions, tolerances
-from simharness.planning.visibility import Obstacle
-from simharness.planning.volume import Volume
 from simharness.reality.validation.subsets import camera_subsets
-from simharness.scenario.sections.detector_section import DetectorSection
-from simharness.scenario.sections.room_section import ClutterSection
 from simharness.statistics.intervals import Interval
 from simharness.world.rigs.extra_camera import cameras_on_walls
 
@@ -66,47 +61,10 @@ class RehearsalEffort:
     workers: int = 1
 
 
-@dataclass(frozen=True)
-class Question:
-    """What is rehearsed.
-
-    Attributes:
-        name: name of the rig.
-        rig: cameras in the world, floor at z = 0.
-        volume: where people are.
-        detector: profile of the detector.
-        people: number of people in the volume.
-        room: floor and height of the room; None where it is unknown.
-        obstacles: boxes that hide people.
-        clutter: objects that the simulator places around the people.
-        target: what a place must reach.
-        subsets: score all sets of two cameras and more, instead of the rig and the rig without each camera.
-        seed: seed of everything.
-    """
-
-    name: str
-    rig: Rig
-    volume: Volume
-    detector: DetectorSection
-    people: int = 4
-    room: Volume | None = None
-    obstacles: tuple[Obstacle, ...] = ()
-    clutter: ClutterSection = field(default_factory=ClutterSection)
-    target: Target = Target()
-    subsets: bool = False
-    seed: int = 0
-
-
 def rehearse_rig(
     rig: Rig,
+    setup: RehearsalSetup,
     *,
-    detector: DetectorSection,
-    volume: Volume | None = None,
-    people: int = 4,
-    room: Volume | None = None,
-    obstacles: Sequence[Obstacle] = (),
-    clutter: ClutterSection | None = None,
-    target: Target | None = None,
     subsets: bool = False,
     seed: int = 0,
     effort: RehearsalEffort | None = None,
@@ -117,15 +75,8 @@ def rehearse_rig(
 
     Args:
         rig: two or more cameras, metres, floor at z = 0.
-        detector: profile of the detector (:func:`simharness.scenario.presets.read_profile`).
-        volume: where people are; by default the largest rectangle that three cameras see
-            (:func:`simharness.planning.floor_coverage.covered_rectangle`).
-        people: number of people in it.
-        room: floor and height of the room; None where it is unknown.
-        obstacles: boxes that hide people.
-        clutter: objects that the simulator places around the people.
-        target: what a place must reach; PCP 95 and 40 mm by default.
-        subsets: score all sets of two cameras and more.
+        setup: where people are, how many, what hides them, and the detector.
+        subsets: score all sets of two cameras and more, instead of the rig and the rig without each camera.
         seed: seed of everything.
         effort: how much is simulated.
         name: name of the rig in the result.
@@ -136,24 +87,8 @@ def rehearse_rig(
             nobody visible to two cameras, or people who do not fit into the volume.
         RunError: any error of the simulation.
     """
-    volume = Volume(covered_rectangle(rig)[0]) if volume is None else volume
-    check_rig(rig, volume, room=room, obstacles=obstacles)
-    if people < 1:
-        raise ValueError(f"people: expected 1 or more, got {people}")
-    question = Question(
-        name,
-        rig,
-        volume,
-        detector,
-        people,
-        room,
-        tuple(obstacles),
-        ClutterSection() if clutter is None else clutter,
-        Target() if target is None else target,
-        subsets,
-        seed,
-    )
-    return _Rehearsing(question, effort or RehearsalEffort(), reporter or Silence()).run()
+    setup.check(rig)
+    return _Rehearsing(name, rig, setup, subsets, seed, effort or RehearsalEffort(), reporter or Silence()).run()
 
 
 @dataclass(frozen=True)
@@ -169,29 +104,29 @@ class _Compared:
 class _Rehearsing:
     """Steps of a rehearsal."""
 
-    question: Question
+    name: str
+    rig: Rig
+    setup: RehearsalSetup
+    subsets: bool
+    seed: int
     effort: RehearsalEffort
     reporter: Reporter
 
     def run(self) -> Rehearsal:
         """Run all steps."""
-        question, rig = self.question, self.question.rig
+        rig, target = self.rig, self.setup.target
         start = perf_counter()
         prediction, whole_places = self._maps()
         layer_seconds = perf_counter() - start
         compared = self._compare()
         base = compared.sets[self.whole]
         scenes, simulated = self._simulate(compared)
-        good = (prediction.pcp >= question.target.pcp) & (prediction.error_mm <= question.target.error_mm)
+        good = (prediction.pcp >= target.pcp) & (prediction.error_mm <= target.error)
         mixed = interval_of(scenes, Condition(self.whole), "mixed")
         rehearsal = Rehearsal(
-            name=question.name,
+            name=self.name,
             rig=rig,
-            volume=question.volume,
-            room=np.zeros((0, 2)) if question.room is None else question.room.outline,
-            people=question.people,
-            detector=question.detector.name,
-            target=question.target,
+            setup=self.setup,
             prediction=prediction,
             coverage=coverage(rig, prediction.places, HEIGHTS),
             good=good,
@@ -206,7 +141,6 @@ class _Rehearsing:
             tolerances=tolerances(scenes, self.whole),
             scenes=tuple(scenes),
             mixed=mixed,
-            obstacles=question.obstacles,
             seconds={"layer": layer_seconds, "all": perf_counter() - start},
         )
         return replace(rehearsal, sentences=sentences(rehearsal))
@@ -214,19 +148,18 @@ class _Rehearsing:
     @property
     def whole(self) -> tuple[int, ...]:
         """Indices of all cameras."""
-        return tuple(range(len(self.question.rig)))
+        return tuple(range(len(self.rig)))
 
     def _layer(self, *, people: int, coarse: bool) -> FastLayer:
-        question = self.question
         return FastLayer.of(
-            question.volume,
-            detector=question.detector,
+            self.setup.volume,
+            detector=self.setup.detector,
             people=people,
             spacing=_COARSE if coarse else _SPACING,
             orientations=_COARSE_TURNS if coarse else 8,
             draws=1 if coarse else 2,
-            obstacles=question.obstacles,
-            seed=question.seed,
+            obstacles=self.setup.obstacles,
+            seed=self.seed,
         )
 
     def _maps(self) -> tuple[Prediction, list[float]]:
@@ -235,9 +168,9 @@ class _Rehearsing:
         Raises:
             ValueError: two cameras see nobody.
         """
-        rig = self.question.rig
+        rig = self.rig
         with self.reporter.stage("maps", len(rig) + 1) as advance:
-            layer = self._layer(people=self.question.people, coarse=False)
+            layer = self._layer(people=self.setup.people, coarse=False)
             terms = [_advanced(layer.terms(camera), advance) for camera in rig]
             if not any(each.seen.any() for each in terms):
                 raise ValueError(
@@ -255,14 +188,14 @@ class _Rehearsing:
 
     def _compare(self) -> _Compared:
         """Return what the fast layer says of other sets of cameras and numbers of people."""
-        question, rig = self.question, self.question.rig
+        rig, setup = self.rig, self.setup
         sets = self._sets()
-        walls, ceiling = (None, np.inf) if question.room is None else (question.room.outline, question.room.height)
-        area, around = question.volume.outline, self.effort.around
+        walls, ceiling = (None, np.inf) if setup.space is None else (setup.space.outline, setup.space.height)
+        area, around = setup.volume.outline, self.effort.around
         candidates = cameras_on_walls(rig, area, walls=walls, ceiling=ceiling, around=around)
         numbers = range(1, self.effort.most + 1)
         with self.reporter.stage("compare", len(sets) + len(candidates) + len(numbers)) as advance:
-            layer = self._layer(people=question.people, coarse=True)
+            layer = self._layer(people=setup.people, coarse=True)
             terms = [layer.terms(camera) for camera in rig]
             predicted = {
                 each: _advanced(layer.predict([terms[k] for k in each], variant=_VARIANT), advance)
@@ -282,14 +215,14 @@ class _Rehearsing:
         return _Compared(predicted, extra, crowds)
 
     def _with_people(self, number: int, layer: FastLayer, terms: Sequence[CameraTerms]) -> Prediction:
-        if number != self.question.people:
+        if number != self.setup.people:
             layer = self._layer(people=number, coarse=True)
-            terms = [layer.terms(camera) for camera in self.question.rig]
+            terms = [layer.terms(camera) for camera in self.rig]
         return layer.predict(terms, variant=_VARIANT)
 
     def _sets(self) -> list[tuple[int, ...]]:
         """Return the sets of cameras that are scored: all cameras, and all without each, or all sets."""
-        if self.question.subsets:
+        if self.subsets:
             return camera_subsets(len(self.whole))
         return [self.whole, *(self._without(k) for k in self.whole)]
 
@@ -303,7 +236,7 @@ class _Rehearsing:
         """
         sets = dict.fromkeys([*compared.sets, *(self._without(k) for k in self.whole)])
         conditions = [Condition(each) for each in sets] + fault_conditions(self.whole)
-        rig, people = self.question.rig, self.question.people
+        rig, people = self.rig, self.setup.people
         if compared.extra is not None:
             rig = Rig([*rig, compared.extra[0]])
             conditions.append(Condition((*self.whole, len(self.whole))))
@@ -311,30 +244,30 @@ class _Rehearsing:
         for number in sorted(self.effort.crowds, reverse=True):
             if number != people and number <= self.effort.most:
                 alone = [Condition(self.whole)]
-                batches[number] = self._batch(self.question.rig, number, alone, self.effort.crowd_scenes)
+                batches[number] = self._batch(self.rig, number, alone, self.effort.crowd_scenes)
         with self.reporter.stage("simulate", sum(len(each.seeds) for each in batches.values())) as advance:
             results = simulate_scenes(list(batches.values()), workers=self.effort.workers, progress=advance)
         by_number = {number: scenes for number, scenes in zip(batches, results, strict=True) if scenes}
         return by_number[people], by_number
 
     def _batch(self, rig: Rig, people: int, conditions: Sequence[Condition], count: int) -> SceneBatch:
-        question = self.question
+        setup = self.setup
         settings = SceneSettings(
             rig,
-            question.volume,
+            setup.volume,
             people,
-            question.detector,
-            clutter=question.clutter,
-            obstacles=question.obstacles,
+            setup.detector,
+            clutter=setup.clutter,
+            obstacles=setup.obstacles,
             whole=self.whole,
         )
-        return SceneBatch(settings, tuple(conditions), tuple(range(question.seed, question.seed + count)))
+        return SceneBatch(settings, tuple(conditions), tuple(range(self.seed, self.seed + count)))
 
     def _estimated(self, scenes: Sequence[SceneResult], cameras: tuple[int, ...], prediction: Prediction) -> Estimated:
         summary, condition = prediction.summary(), Condition(cameras)
         return Estimated(
-            float(summary["pcp"].value),
-            float(summary["mpjpe_mm"].value),
+            summary["pcp"].mean,
+            summary["mpjpe_mm"].mean,
             interval_of(scenes, condition, "pcp"),
             interval_of(scenes, condition, "mpjpe_mm"),
             interval_of(scenes, condition, "recall"),
@@ -343,15 +276,15 @@ class _Rehearsing:
     def _worth(self, k: int, sees: float, scenes: Sequence[SceneResult], compared: _Compared) -> CameraWorth:
         rest, base = Condition(self._without(k)), Condition(self.whole)
         predicted = compared.sets.get(rest.cameras)
-        layer = compared.sets[self.whole].summary()["pcp"].value
+        layer = compared.sets[self.whole].summary()["pcp"].mean
         gained = loss_of(scenes, base, rest, "mpjpe_mm")
         return CameraWorth(
-            camera=self.question.rig[k],
+            camera=self.rig[k],
             sees=sees,
             without=None if predicted is None else self._estimated(scenes, rest.cameras, predicted),
             worth=loss_of(scenes, rest, base),
             worth_mm=gained,
-            layer_worth=float(layer if predicted is None else layer - predicted.summary()["pcp"].value),
+            layer_worth=float(layer if predicted is None else layer - predicted.summary()["pcp"].mean),
         )
 
     def _extra(self, scenes: Sequence[SceneResult], compared: _Compared, base: Prediction) -> ExtraCamera | None:
@@ -365,7 +298,7 @@ class _Rehearsing:
             self._estimated(scenes, more, prediction),
             loss_of(scenes, whole, Condition(more)),
             loss_of(scenes, Condition(more), whole, "mpjpe_mm"),
-            float(prediction.summary()["pcp"].value - base.summary()["pcp"].value),
+            float(prediction.summary()["pcp"].mean - base.summary()["pcp"].mean),
         )
 
     def _crowds(self, simulated: Mapping[int, Sequence[SceneResult]], compared: _Compared) -> tuple[Crowd, ...]:
@@ -376,8 +309,8 @@ class _Rehearsing:
             crowds.append(
                 Crowd(
                     number,
-                    float(summary["pcp"].value),
-                    float(summary["mpjpe_mm"].value),
+                    summary["pcp"].mean,
+                    summary["mpjpe_mm"].mean,
                     _mean(prediction.risk),
                     None if of is None else interval_of(of, Condition(self.whole), "pcp"),
                     None if of is None else interval_of(of, Condition(self.whole), "mixed"),
@@ -388,9 +321,9 @@ class _Rehearsing:
 
 def _better(one: Prediction, other: Prediction) -> bool:
     """Return whether a prediction has more PCP than another; of equal ones, to a tenth, the smaller error."""
-    mine, theirs = one.summary(), other.summary()
-    key = (round(float(mine["pcp"].value), 1), -float(mine["mpjpe_mm"].value))
-    return key > (round(float(theirs["pcp"].value), 1), -float(theirs["mpjpe_mm"].value))
+    here, there = one.summary(), other.summary()
+    key = (round(here["pcp"].mean, 1), -here["mpjpe_mm"].mean)
+    return key > (round(there["pcp"].mean, 1), -there["mpjpe_mm"].mean)
 
 
 def _mean(values: np.ndarray) -> float:

@@ -15,8 +15,7 @@ from simharness.planning.planned_room import Room
 from simharness.planning.rehearsal_scene import SceneSettings
 from simharness.planning.scene_results import Condition, SceneResult
 from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
-from simharness.planning.value_fit import VARIANT, obstacles_of
-from simharness.planning.volume import Volume
+from simharness.planning.value_fit import VARIANT
 from simharness.types.random_streams import stream
 
 _SPACING = (0.25, 0.3)  # metres between the places that are tried: on the mount and in height
@@ -39,7 +38,7 @@ def corner_rig(room: Room, count: int, *, height: float = 2.5, lens: int = 0) ->
         height: preferred height, metres.
         lens: index of the lens.
     """
-    points = [corner for corner in room.outline]
+    points = [corner for corner in room.space.outline]
     while len(points) < count:
         sides = np.roll(points, -1, axis=0) - points
         longest = int(np.argmax(np.linalg.norm(sides, axis=1)))
@@ -50,7 +49,7 @@ def corner_rig(room: Room, count: int, *, height: float = 2.5, lens: int = 0) ->
 
 def ring_rig(room: Room, count: int, *, height: float = 2.2, lens: int = 0) -> list[Candidate]:
     """Return cameras at equal bearings around the middle of the volume, as far out as the places allow; as above."""
-    middle, reach = _middle(room), float(np.ptp(room.outline, axis=0).max())
+    middle, reach = room.volume.middle, float(room.space.size.max())
     bearings = np.pi / count + 2 * np.pi * np.arange(count) / count
     away = middle + reach * np.column_stack([np.cos(bearings), np.sin(bearings)])
     return _nearest(room, np.column_stack([away, np.full(count, height)]), lens, by_bearing=True)
@@ -86,10 +85,11 @@ def simulate_rigs(
         conditions.append(Condition(tuple(range(first, len(union)))))
     settings = SceneSettings(
         Rig(union),
-        Volume(room.volume, room.volume_height),
+        room.volume,
         room.keys.people.count,
         room.detector,
-        obstacles=obstacles_of(room),
+        clutter=room.keys.clutter,
+        obstacles=room.blocking,
         variant=VARIANT,
         whole=conditions[0].cameras,
     )
@@ -98,10 +98,6 @@ def simulate_rigs(
         batch = SceneBatch(settings, tuple(conditions), drawn)
         (results,) = simulate_scenes([batch], workers=workers, progress=advance)
     return results, conditions
-
-
-def _middle(room: Room) -> Floats:
-    return (room.volume.min(axis=0) + room.volume.max(axis=0)) / 2
 
 
 def _spread(points: Floats, count: int) -> Floats:
@@ -117,7 +113,7 @@ def _nearest(room: Room, wanted: Floats, lens: int, *, by_bearing: bool = False)
     """Return cameras at the free places nearest to wanted points (n, 3), or in their directions from the middle."""
     places = places_in(room, spacing=_SPACING[0], levels=_SPACING[1])
     positions = np.array([place for _, place in places])
-    middle = _middle(room)
+    middle = room.volume.middle
     free = np.ones(len(places), bool)
     found = []
     for point in wanted:

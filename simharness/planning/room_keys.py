@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field
 
 from simharness.scenario.sections.cameras_section import Pixels, Term
+from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.section import (
     MOST_CAMERAS,
     Coordinate,
@@ -166,7 +167,7 @@ class FixedKeys(Section):
 class PeopleKeys(Section):
     """[people]: the people whom the cameras have to see."""
 
-    count: Annotated[int, Field(ge=1, le=20)] = Field(4, description="number of people in the volume at a time")
+    count: Annotated[int, Field(ge=1, le=40)] = Field(4, description="number of people in the volume at a time")
 
 
 class TargetKeys(Section):
@@ -207,6 +208,9 @@ class RoomKeys(Section):
     cameras: CameraKeys = CameraKeys()
     fixed: tuple[FixedKeys, ...] = Field((), max_length=MOST_CAMERAS, description="cameras that hang already")
     people: PeopleKeys = PeopleKeys()
+    clutter: ClutterSection = Field(
+        ClutterSection(), description="objects that the simulator places around the people, in the simulation alone"
+    )
     detector: str = Field("typical", description="detector profile: a name in scenarios/detectors, or a TOML file")
     target: TargetKeys = TargetKeys()
     objective: ObjectiveKeys = ObjectiveKeys()

@@ -59,9 +59,9 @@ def grid_spacing(places: Floats) -> float:
 
 
 def _verdict(rehearsal: Rehearsal) -> str:
-    count, people = len(rehearsal.rig), _people(rehearsal.people)
-    target = f"PCP {rehearsal.target.pcp:g} and {rehearsal.target.error_mm:g} mm"
-    size = _size(*_extent(rehearsal.volume.outline))
+    setup, count = rehearsal.setup, len(rehearsal.rig)
+    people, size = _people(setup.people), _size(*setup.volume.size)
+    target = f"PCP {setup.target.pcp:g} and {setup.target.error:g} mm"
     if rehearsal.good_share > 0.995:
         return f"{count} cameras are enough for {people} in the whole volume of {size}: everywhere {target} are met."
     rectangle = good_rectangle(rehearsal.prediction.places, rehearsal.good)
@@ -147,10 +147,6 @@ def _matching(rehearsal: Rehearsal) -> str:
 def _with_interval(value: Interval, *, digits: int = 1) -> str:
     text = f"{value.mean:.{digits}f}"
     return f"{text} ({value.low:.{digits}f} to {value.high:.{digits}f})" if np.isfinite(value.low) else text
-
-
-def _extent(outline: Floats) -> Floats:
-    return outline.max(axis=0) - outline.min(axis=0)
 
 
 def _size(x: float, y: float) -> str:

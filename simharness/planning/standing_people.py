@@ -10,16 +10,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Self, get_args
+from typing import NamedTuple, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Bools, Floats, Integers
+from mvpose.checks import as_array
 from simharness.detector.bias import body_axes
-from simharness.planning.volume import Volume
 from simharness.scenario.sections.people_section import ActivityName
+from simharness.types.floor import Floor, Volume
 from simharness.types.random_streams import stream
+from simharness.world.scene.objects.geoms import Box
 
 ACTIVITIES = ("walk", "wave", "turn", "talk", "reach", "point")
 """Activities from which poses are taken unless others are given: people who walk, stand and use their arms."""
@@ -33,7 +35,31 @@ _AREA = 6.0  # metres, half the side of the square in which the people of the po
 _NOWHERE = np.array([0.0, 0.0, -1e4])  # position of absent people: no ray goes there
 _LIMBS = slice(5, 17)  # of COCO-17: shoulders to ankles
 _EXTREMES = 100  # directions in which the outermost vertices of a pose are taken
+_CLEARANCE = 0.25  # metres around an obstacle where nobody stands: half the width of a person
+_OVERHEAD = 1.9  # metres: people stand under an obstacle that begins higher
 _TRIES = 40  # open scenes that a person is tried in before the rule of the least distance is dropped
+
+
+class Silhouettes(NamedTuple):
+    """Shapes of K poses, from which boxes in pictures follow.
+
+    Attributes:
+        body: body of each pose, (K,).
+        outlines: outermost vertices of the skin of all poses, one after the other, (n, 3), metres.
+        outline_of: first vertex of each pose, and the end, (K + 1,).
+        extremes: outermost of these, which suffice where the whole person is in the picture, (m, 3), metres.
+        extremes_of: first of them of each pose, and the end, (K + 1,).
+        edges: edges of the outlines of all bodies, one after the other, as vertices of a pose, (e, 2).
+        edges_of: first edge of each body, and the end.
+    """
+
+    body: Integers
+    outlines: Floats
+    outline_of: Integers
+    extremes: Floats
+    extremes_of: Integers
+    edges: Integers
+    edges_of: Integers
 
 
 @dataclass(frozen=True)
@@ -45,26 +71,14 @@ class PosePool:
         capsules: ends of the axes of the capsules that hide, (K, C, 2, 3), metres.
         radii: radii of the capsules, (K, C), metres.
         depths: largest distance of the skin in front of each COCO-17 joint, (K, 17), metres.
-        body: body of each pose, (K,).
-        outlines: outermost vertices of the skin of all poses, one after the other, (n, 3), metres.
-        outline_of: first vertex of each pose, and the end, (K + 1,).
-        extremes: outermost of these, which suffice where the whole person is in the picture, (m, 3), metres.
-        extremes_of: first of them of each pose, and the end, (K + 1,).
-        edges: edges of the outlines of all bodies, one after the other, as vertices of a pose, (e, 2).
-        edges_of: first edge of each body, and the end.
+        silhouettes: shapes in pictures.
     """
 
     landmarks: Floats = field(repr=False)
     capsules: Floats = field(repr=False)
     radii: Floats = field(repr=False)
     depths: Floats = field(repr=False)
-    body: Integers = field(repr=False)
-    outlines: Floats = field(repr=False)
-    outline_of: Integers = field(repr=False)
-    extremes: Floats = field(repr=False)
-    extremes_of: Integers = field(repr=False)
-    edges: Integers = field(repr=False)
-    edges_of: Integers = field(repr=False)
+    silhouettes: Silhouettes = field(repr=False)
 
     def __len__(self) -> int:
         return len(self.landmarks)
@@ -76,13 +90,11 @@ class PosePool:
         return ((given**2).sum(axis=1)[:, None] - 2 * given @ own.T + (own**2).sum(axis=1)).argmin(axis=1)
 
 
-def pose_pool(activities: Sequence[str] = ACTIVITIES, *, children: float = 0.0, seed: int = 0) -> PosePool:
+def pose_pool(activities: Sequence[str] = ACTIVITIES) -> PosePool:
     """Simulate the poses of a pool; the result is kept, because this takes a second or two.
 
     Args:
         activities: activities of the simulator, assigned to the bodies in turn.
-        children: share of children.
-        seed: seed of bodies and motions.
 
     Raises:
         ValueError: an activity that the simulator does not have.
@@ -91,11 +103,11 @@ def pose_pool(activities: Sequence[str] = ACTIVITIES, *, children: float = 0.0, 
     if not activities or (unknown := [name for name in activities if name not in known]):
         got = f"{unknown[0]!r}" if activities else "none"
         raise ValueError(f"activities: expected one or more of {', '.join(known)}, got {got}")
-    return _pose_pool(tuple(activities), float(children), seed)
+    return _pose_pool(tuple(activities))
 
 
 @cache
-def _pose_pool(activities: tuple[str, ...], children: float, seed: int) -> PosePool:
+def _pose_pool(activities: tuple[str, ...]) -> PosePool:
     from simharness.capture.body_outlines import Outline, even_directions
     from simharness.capture.ray_casting import RayCaster
     from simharness.scenario.sections.cameras_section import CamerasSection
@@ -108,16 +120,14 @@ def _pose_pool(activities: tuple[str, ...], children: float, seed: int) -> PoseP
 
     scenario = Scenario(
         name="planning",
-        seed=seed,
+        seed=0,
         duration=_LAST + 0.5,
         room=RoomSection.model_validate({"size": (2 * _AREA + 2, 2 * _AREA + 2, 3.0), "walls": False}),
-        people=PeopleSection.model_validate(
-            {"count": _BODIES, "activities": activities, "area": _AREA, "children": children}
-        ),
+        people=PeopleSection.model_validate({"count": _BODIES, "activities": activities, "area": _AREA}),
         clutter=ClutterSection(),
         cameras=CamerasSection(),
     )
-    scene = build(scenario, build_rig(scenario.cameras, seed=seed, room=None))
+    scene = build(scenario, build_rig(scenario.cameras, seed=0, room=None))
     ways = even_directions(_EXTREMES).T
     caster, outlines = RayCaster(scene), [Outline.of(body) for body in scene.bodies]
     landmarks, capsules, radii, depths, bodies, skins = [], [], [], [], [], []
@@ -137,10 +147,12 @@ def _pose_pool(activities: tuple[str, ...], children: float, seed: int) -> PoseP
         np.array(capsules),
         np.array(radii),
         np.array(depths),
-        np.array(bodies),
-        *_joined(skins),
-        *_joined([skin[np.unique((skin @ ways).argmax(axis=0))] for skin in skins]),
-        *_joined([outline.edges for outline in outlines]),
+        Silhouettes(
+            np.array(bodies),
+            *_joined(skins),
+            *_joined([skin[np.unique((skin @ ways).argmax(axis=0))] for skin in skins]),
+            *_joined([outline.edges for outline in outlines]),
+        ),
     )
 
 
@@ -246,13 +258,14 @@ def standing_scenes(
     people: int = 4,
     spacing: float = 0.5,
     repeats: int = 16,
-    blocked: Sequence[Volume] = (),
+    obstacles: Sequence[Box] = (),
+    tracks: Floats | None = None,
     seed: int = 0,
 ) -> StandingScenes:
     """Draw scenes in which every place of the volume is taken ``repeats`` times, facing evenly spread directions.
 
-    The others in a scene stand at other places, at random. Where the volume has tracks, scenes are recorded frames:
-    ``repeats`` times as many people as there are places, with the pool's poses that are nearest to the recorded ones.
+    The others in a scene stand at other places, at random. With tracks, scenes are recorded frames: ``repeats`` times
+    as many people as there are places, with the pool's poses that are nearest to the recorded ones.
 
     Args:
         volume: where people stand.
@@ -260,7 +273,9 @@ def standing_scenes(
         people: number of people of a scene.
         spacing: metres between places.
         repeats: number of times that somebody stands at each place.
-        blocked: floor taken by obstacles, where nobody stands.
+        obstacles: boxes in which nobody stands.
+        tracks: joints of recorded people who walk in the volume, COCO-17, (T, P, 17, 3), metres, NaN where a person is
+            absent.
         seed: seed of the draws.
 
     Raises:
@@ -268,13 +283,14 @@ def standing_scenes(
     """
     if people < 1 or repeats < 1:
         raise ValueError(f"expected at least 1 person and 1 repeat, got {people} people and {repeats} repeats")
-    places = volume.places(spacing)
+    places, blocked = volume.places(spacing), [taken_floor(each) for each in obstacles if _in_the_way(each)]
     for taken in blocked:
         places = places[~taken.contains(places)]
     if not len(places):
         raise ValueError("obstacles take the whole floor of the volume: nobody can stand in it; move or remove some")
-    if volume.tracks is not None:
-        return _recorded_scenes(volume.tracks, pool, places, repeats=repeats, seed=seed)
+    if tracks is not None:
+        tracks = as_array(tracks, ("T", "P", 17, 3), "joints of recorded people")
+        return _recorded_scenes(tracks, pool, places, repeats=repeats, seed=seed)
     rng = stream(seed, "planning", "places")
     target = np.tile(np.arange(len(places)), repeats)
     position = places[target] + spacing * (rng.random((len(target), 2)) - 0.5)
@@ -286,6 +302,17 @@ def standing_scenes(
     group = _grouped(position, rng.permutation(len(target)), people)
     pose = stream(seed, "planning", "poses").integers(len(pool), size=group.shape)
     return StandingScenes.of(pool, places, target[group], pose, position[group], 2 * np.pi * (angle[group] + 0.0))
+
+
+def taken_floor(obstacle: Box) -> Floor:
+    """Return the floor on which nobody stands because of an obstacle: a quarter of a metre around it is included."""
+    (x, y, z), (u, v, w) = obstacle.center, obstacle.half
+    return Box((x, y, z), (u + _CLEARANCE, v + _CLEARANCE, w), obstacle.yaw).footprint
+
+
+def _in_the_way(obstacle: Box) -> bool:
+    """Return whether nobody can stand where an obstacle is; False for one that hangs overhead."""
+    return obstacle.center[2] - obstacle.half[2] < _OVERHEAD
 
 
 def _grouped(position: Floats, order: Integers, people: int) -> Integers:

@@ -11,8 +11,6 @@ from simharness.planning.candidates import Candidate
 from simharness.planning.fast_layer import FastLayer
 from simharness.planning.planned_room import Room
 from simharness.planning.rig_value import Correction, RigValue, SightingOdds
-from simharness.planning.visibility import Obstacle
-from simharness.planning.volume import Volume
 from simharness.types.random_streams import stream
 
 VARIANT = "full"
@@ -35,23 +33,17 @@ def layer_of(room: Room, *, places: int = _PLACES, repeats: int = 6, seed: int =
         repeats: number of people who stand at each place.
         seed: seed of the draws.
     """
-    volume = Volume(room.volume, room.volume_height)
-    spacing = float(np.clip(np.sqrt(volume.area / places), 0.25, 3.0))
+    spacing = float(np.clip(np.sqrt(room.volume.area / places), 0.25, 3.0))
     return FastLayer.of(
-        volume,
+        room.volume,
         detector=room.detector,
         people=room.keys.people.count,
         spacing=spacing,
         orientations=repeats,
         draws=1,
-        obstacles=obstacles_of(room),
+        obstacles=room.blocking,
         seed=seed,
     )
-
-
-def obstacles_of(room: Room) -> tuple[Obstacle, ...]:
-    """Return what hides people in a room."""
-    return tuple(Obstacle(np.array(box.center), 2.0 * np.array(box.half), box.yaw) for box in room.blocking)
 
 
 def fit_value(room: Room, candidates: Sequence[Candidate], *, seed: int = 0) -> RigValue:
@@ -90,8 +82,8 @@ def _compared(
     return (
         100.0 - float(maps.pcp.mean()),
         float(error.mean()) if len(error) else np.nan,
-        100.0 - figures["pcp"].value,
-        figures["mpjpe_mm"].value,
+        100.0 - figures["pcp"].mean,
+        figures["mpjpe_mm"].mean,
     )
 
 

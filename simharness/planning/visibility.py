@@ -7,66 +7,24 @@ The rule of visibility, the capsules and the outlines are those of the simulator
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from mvpose.arrays import Bools, Floats
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Camera
-from mvpose.checks import as_array
 from mvpose.kernels import njit
 from simharness.capture.body_outlines import IN_FRONT, bounding_box, packed, project_vertex
 from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import hit_people
 from simharness.capture.rendering.renderer import NEAR
 from simharness.planning.standing_people import StandingScenes
-from simharness.planning.volume import Volume
 from simharness.types.views import Views, Visibility
 from simharness.world.rigs.projection import project_to_image
-
-_CLEARANCE = 0.25  # metres around an obstacle where nobody stands: half the width of a person
-_OVERHEAD = 1.9  # metres: people stand under an obstacle that begins higher
+from simharness.world.scene.objects.geoms import Box
 
 
-@dataclass(frozen=True)
-class Obstacle:
-    """Box that hides what is behind it.
-
-    Attributes:
-        center: (3,), metres.
-        size: extent along its own x, y and z, (3,), metres.
-        yaw: rotation about z, radians.
-
-    Raises:
-        ValueError: a wrong shape, a value that is not finite, or a size that is not positive.
-    """
-
-    center: Floats
-    size: Floats
-    yaw: float = 0.0
-
-    def __post_init__(self) -> None:
-        for key in ("center", "size"):
-            array = as_array(getattr(self, key), (3,), f"{key} of an obstacle")
-            if not np.isfinite(array).all() or (key == "size" and (array <= 0).any()):
-                raise ValueError(f"{key} of an obstacle must be finite, and sizes positive, metres, got {array}")
-            object.__setattr__(self, key, array)
-
-    @property
-    def floor(self) -> Volume:
-        """Floor on which nobody stands because of it: its footprint and a quarter of a metre around."""
-        x, y = self.size[:2] / 2 + _CLEARANCE
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        corners = np.array([[-x, -y], [x, -y], [x, y], [-x, y]]) @ np.array([[cos, sin], [-sin, cos]])
-        return Volume(corners + self.center[:2])
-
-    @property
-    def blocks(self) -> bool:
-        """Whether nobody can stand where it is; False for an obstacle that hangs overhead."""
-        return bool(self.center[2] - self.size[2] / 2 < _OVERHEAD)
-
-
-def see(camera: Camera, scenes: StandingScenes, obstacles: Sequence[Obstacle] = ()) -> Views:
+def see(camera: Camera, scenes: StandingScenes, obstacles: Sequence[Box] = ()) -> Views:
     """Return what a camera sees of everyone: the views of S frames in one camera.
 
     Args:
@@ -83,7 +41,7 @@ def see(camera: Camera, scenes: StandingScenes, obstacles: Sequence[Obstacle] = 
     direction = direction / length[..., None]
     shape = inside.shape
     owner, in_front = np.full(shape, -1), np.full(shape, -np.inf)
-    boxes_of_objects = np.array([[*o.center, *o.size / 2, np.cos(o.yaw), np.sin(o.yaw)] for o in obstacles])
+    boxes_of_objects = np.array([[*each.center, *each.half, np.cos(each.yaw), np.sin(each.yaw)] for each in obstacles])
     _cast(
         camera.center,
         camera.R[2],
@@ -193,61 +151,53 @@ def _enter_box(start, way, box):
 
 def _boxes(camera: Camera, scenes: StandingScenes) -> Floats:
     """Return the boxes of everyone in the image, (S, Q, 4); zeros where nothing of the person is inside."""
-    pool, limits = scenes.pool, np.full((len(scenes), scenes.people, 4), np.nan)
-    _box_everyone(
-        scenes.pose,
-        scenes.turn,
-        scenes.position,
-        scenes.present,
-        pool.outlines,
-        pool.outline_of,
-        pool.extremes,
-        pool.extremes_of,
-        pool.edges,
-        pool.edges_of,
-        pool.body,
-        packed(camera)[None],
-        limits,
-    )
+    limits = np.full((len(scenes), scenes.people, 4), np.nan)
+    people = _Placed(scenes.pose, scenes.turn, scenes.position, scenes.present)
+    _box_everyone(people, scenes.pool.silhouettes, packed(camera)[None], limits)
     low, high = limits[..., :2], limits[..., 2:]
     inside = (high >= low).all(axis=-1, keepdims=True)  # False where NaN
     return np.where(inside, np.concatenate([low, high - low], axis=-1), 0.0)
 
 
+class _Placed(NamedTuple):
+    """People of S scenes.
+
+    Attributes:
+        pose: poses of the pool, (S, Q).
+        turn: rotations, (S, Q, 3, 3).
+        position: positions, (S, Q, 3), metres.
+        present: who is in the scene, (S, Q).
+    """
+
+    pose: Integers
+    turn: Floats
+    position: Floats
+    present: Bools
+
+
 @njit(cache=True)
-def _box_everyone(
-    poses, turns, positions, present, outlines, outline_of, extremes, extremes_of, edges, edges_of, bodies, camera, out
-):
+def _box_everyone(people, shapes, camera, out):
     """Write left, top, right, bottom of everyone in one image, (S, Q, 4).
 
     Where all extreme vertices are inside the image, their bounds are the box; else outline and edges are clipped.
 
     Args:
-        poses: poses of the pool, (S, Q).
-        turns: rotations, (S, Q, 3, 3).
-        positions: positions, (S, Q, 3).
-        present: who is in the scene, (S, Q).
-        outlines: vertices of the outlines of all poses, (n, 3).
-        outline_of: first vertex of each pose and the end, (K + 1,).
-        extremes: extreme vertices of all poses, (m, 3).
-        extremes_of: first of them of each pose and the end, (K + 1,).
-        edges: edges of the outlines of all bodies, (e, 2).
-        edges_of: first edge of each body and the end.
-        bodies: body of each pose, (K,).
+        people: the people, :class:`_Placed`.
+        shapes: shapes of the poses, :class:`~simharness.planning.standing_people.Silhouettes`.
         camera: parameters of the camera, (1, 26).
         out: output.
     """
     c, limits = camera[0], np.empty((1, 4))
-    for s in range(len(poses)):
-        for q in range(poses.shape[1]):
-            if not present[s, q]:
+    for s in range(len(people.pose)):
+        for q in range(people.pose.shape[1]):
+            if not people.present[s, q]:
                 continue
-            pose = poses[s, q]
-            turn, at, box = turns[s, q], positions[s, q], out[s, q]
+            pose = people.pose[s, q]
+            turn, at, box = people.turn[s, q], people.position[s, q], out[s, q]
             box[:] = np.inf, np.inf, -np.inf, -np.inf
             inside, ahead = True, False
-            for i in range(extremes_of[pose], extremes_of[pose + 1]):
-                x, y, z = _moved(extremes[i], turn, at)
+            for i in range(shapes.extremes_of[pose], shapes.extremes_of[pose + 1]):
+                x, y, z = _moved(shapes.extremes[i], turn, at)
                 a = c[5] * x + c[6] * y + c[7] * z + c[14]
                 b = c[8] * x + c[9] * y + c[10] * z + c[15]
                 d = c[11] * x + c[12] * y + c[13] * z + c[16]
@@ -260,12 +210,13 @@ def _box_everyone(
                     inside = False
             if inside or not ahead:
                 continue
-            first, last = outline_of[pose], outline_of[pose + 1]
+            first, last = shapes.outline_of[pose], shapes.outline_of[pose + 1]
             moved = np.empty((last - first, 3))
             for i in range(first, last):
-                moved[i - first] = _moved(outlines[i], turn, at)
-            body = bodies[pose]
-            bounding_box(moved, edges[edges_of[body] : edges_of[body + 1]], camera, 0.0, 1.0, limits)
+                moved[i - first] = _moved(shapes.outlines[i], turn, at)
+            body = shapes.body[pose]
+            edges = shapes.edges[shapes.edges_of[body] : shapes.edges_of[body + 1]]
+            bounding_box(moved, edges, camera, 0.0, 1.0, limits)
             box[:] = limits[0]
 
 

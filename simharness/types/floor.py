@@ -183,7 +183,7 @@ def simple_outline(corners: ArrayLike, *, what: str = "outline", smallest: float
     outline = as_array(corners, ("n", 2), what)
     if not np.isfinite(outline).all() or np.abs(outline).max(initial=0.0) > _LARGEST:
         raise ValueError(f"{what} must be finite and within {_LARGEST:g} m of the origin, got {outline.tolist()}")
-    outline = outline[np.linalg.norm(outline - np.roll(outline, 1, axis=0), axis=1) > _ROUNDING]
+    outline = outline[np.linalg.norm(outline - np.roll(outline, -1, axis=0), axis=1) > _ROUNDING]
     if len(outline) < 3:
         raise ValueError(
             f"{what} is not closed: {len(outline)} different corners enclose no floor; expected at least 3 corners "

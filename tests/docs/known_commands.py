@@ -75,7 +75,7 @@ IN_PARTS = {
 REHEARSE = (  # run by tests/simharness/planning
     "simharness rehearse",
     "simharness rehearse ring5 --volume 6x6 --people 4",
-    "simharness rehearse my-rig.toml --room 8x6x3 --volume 4x3@1,0.5 --people 6 --obstacle 1.5,0,0.4,2,1.8 --subsets",
+    "simharness rehearse my-rig.toml --room my-room.toml --people 6 --subsets",
 )
 PLAN = (  # run by tests/simharness/planning
     "simharness plan",

@@ -14,6 +14,7 @@ from doc_pages import FENCE, PAGES, ROOT, blocks
 import simharness
 from mvpose.wholebody import read_skeleton
 from simharness.planning.candidates import candidates_in
+from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.room_file import read_room
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.people_section import PeopleSection
@@ -21,7 +22,7 @@ from simharness.scenario.sections.people_section import PeopleSection
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in FENCE.findall(page))
-    assert languages == {"python": 15, "toml": 11, "yaml": 1}
+    assert languages == {"python": 15, "toml": 12, "yaml": 1}
 
 
 def test_the_shares_of_the_face_are_valid():
@@ -45,6 +46,16 @@ def test_the_room_of_the_plan_is_read_and_has_places(tmp_path):
     assert len(candidates_in(room, most=300)) > 50
     (block,) = [block for block in blocks("python") if "candidates_in(lab)" in block]
     exec(block, {})
+
+
+def test_the_room_of_the_rehearsal_describes_it(tmp_path):
+    (file,) = [
+        block for block in blocks("toml") if "[clutter]" in block and "[[lenses]]" not in block and "[room]" in block
+    ]
+    (tmp_path / "my-room.toml").write_text(file, encoding="utf-8")
+    setup = RehearsalSetup.in_room(read_room(tmp_path / "my-room.toml"))
+    assert setup.clutter.boxes == 6
+    assert setup.space.contains(setup.obstacles[0].footprint.outline).all()
 
 
 @pytest.fixture
@@ -85,7 +96,7 @@ def test_the_example_of_getting_started(shorter):
 
 @pytest.mark.slow
 def test_the_example_of_a_rehearsal():
-    rehearsal = run_block("rehearse(read_rig(")["rehearsal"]
+    rehearsal = run_block("rehearse_rig(read_rig(")["rehearsal"]
     assert rehearsal.whole.pcp.mean > 90
 
 

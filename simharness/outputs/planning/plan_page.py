@@ -142,11 +142,11 @@ def render_plan(plan: RigPlan, *, command: str = "") -> str:
 
 
 def _facts(room: Room) -> list[tuple[str, str]]:
-    x, y = (room.outline.max(axis=0) - room.outline.min(axis=0)).tolist()
-    u, v = (room.volume.max(axis=0) - room.volume.min(axis=0)).tolist()
+    x, y = room.space.size.tolist()
+    u, v = room.volume.size.tolist()
     target, objective = room.keys.target, room.keys.objective
     facts = [
-        ("room", f"{x:.1f} by {y:.1f} m, {room.height:.1f} m high"),
+        ("room", f"{x:.1f} by {y:.1f} m, {room.space.height:.1f} m high"),
         ("volume", f"{u:.1f} by {v:.1f} m"),
         ("people", f"{room.keys.people.count}"),
         ("detector", room.detector.name),
@@ -163,13 +163,13 @@ def _cards(plan: RigPlan) -> list[dict[str, str]]:
     cards = [
         {
             "title": "PCP",
-            "text": f"{figures.pcp[0]:.1f} %",
-            "about": f"{figures.pcp[1]:.1f} to {figures.pcp[2]:.1f}; {how}",
+            "text": f"{figures.pcp.mean:.1f} %",
+            "about": f"{figures.pcp.low:.1f} to {figures.pcp.high:.1f}; {how}",
         },
         {
             "title": "Joint error",
-            "text": f"{figures.error_mm[0]:.0f} mm",
-            "about": f"{figures.error_mm[1]:.0f} to {figures.error_mm[2]:.0f}; {how}",
+            "text": f"{figures.error_mm.mean:.0f} mm",
+            "about": f"{figures.error_mm.low:.0f} to {figures.error_mm.high:.0f}; {how}",
         },
         {
             "title": "Within the target",
@@ -178,8 +178,8 @@ def _cards(plan: RigPlan) -> list[dict[str, str]]:
         },
     ]
     if usual:
-        best = max(usual, key=lambda each: (each.simulated or each.predicted).pcp[0])
-        gain = figures.pcp[0] - (best.simulated or best.predicted).pcp[0]
+        best = max(usual, key=lambda each: (each.simulated or each.predicted).pcp.mean)
+        gain = figures.pcp.mean - (best.simulated or best.predicted).pcp.mean
         cards.append(
             {"title": "Gain", "text": f"{gain:+.1f} PCP", "about": f"over cameras without a plan ({best.title})"}
         )
@@ -212,8 +212,8 @@ def _points(plan: RigPlan) -> list[dict[str, Any]]:
             "now": point.cameras == len(plan.rig),
             "cells": [
                 f"{point.cameras}",
-                f"{point.figures.pcp[0]:.1f}",
-                f"{point.figures.error_mm[0]:.0f}",
+                f"{point.figures.pcp.mean:.1f}",
+                f"{point.figures.error_mm.mean:.0f}",
                 f"{point.figures.share:.0f} %",
                 f"{point.figures.worst:.0f}",
                 f"{point.cost:g}",

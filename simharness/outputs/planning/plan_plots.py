@@ -41,12 +41,12 @@ def room_from_above(
     Returns:
         An SVG element.
     """
-    low, high = room.outline.min(axis=0) - _MARGIN, room.outline.max(axis=0) + _MARGIN
+    low, high = room.space.bounds[0] - _MARGIN, room.space.bounds[1] + _MARGIN
     tall = float((high - low)[1] / (high - low)[0])
     with svg_plot(name, size=(width, (width - _PAD[0]) * tall + _PAD[1])) as (axes, written):
         draw_room(axes, room)
         if places is not None and len(places):
-            shade = np.clip(places[:, 2] / room.height, 0.0, 1.0)
+            shade = np.clip(places[:, 2] / room.space.height, 0.0, 1.0)
             order = np.argsort(places[:, 2])[::-1]  # low ones on top, smaller
             axes.scatter(
                 places[order, 0], places[order, 1], s=6 + 22 * shade[order], c=PLACE, alpha=0.35, lw=0, zorder=3,
@@ -76,15 +76,15 @@ def room_from_side(
     Returns:
         An SVG element.
     """
-    low, high = room.outline[:, axis].min(), room.outline[:, axis].max()
+    low, high = (end[axis] for end in room.space.bounds)
     wide = float(high - low) + 2 * _MARGIN
-    height = (_SIDE_WIDTH - _PAD[0]) * (room.height + 0.6) / wide + _PAD[1]
+    height = (_SIDE_WIDTH - _PAD[0]) * (room.space.height + 0.6) / wide + _PAD[1]
     with svg_plot(name, size=(_SIDE_WIDTH, height)) as (axes, written):
-        axes.add_patch(_rectangle(low, high, 0.0, room.height, fc="none", ec=INK, lw=2.2, zorder=2))
-        along = room.volume[:, axis]
+        axes.add_patch(_rectangle(low, high, 0.0, room.space.height, fc="none", ec=INK, lw=2.2, zorder=2))
+        along = room.volume.outline[:, axis]
         axes.add_patch(
             _rectangle(
-                along.min(), along.max(), 0.0, room.volume_height, fc=VOLUME, ec=VOLUME, alpha=0.16, lw=1.2, zorder=1
+                along.min(), along.max(), 0.0, room.volume.height, fc=VOLUME, ec=VOLUME, alpha=0.16, lw=1.2, zorder=1
             )
         )
         for box in room.obstacles:
@@ -99,15 +99,15 @@ def room_from_side(
             color = _color(camera, room)
             axes.plot([start[axis], end[axis]], [start[2], end[2]], color=color, lw=1.6, alpha=0.7, zorder=4)
             axes.plot(start[axis], start[2], "o", color=color, ms=5.5, mec="white", mew=0.8, zorder=5)
-        axes.set(xlabel=f"{'xy'[axis]}, m", ylabel="z, m", ylim=(-0.2, room.height + 0.4))
+        axes.set(xlabel=f"{'xy'[axis]}, m", ylabel="z, m", ylim=(-0.2, room.space.height + 0.4))
         axes.set_xlim(low - _MARGIN, high + _MARGIN)
-        axes.set_yticks(np.arange(0.0, room.height + 0.1))
+        axes.set_yticks(np.arange(0.0, room.space.height + 0.1))
         axes.set_aspect("equal")
         axes.grid(axis="y", color=LINE)
         axes.spines[:].set_visible(False)
         down = np.array([0.0, -1.0])
         labels = [MapLabel(each.name, each.center[[axis, 2]], down, size=7.5) for each in cameras]
-        frame = np.array([[low, 0.0], [low, room.height], [high, room.height], [high, 0.0]])
+        frame = np.array([[low, 0.0], [low, room.space.height], [high, room.space.height], [high, 0.0]])
         sights = [np.stack([each.center, each.center + 0.8 * each.R[2]])[:, [axis, 2]] for each in cameras]
         write_labels(axes, labels, lines=[frame, *sights])
     return written[0]
@@ -115,14 +115,15 @@ def room_from_side(
 
 def draw_room(axes: Axes, room: Room) -> None:
     """Draw walls, doors, volume and obstacles of a room from above."""
-    axes.add_patch(Polygon(room.outline, closed=True, fc="none", ec=INK, lw=2.2, joinstyle="miter", zorder=2))
+    axes.add_patch(Polygon(room.space.outline, closed=True, fc="none", ec=INK, lw=2.2, joinstyle="miter", zorder=2))
     axes.add_patch(
-        Polygon(room.volume, closed=True, fc=VOLUME, ec=VOLUME, alpha=0.16, lw=1.2, zorder=1, label="people")
+        Polygon(room.volume.outline, closed=True, fc=VOLUME, ec=VOLUME, alpha=0.16, lw=1.2, zorder=1, label="people")
     )
-    axes.add_patch(Polygon(room.volume, closed=True, fc="none", ec=VOLUME, lw=1.0, ls=(0, (4, 3)), zorder=1.1))
+    axes.add_patch(Polygon(room.volume.outline, closed=True, fc="none", ec=VOLUME, lw=1.0, ls=(0, (4, 3)), zorder=1.1))
     for box in room.obstacles:
-        corners = box.corners[[0, 4, 6, 2], :2]
-        axes.add_patch(Polygon(corners, closed=True, fc=OBSTACLE, ec=FAINT, alpha=0.55, lw=0.8, zorder=1.5))
+        axes.add_patch(
+            Polygon(box.footprint.outline, closed=True, fc=OBSTACLE, ec=FAINT, alpha=0.55, lw=0.8, zorder=1.5)
+        )
     for start, end in room.doors:
         axes.plot(*np.stack([start, end]).T, color=DOOR, lw=5.0, solid_capstyle="butt", zorder=2.5)
 
@@ -146,7 +147,7 @@ def place_map(name: str, plan: RigPlan, values: Floats, *, worst: float, best: f
         digits: digits of the written values.
     """
     places = plan.prediction.places
-    low, high = plan.room.outline.min(axis=0) - 0.3, plan.room.outline.max(axis=0) + 0.3
+    low, high = plan.room.space.bounds[0] - 0.3, plan.room.space.bounds[1] + 0.3
     tall = float((high - low)[1] / (high - low)[0])
     side = _spacing(places)
     with svg_plot(name, size=(_SIZE[0], _SIZE[0] * tall)) as (axes, written):
@@ -173,7 +174,7 @@ def buying_curve(name: str, plan: RigPlan) -> str:
     """Plot the PCP and the share of the volume within the target against the number of cameras."""
     with svg_plot(name, size=_SIZE) as (axes, written):
         counts = [point.cameras for point in plan.curve]
-        axes.plot(counts, [point.figures.pcp[0] for point in plan.curve], "o-", color=_LAYER, ms=5, label="PCP")
+        axes.plot(counts, [point.figures.pcp.mean for point in plan.curve], "o-", color=_LAYER, ms=5, label="PCP")
         axes.plot(
             counts, [point.figures.share for point in plan.curve], "s--", color=CAMERA, ms=4.5,
             label="share of the volume within the target",
@@ -192,11 +193,13 @@ def rig_bars(name: str, plan: RigPlan) -> str:
     with svg_plot(name, size=(_SIZE[0], 0.6 + 0.42 * len(rows))) as (axes, written):
         for k, each in enumerate(rows):
             y = len(rows) - 1 - k
-            axes.plot(each.predicted.pcp[0], y + 0.13, "o", color=_LAYER, ms=5, label="fast layer" if k == 0 else None)
+            axes.plot(
+                each.predicted.pcp.mean, y + 0.13, "o", color=_LAYER, ms=5, label="fast layer" if k == 0 else None
+            )
             if each.simulated is not None:
-                value, low, high = each.simulated.pcp
-                axes.plot([low, high], [y - 0.13] * 2, color=_SIMULATED, lw=2, alpha=0.6)
-                axes.plot(value, y - 0.13, "o", color=_SIMULATED, ms=5, label="simulation" if k == 0 else None)
+                pcp = each.simulated.pcp
+                axes.plot([pcp.low, pcp.high], [y - 0.13] * 2, color=_SIMULATED, lw=2, alpha=0.6)
+                axes.plot(pcp.mean, y - 0.13, "o", color=_SIMULATED, ms=5, label="simulation" if k == 0 else None)
         axes.set_yticks(range(len(rows)), [each.title for each in reversed(rows)], color=INK)
         axes.set(xlabel="PCP, %", ylim=(-0.6, len(rows) - 0.4))
         axes.grid(axis="x")
@@ -213,7 +216,7 @@ def _color(camera: Camera, room: Room) -> str:
 
 def _label(axes: Axes, room: Room, cameras: Sequence[Camera]) -> None:
     """Write names and heights of obstacles and cameras, where they hide neither walls nor each other."""
-    middle = room.volume.mean(axis=0)
+    middle = room.volume.outline.mean(axis=0)
     labels = []
     for box, keys in zip(room.obstacles, room.keys.obstacles, strict=True):
         text = f"{keys.name}\n{box.center[2] + box.half[2]:.1f} m".strip()
@@ -227,8 +230,8 @@ def _label(axes: Axes, room: Room, cameras: Sequence[Camera]) -> None:
         axes,
         labels,
         lines=[
-            np.vstack([room.outline, room.outline[:1]]),
-            np.vstack([room.volume, room.volume[:1]]),
+            np.vstack([room.space.outline, room.space.outline[:1]]),
+            np.vstack([room.volume.outline, room.volume.outline[:1]]),
             *(cone_from_above(camera, _REACH)[[1, 0, 2]] for camera in cameras),
         ],
         areas=[(corners.min(axis=0), corners.max(axis=0)) for corners in boxes],
@@ -249,5 +252,5 @@ def _spacing(places: Floats) -> float:
 
 
 def _lows(plan: RigPlan) -> list[float]:
-    values = [v for p in plan.curve for v in (p.figures.pcp[0], p.figures.share) if np.isfinite(v)]
+    values = [v for p in plan.curve for v in (p.figures.pcp.mean, p.figures.share) if np.isfinite(v)]
     return values or [50.0]

@@ -78,27 +78,27 @@ def render_rehearsal(rehearsal: Rehearsal, *, provenance: Mapping[str, Any]) -> 
         subsets=_subset_rows(rehearsal),
         subset_curve=Markup(subset_curve(rehearsal, name="sets")) if _all_sets(rehearsal) else None,
         scenes=len(rehearsal.scenes),
-        target=rehearsal.target,
+        target=rehearsal.setup.target,
         command=provenance.get("command") or "",
         provenance=provenance_sentence(provenance),
     )
 
 
 def _facts(rehearsal: Rehearsal) -> list[tuple[str, str]]:
-    low, high = rehearsal.volume.outline.min(axis=0), rehearsal.volume.outline.max(axis=0)
-    x, y = high - low
+    setup = rehearsal.setup
+    x, y = setup.volume.size
     return [
         ("cameras", str(len(rehearsal.rig))),
-        ("people", str(rehearsal.people)),
-        ("volume", f"{x:.1f} by {y:.1f} m, {rehearsal.volume.height:.1f} m high"),
-        ("detector", rehearsal.detector),
-        ("target", f"PCP {rehearsal.target.pcp:g}, {rehearsal.target.error_mm:g} mm"),
+        ("people", str(setup.people)),
+        ("volume", f"{x:.1f} by {y:.1f} m, {setup.volume.height:.1f} m high"),
+        ("detector", setup.detector.name),
+        ("target", f"PCP {setup.target.pcp:g}, {setup.target.error:g} mm"),
         ("scenes", str(len(rehearsal.scenes))),
     ]
 
 
 def _cards(rehearsal: Rehearsal) -> list[dict[str, str]]:
-    whole = rehearsal.whole
+    whole, target = rehearsal.whole, rehearsal.setup.target
     return [
         {
             "title": "PCP",
@@ -121,7 +121,7 @@ def _cards(rehearsal: Rehearsal) -> list[dict[str, str]]:
         {
             "title": "Good floor",
             "text": f"{100 * rehearsal.good_share:.0f} %",
-            "about": f"of the volume has PCP {rehearsal.target.pcp:g} and {rehearsal.target.error_mm:g} mm",
+            "about": f"of the volume has PCP {target.pcp:g} and {target.error:g} mm",
             "source": _LAYER,
         },
     ]

@@ -21,7 +21,6 @@ from mvpose.report.svg_plots import FAINT, INK, legend_above, svg_plot
 from simharness.planning.rehearsal_result import Rehearsal
 from simharness.planning.sentences import grid_spacing
 from simharness.planning.tolerance import CLIFF, FaultTolerance
-from simharness.planning.visibility import Obstacle
 from simharness.statistics.intervals import Interval
 
 GOOD = "#1f8a5b"
@@ -180,16 +179,6 @@ def outline_of(places: Floats, chosen: Bools) -> list[Floats]:
     return lines
 
 
-def corners_of(obstacle: Obstacle) -> Floats:
-    """Return the corners of a box, in order around its floor and then around its top, (8, 3), metres."""
-    half = obstacle.size / 2
-    around = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half[:2]
-    cos, sin = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
-    floor = around @ np.array([[cos, sin], [-sin, cos]]) + obstacle.center[:2]
-    low, high = obstacle.center[2] - half[2], obstacle.center[2] + half[2]
-    return np.concatenate([np.column_stack([floor, np.full(4, z)]) for z in (low, high)])
-
-
 def crowd_curve(rehearsal: Rehearsal, *, name: str) -> str:
     """Plot PCP against the number of people: the fast layer as a line, simulation as points with intervals."""
     crowds = rehearsal.crowds
@@ -204,7 +193,7 @@ def crowd_curve(rehearsal: Rehearsal, *, name: str) -> str:
         )
         known = [(each.people, each.pcp) for each in crowds if each.pcp is not None]
         _points(axes, [number for number, _ in known], [pcp for _, pcp in known], "simulation")
-        axes.axhline(rehearsal.target.pcp, color=FAINT, lw=0.9, ls=":")
+        axes.axhline(rehearsal.setup.target.pcp, color=FAINT, lw=0.9, ls=":")
         values = [each.layer_pcp for each in crowds] + [_low(pcp) for _, pcp in known]
         axes.set(xlabel="people in the volume", ylabel="PCP, %", ylim=(_bottom(values), 101))
         axes.set_xticks([each.people for each in crowds])
@@ -260,7 +249,7 @@ def subset_curve(rehearsal: Rehearsal, *, name: str) -> str:
         )
         best = [max(each.pcp.mean for names, each in sets.items() if len(names) == count) for count in counts]
         axes.plot(counts, best, "-", color=SIMULATION, lw=1.5, label="the best of its size")
-        axes.axhline(rehearsal.target.pcp, color=FAINT, lw=0.9, ls=":")
+        axes.axhline(rehearsal.setup.target.pcp, color=FAINT, lw=0.9, ls=":")
         axes.set(xlabel="cameras", ylabel="PCP, %", ylim=(_bottom([each.pcp.mean for each in sets.values()]), 101))
         axes.set_xticks(counts)
         axes.grid(axis="y")
@@ -270,24 +259,25 @@ def subset_curve(rehearsal: Rehearsal, *, name: str) -> str:
 
 def _surroundings(axes: Axes, rehearsal: Rehearsal, *, names: bool = True) -> float:
     """Draw volume, room and cameras, with their names or plain; return the width that is shown, metres."""
-    outline = rehearsal.volume.outline
+    setup = rehearsal.setup
+    outline, walls = setup.volume.outline, np.zeros((0, 2)) if setup.space is None else setup.space.outline
     axes.add_patch(Polygon(outline, fill=False, ec=INK, lw=1.1, zorder=3.2))
-    if len(rehearsal.room):
-        axes.add_patch(Polygon(rehearsal.room, fill=False, ec=FAINT, lw=2.2, zorder=1.2))
-    for obstacle in rehearsal.obstacles:
-        axes.add_patch(Polygon(corners_of(obstacle)[:4, :2], fc=FAINT, ec=INK, lw=0.9, alpha=0.55, zorder=2.5))
+    if len(walls):
+        axes.add_patch(Polygon(walls, fill=False, ec=FAINT, lw=2.2, zorder=1.2))
+    for obstacle in setup.obstacles:
+        axes.add_patch(Polygon(obstacle.footprint.outline, fc=FAINT, ec=INK, lw=0.9, alpha=0.55, zorder=2.5))
     for camera in rehearsal.rig:
         camera_from_above(axes, camera)
     if rehearsal.extra is not None:
         _extra(axes, rehearsal.extra.camera)
-    points = np.concatenate([outline, rehearsal.room, rehearsal.rig.centers[:, :2]])
+    points = np.concatenate([outline, walls, rehearsal.rig.centers[:, :2]])
     if rehearsal.extra is not None:
         points = np.concatenate([points, rehearsal.extra.camera.center[None, :2]])
     low, high = points.min(axis=0) - 0.6, points.max(axis=0) + 0.6
     fit_view(axes, low, high, tall=_TALL)
     if names:
-        walls = [np.vstack([each, each[:1]]) for each in (outline, rehearsal.room) if len(each)]
-        name_cameras(axes, rehearsal.rig, lines=walls, areas=[(outline.min(axis=0), outline.max(axis=0))])
+        lines = [np.vstack([each, each[:1]]) for each in (outline, walls) if len(each)]
+        name_cameras(axes, rehearsal.rig, lines=lines, areas=[(outline.min(axis=0), outline.max(axis=0))])
     else:
         axes.set(xlabel="", ylabel="")
     left, right = axes.get_xlim()

@@ -17,7 +17,7 @@ from mvpose.report.view_3d import (
     prism,
     view_3d,
 )
-from simharness.outputs.planning.rehearsal_plots import EXTRA, GOOD, corners_of, outline_of
+from simharness.outputs.planning.rehearsal_plots import EXTRA, GOOD, outline_of
 from simharness.planning.rehearsal_result import Rehearsal
 from simharness.planning.sentences import grid_spacing
 
@@ -29,12 +29,14 @@ _TILE, _OUTLINE, _GRID = Style3D(GOOD, opacity=0.22), Style3D(GOOD, 1.8), Style3
 
 def rig_view_3d(rehearsal: Rehearsal) -> View3D:
     """Return the view of a rehearsal."""
-    rig, volume, height = rehearsal.rig, rehearsal.volume.outline, rehearsal.volume.height
-    points = np.concatenate([volume, rig.centers[:, :2], rehearsal.room])
+    rig, setup = rehearsal.rig, rehearsal.setup
+    volume, height = setup.volume.outline, setup.volume.height
+    walls = np.zeros((0, 2)) if setup.space is None else setup.space.outline
+    points = np.concatenate([volume, rig.centers[:, :2], walls])
     frusta = [Piece3D(camera_pyramid(camera, _REACH), PYRAMID, _FRUSTUM) for camera in rig]
     if rehearsal.extra is not None:
         frusta.append(Piece3D(camera_pyramid(rehearsal.extra.camera, _REACH), PYRAMID, _EXTRA))
-    room = _at(rehearsal.room, 0.0)
+    room = _at(walls, 0.0)
     scene = Scene3D(
         label="The rig in 3D: frusta of the cameras, the volume, and the part of it that meets the target in green",
         center=np.array([*(points.min(axis=0) + points.max(axis=0)) / 2, height / 2]),
@@ -43,7 +45,7 @@ def rig_view_3d(rehearsal: Rehearsal) -> View3D:
             *_tiles(rehearsal),
             Piece3D.of_lines(_floor(points), _GRID),
             Piece3D(room, Shape3D(lines=loop(len(room))), _ROOM),
-            *(Piece3D(corners_of(each), prism(4), _OBSTACLE) for each in rehearsal.obstacles),
+            *(Piece3D(each.corners[[0, 4, 6, 2, 1, 5, 7, 3]], prism(4), _OBSTACLE) for each in setup.obstacles),
             Piece3D(np.concatenate([_at(volume, 0.0), _at(volume, height)]), prism(len(volume)), _VOLUME),
             Piece3D.of_lines(_upright(outline_of(rehearsal.prediction.places, rehearsal.good), height), _OUTLINE),
             *frusta,

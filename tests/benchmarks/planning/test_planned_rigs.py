@@ -8,7 +8,6 @@ import pytest
 from benchmarks.planning.peer import _camera, read_result, settings_of
 from benchmarks.planning.planned_rigs import RIGS, summary
 from benchmarks.planning.rooms import draw_room
-from simharness.planning.polygons import contains, distance_to_edges
 
 OUTPUT = """
   Restart 10/10  best=633.7: 100%|█| 10/10 [00:48<00:00]    - Attempt  9: Score=633.741 (South=634.9 | North=450.0)
@@ -26,7 +25,7 @@ def test_best_attempt_is_read_with_its_bearings():
 
 def test_cameras_of_the_peer_have_its_lens_and_direction():
     room = draw_room(3)
-    each = _camera(room, ("P", 0.4, float(room.outline[0, 1]) + 0.15, 2.2, 90.0, 21.0))
+    each = _camera(room, ("P", 0.4, float(room.space.outline[0, 1]) + 0.15, 2.2, 90.0, 21.0))
     assert room.lenses[each.lens].turned
     assert np.degrees([each.bearing, each.tilt]) == pytest.approx([90.0, -21.0])
     assert room.mounts[each.mount].name == "wall 0"
@@ -38,13 +37,13 @@ def test_the_peer_gets_the_same_places_and_volume(seed):
     given = settings_of(room, 5)
     walls = np.array(given["room"]["corners"])
     clearance = room.keys.places.walls.clearance
-    assert contains(room.outline, walls).all()
-    away = distance_to_edges(room.outline, walls)  # farther at a corner that points into the room
+    assert room.space.contains(walls).all()
+    away = room.space.distance_to_sides(walls)  # farther at a corner that points into the room
     assert away.min() == pytest.approx(clearance)
     assert away.max() < 1.5 * clearance
     (zone,) = given["capture_zones"]
     place = [zone["placement"]["x_offsets"][0], zone["placement"]["y_offsets"][0]]
-    assert np.array(zone["vertices"]) + place == pytest.approx(room.volume)
+    assert np.array(zone["vertices"]) + place == pytest.approx(room.volume.outline)
     assert given["camera_sets"][0]["max_count"] == 5
     wide, tall = room.lenses[0].fov
     assert (given["camera_sets"][0]["fov_h_landscape"], given["camera_sets"][0]["fov_h_portrait"]) == (wide, tall)
@@ -54,7 +53,7 @@ def test_rooms_are_the_same_by_seed_and_have_four_to_eight_cameras():
     rooms = [draw_room(seed) for seed in range(30)]
     assert all(each.keys == draw_room(seed).keys for seed, each in enumerate(rooms))
     assert {each.keys.cameras.count for each in rooms} == {4, 5, 6, 7, 8}
-    assert {len(each.outline) for each in rooms} == {4, 6}
+    assert {len(each.space.outline) for each in rooms} == {4, 6}
 
 
 def test_summary_counts_wins_and_the_gain_where_others_are_low():

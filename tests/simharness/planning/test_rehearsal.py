@@ -16,12 +16,13 @@ from simharness.cli import app
 from simharness.outputs.planning.rehearsal_page import render_rehearsal
 from simharness.outputs.planning.rehearsal_plots import outline_of
 from simharness.planning.rehearsal_result import HEIGHTS
+from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.rehearse_rig import RehearsalEffort, rehearse_rig
 from simharness.planning.rig_file import read_rig
 from simharness.planning.sentences import good_rectangle, sentences
-from simharness.planning.volume import Volume
 from simharness.scenario.presets import read_profile
 from simharness.trial.provenance import provenance
+from simharness.types.floor import Volume
 
 pytestmark = pytest.mark.slow
 
@@ -29,14 +30,10 @@ TINY = RehearsalEffort(scenes=2, crowd_scenes=1, crowds=(1,), most=2, around=3)
 VOLUME = Volume.box(2.0, 2.0)
 
 
-def a_rehearsal(rig, **changes):
-    content = dict(detector=read_profile("typical"), volume=VOLUME, people=2, effort=TINY)
-    return rehearse_rig(rig, **content | changes)
-
-
 @pytest.fixture(scope="module")
 def rehearsal():
-    return a_rehearsal(read_rig("corners4"), name="corners")
+    setup = RehearsalSetup(VOLUME, read_profile("typical"), people=2)
+    return rehearse_rig(read_rig("corners4"), setup, name="corners", effort=TINY)
 
 
 def test_figures_of_one_rehearsal_agree(rehearsal):
@@ -98,21 +95,46 @@ def test_the_page_has_every_sentence_and_marks_every_figure(rehearsal):
     assert page.count('class="source simulation"') >= 8
 
 
+HALL = """
+detector = "typical"
+[room]
+size = [8.0, 8.0, 3.0]
+[volume]
+size = [4.0, 3.0]
+center = [1.0, 0.5]
+[[obstacles]]
+center = [1.5, 0.0]
+size = [0.4, 2.0, 1.8]
+[clutter]
+boxes = 3
+[target]
+pcp = 90.0
+error = 50.0
+"""
+
+
 def test_the_command_writes_page_and_json(rehearsal, tmp_path, monkeypatch):
     asked = {}
 
-    def remembered(rig, **options):
-        asked.update(options, rig=rig)
+    def remembered(rig, setup, **options):
+        asked.update(options, setup=setup)
         return rehearsal
 
     monkeypatch.setattr(simharness.planning.rehearse_rig, "rehearse_rig", remembered)
-    options = "--room 8x8x3 --volume 4x3@1,0.5 --people 6 --obstacle 1.5,0,0.4,2,1.8 --subsets --scenes 2"
+    room = tmp_path / "hall.toml"
+    room.write_text(HALL, encoding="utf-8")
+    options = f"--room {room} --people 6 --subsets --scenes 2"
     result = CliRunner().invoke(app, ["rehearse", "corners4", *options.split(), "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
-    assert asked["people"] == 6
+    setup = asked["setup"]
     assert asked["subsets"]
-    assert asked["volume"].area == pytest.approx(12.0)
-    assert len(asked["obstacles"]) == 1
+    assert setup.people == 6
+    assert setup.volume.area == pytest.approx(12.0)
+    assert setup.volume.middle == pytest.approx([1.0, 0.5])
+    assert setup.space.height == 3.0
+    assert len(setup.obstacles) == 1
+    assert setup.clutter.boxes == 3
+    assert (setup.target.pcp, setup.target.error) == (90.0, 50.0)
     assert json.loads((tmp_path / "rehearsal.json").read_text())["name"] == "corners"
     assert "<h1>corners</h1>" in (tmp_path / "rehearsal.html").read_text()
 

@@ -9,16 +9,16 @@ from typer.testing import CliRunner
 from mvpose import Rig
 from mvpose.formats.calibration.voxelpose import write_calibration
 from simharness.cli import app
-from simharness.cli.rehearse_values import clutter_of, obstacle_of, room_of, surroundings_of, target_of, volume_of
-from simharness.outputs.planning.rehearsal_plots import corners_of
+from simharness.cli.rehearse_command import rectangle_of
+from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.rehearse_rig import rehearse_rig
 from simharness.planning.room_file import read_room
-from simharness.planning.visibility import Obstacle
-from simharness.planning.volume import Volume
+from simharness.planning.standing_people import taken_floor
 from simharness.scenario.presets import read_profile
-from simharness.scenario.shipped import shipped_folder
+from simharness.types.floor import Volume
 from simharness.world.rigs.layouts import look_at
 from simharness.world.rigs.published_rigs import preset_rig
+from simharness.world.scene.objects.geoms import Box
 
 
 def test_nothing_visible_is_one_message():
@@ -30,39 +30,43 @@ def test_nothing_visible_is_one_message():
         ]
     )
     with pytest.raises(ValueError, match="nothing is visible"):
-        rehearse_rig(away, detector=read_profile("typical"), volume=Volume.box(2.0, 2.0))
+        rehearse_rig(away, RehearsalSetup(Volume.box(2.0, 2.0), read_profile("typical")))
 
 
-@pytest.mark.parametrize(
-    ("read", "text", "message"),
-    [
-        (volume_of, "4", "three corners or more"),
-        (volume_of, "0,0 1,1", "not closed"),
-        (volume_of, "0,0 2,2 2,0 0,2", "sides 1 and 3 cross"),
-        (volume_of, "0x3", "above 0 m"),
-        (volume_of, "axb", "expected 2 numbers"),
-        (room_of, "8", "expected 2 or 3 numbers"),
-        (obstacle_of, "1,2,3", "expected 5 numbers"),
-        (lambda text: clutter_of([text]), "chair=2", "kinds are boxes, shelves"),
-        (target_of, "101,40", "at most 100"),
-    ],
-)
-def test_options_that_cannot_be_read(read, text, message):
-    with pytest.raises(ValueError, match=message):
-        read(text)
+def test_a_rehearsal_has_people():
+    with pytest.raises(ValueError, match="people: expected 1 or more, got 0"):
+        RehearsalSetup(Volume.box(2.0, 2.0), read_profile("typical"), people=0)
 
 
-def test_a_room_file_gives_volume_obstacles_people_and_detector():
-    rooms = sorted((shipped_folder() / "rooms").glob("*.toml"))
-    around = surroundings_of(str(rooms[0]))
-    room = read_room(rooms[0])
-    assert around.people == room.keys.people.count
-    assert around.volume.area > 0
-    assert len(around.obstacles) == len(room.blocking)
-    for each, box in zip(around.obstacles, room.blocking, strict=True):
-        assert np.allclose(each.size, 2 * np.array(box.half))
-    assert surroundings_of("8x6x2.5").room.height == 2.5
-    assert surroundings_of("8x6").volume is None
+@pytest.mark.parametrize("text", ["4", "0x3", "axb", "4x3x2", "4x3@1,0.5", "0,0 4,0 4,3", "infx3"])
+def test_a_volume_that_is_no_rectangle_is_sent_to_the_room_file(text):
+    with pytest.raises(ValueError, match=r"expected two sides above 0 m, 4x3.*\[volume\] of a room file"):
+        rectangle_of(text)
+
+
+def test_a_volume_is_a_rectangle_around_the_origin():
+    volume = rectangle_of("4x2.5")
+    assert volume.size == pytest.approx([4.0, 2.5])
+    assert volume.middle == pytest.approx([0.0, 0.0])
+
+
+def test_a_room_file_gives_volume_obstacles_people_clutter_target_and_detector(tmp_path):
+    file = tmp_path / "room.toml"
+    file.write_text(
+        "detector = 'poor'\n[room]\nsize = [8.0, 6.0, 2.5]\n[volume]\nsize = [3.0, 2.0]\nheight = 1.9\n"
+        "[[obstacles]]\ncenter = [2.0, 1.0]\nsize = [0.4, 1.0, 1.8]\n[people]\ncount = 6\n"
+        "[clutter]\nboxes = 2\n[target]\npcp = 90.0\n"
+    )
+    room = read_room(file)
+    setup = RehearsalSetup.in_room(room)
+    assert setup.people == 6
+    assert setup.detector == read_profile("poor")
+    assert (setup.volume.area, setup.volume.height) == (pytest.approx(6.0), 1.9)
+    assert setup.space.size == pytest.approx([8.0, 6.0])
+    assert setup.space.height == 2.5
+    assert setup.obstacles == room.obstacles
+    assert setup.clutter.boxes == 2
+    assert (setup.target.pcp, setup.target.error) == (90.0, 40.0)
 
 
 def test_a_calibration_without_the_size_of_its_pictures(tmp_path):
@@ -73,35 +77,36 @@ def test_a_calibration_without_the_size_of_its_pictures(tmp_path):
     assert "give --size WIDTHxHEIGHT" in result.output
 
 
-def test_options_that_can():
-    assert np.allclose(volume_of("4x2@1,0.5").outline.mean(axis=0), [1.0, 0.5])
-    assert volume_of("0,0 4,0 4,3 0,0").area == pytest.approx(6.0)
-    assert room_of("8x6").height == 3.0
-    assert clutter_of(["boxes=3", "chairs=1"]).boxes == 3
-    assert np.allclose(obstacle_of("1,2,0.5,0.4,1.8").center, [1.0, 2.0, 0.9])
+ROOM = "[room]\nsize = [{}]\n[volume]\nsize = [2.0, 2.0]\nheight = 1.4\n"
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "room", "message"),
     [
-        ("ring5 --room 6x6x3", "outside of the room"),
-        ("ring5 --room 9x9x1.5", "above the ceiling"),
-        ("no-such-rig", "no such rig"),
-        ("ring5 --volume 4x", "--volume"),
-        ("ring5 --detector nonsense", "nonsense"),
+        ("ring5", ROOM.format("6.0, 6.0, 3.0"), "outside of the room"),
+        ("ring5", ROOM.format("9.0, 9.0, 1.5"), "above the ceiling"),
+        ("ring5 --volume 12x3", ROOM.format("11.0, 11.0, 3.0"), "its corner (-6.00, -1.50) m is outside of the room"),
+        ("ring5 --room 8x6x3", "", "8x6x3: no such room; expected a TOML file"),
+        ("ring5 --people 41", "", "--people"),
+        ("no-such-rig", "", "no such rig"),
+        ("ring5 --volume 4x", "", "--volume"),
+        ("ring5 --size 800", "", "--size must be WIDTHxHEIGHT"),
+        ("ring5 --detector nonsense", "", "nonsense"),
     ],
 )
-def test_bad_input_is_one_message(arguments, message, tmp_path):
-    result = CliRunner().invoke(app, ["rehearse", *arguments.split(), "--out", str(tmp_path)])
+def test_bad_input_is_one_message(arguments, room, message, tmp_path):
+    options = arguments.split()
+    if room:
+        (tmp_path / "room.toml").write_text(room)
+        options += ["--room", str(tmp_path / "room.toml")]
+    result = CliRunner().invoke(app, ["rehearse", *options, "--out", str(tmp_path)])
     assert result.exit_code == 2
     assert message in result.output
-    assert len(result.output.strip().splitlines()) == 1
 
 
 def test_a_turned_obstacle_is_drawn_where_it_stands():
-    corners = corners_of(Obstacle(np.array([1.0, 2.0, 0.5]), np.array([2.0, 0.4, 1.0]), yaw=np.pi / 2))
-    assert np.allclose(corners.min(axis=0), [0.8, 1.0, 0.0])
-    assert np.allclose(corners.max(axis=0), [1.2, 3.0, 1.0])
-    floor = Obstacle(np.array([1.0, 2.0, 0.5]), np.array([2.0, 0.4, 1.0]), yaw=0.4).floor
-    drawn = corners_of(Obstacle(np.array([1.0, 2.0, 0.5]), np.array([2.0, 0.4, 1.0]), yaw=0.4))
-    assert floor.contains(drawn[:, :2]).all()
+    footprint = Box((1.0, 2.0, 0.5), (1.0, 0.2, 0.5), yaw=np.pi / 2).footprint
+    assert np.allclose(footprint.bounds, [[0.8, 1.0], [1.2, 3.0]])
+    turned = Box((1.0, 2.0, 0.5), (1.0, 0.2, 0.5), yaw=0.4)
+    assert taken_floor(turned).contains(turned.footprint.outline).all()
+    assert taken_floor(turned).area == pytest.approx(2.5 * 0.9)

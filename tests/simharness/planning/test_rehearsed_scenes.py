@@ -12,10 +12,10 @@ from simharness.planning.rehearsal_scene import SceneSettings
 from simharness.planning.rig_file import read_rig
 from simharness.planning.scene_results import Condition, loss_of
 from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
-from simharness.planning.visibility import Obstacle
-from simharness.planning.volume import Volume
 from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.room_section import ClutterSection
+from simharness.types.floor import Volume
+from simharness.world.scene.objects.geoms import Box
 
 WHOLE = (0, 1, 2, 3, 4)
 WORSE = Condition(WHOLE, "rotation", 2.0)
@@ -75,7 +75,7 @@ def test_an_obstacle_before_two_cameras_costs_what_their_failure_does():
     walls = []
     for camera in list(read_rig("ring5"))[:2]:
         x, y, _ = 0.9 * camera.center
-        walls.append(Obstacle(np.array([x, y, 1.5]), np.array([0.1, 3.0, 3.0]), float(np.arctan2(y, x))))
+        walls.append(Box((float(x), float(y), 1.5), (0.05, 1.5, 1.5), float(np.arctan2(y, x))))
     failed = Condition((2, 3, 4))
     hidden = simulated([Condition(WHOLE), failed], obstacles=tuple(walls))
     assert hidden.scores[Condition(WHOLE)].mpjpe_mm == pytest.approx(hidden.scores[failed].mpjpe_mm, abs=8)

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from mvpose import Rig
-from simharness.planning.floor_coverage import covered_rectangle, whole_people
-from simharness.planning.rig_checks import check_rig
+from simharness.planning.floor_coverage import covered_volume, whole_people
+from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.rig_file import read_rig
-from simharness.planning.visibility import Obstacle
-from simharness.planning.volume import Volume
+from simharness.scenario.presets import read_profile
+from simharness.types.floor import Volume
 from simharness.world.rigs.layouts import look_at
+from simharness.world.scene.objects.geoms import Box
 
 K = np.array([[500.0, 0, 400], [0, 500, 300], [0, 0, 1]])
 
@@ -27,9 +28,13 @@ def rig_with(one):
 ROOM, VOLUME = Volume.box(6.0, 4.0, height=3.0), Volume.box(2.0, 2.0)
 
 
+def check(rig, volume=VOLUME, **changes):
+    RehearsalSetup(volume, read_profile("typical"), **changes).check(rig)
+
+
 def test_a_rig_inside_the_room_and_on_its_walls_passes():
-    check_rig(rig_with(camera(2.5, 1.0)), VOLUME, room=ROOM)
-    check_rig(rig_with(camera(3.0, 1.0)), VOLUME, room=ROOM)
+    check(rig_with(camera(2.5, 1.0)), space=ROOM)
+    check(rig_with(camera(3.0, 1.0)), space=ROOM)
 
 
 @pytest.mark.parametrize(
@@ -42,19 +47,19 @@ def test_a_rig_inside_the_room_and_on_its_walls_passes():
 )
 def test_a_camera_that_is_not_in_the_room(placed, message):
     with pytest.raises(ValueError, match=message):
-        check_rig(rig_with(placed), VOLUME, room=ROOM)
+        check(rig_with(placed), space=ROOM)
 
 
 def test_a_camera_inside_a_turned_obstacle():
-    shelf = Obstacle(np.array([2.0, 1.0, 1.0]), np.array([2.0, 0.4, 2.5]), yaw=np.pi / 2)
-    check_rig(rig_with(camera(2.6, 1.0)), VOLUME, obstacles=[shelf])  # inside only if it were not turned
+    shelf = Box((2.0, 1.0, 1.0), (1.0, 0.2, 1.25), yaw=np.pi / 2)
+    check(rig_with(camera(2.6, 1.0)), obstacles=(shelf,))  # inside only if it were not turned
     with pytest.raises(ValueError, match="inside obstacle 0"):
-        check_rig(rig_with(camera(2.0, 1.7)), VOLUME, obstacles=[shelf])
+        check(rig_with(camera(2.0, 1.7)), obstacles=(shelf,))
 
 
 def test_a_volume_that_leaves_the_room():
     with pytest.raises(ValueError, match="outside of the room"):
-        check_rig(rig_with(camera(2.5, 1.0)), Volume.box(2.0, 5.0), room=ROOM)
+        check(rig_with(camera(2.5, 1.0)), Volume.box(2.0, 5.0), space=ROOM)
 
 
 def test_one_camera_is_no_rig(tmp_path):
@@ -67,13 +72,13 @@ def test_one_camera_is_no_rig(tmp_path):
 def test_cameras_that_look_away_from_each_other_see_nobody_together():
     apart = Rig([camera(-5.0, 0.0, aim=(-9.0, 0.0, 1.0)), camera(5.0, 0.0, aim=(9.0, 0.0, 1.0), name="right")])
     with pytest.raises(ValueError, match="nowhere on the floor"):
-        covered_rectangle(apart)
+        covered_volume(apart)
 
 
 def test_everywhere_in_the_covered_rectangle_enough_cameras_see_a_person_whole():
     rig = read_rig("ring5")
-    corners, needed = covered_rectangle(rig)
+    volume, needed = covered_volume(rig)
     assert needed == 3
-    assert (whole_people(rig, Volume(corners).places(0.25)).sum(axis=0) >= needed).all()
-    wider = Volume(corners * 1.5 - 0.5 * corners.mean(axis=0)).places(0.25)
+    assert (whole_people(rig, volume.places(0.25)).sum(axis=0) >= needed).all()
+    wider = Volume(volume.outline * 1.5 - 0.5 * volume.middle).places(0.25)
     assert not (whole_people(rig, wider).sum(axis=0) >= needed).all()

@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 from mvpose import Rig
 from simharness.cli import app
 from simharness.planning.candidates import candidates_in
-from simharness.planning.plan_rig import plan_rig
-from simharness.planning.planned_room import Room, make_room
+from simharness.planning.plan_rig import PlanEffort, plan_rig
+from simharness.planning.planned_room import Room
 from simharness.planning.rig_comparison import corner_rig, rig_of, ring_rig
 from simharness.planning.rig_file import CALIBRATION, write_rig
 from simharness.planning.rig_value import RigValue, SightingOdds
-from simharness.planning.room_file import read_room
+from simharness.planning.room_file import make_room, read_room
 from simharness.planning.room_keys import RoomKeys
 from simharness.planning.search import Ledger
 from simharness.planning.value_fit import layer_of
@@ -103,7 +103,7 @@ def test_value_agrees_with_the_method_on_the_order_of_rigs(valued: RigValue) -> 
         chosen = [candidates[k] for k in rng.choice(len(candidates), size, replace=False)]
         predicted = layer.predict([layer.terms(each) for each in rig_of(room, chosen)], variant="fast")
         figures.append(
-            (valued.maps([valued.terms(each) for each in chosen]).pcp.mean(), predicted.summary()["pcp"].value)
+            (valued.maps([valued.terms(each) for each in chosen]).pcp.mean(), predicted.summary()["pcp"].mean)
         )
     ranks = np.argsort(np.argsort(np.array(figures), axis=0), axis=0)
     assert np.corrcoef(ranks.T)[0, 1] > 0.7
@@ -147,7 +147,7 @@ def test_nobody_visible() -> None:
         )
     ]  # fmt: skip
     with pytest.raises(ValueError, match="no camera at any place sees anybody"):
-        plan_rig(small_room(obstacles=low + walls), 2, most=12, starts=1, simulate=0, curve=())
+        plan_rig(small_room(obstacles=low + walls), 2, effort=PlanEffort(candidates=12, starts=1, scenes=0, curve=()))
 
 
 def test_command_line_reports_mistakes(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ import pytest
 from mvpose.arrays import Floats
 from simharness.planning.candidates import Candidate, candidates_in, far_enough
 from simharness.planning.limits import Limits
-from simharness.planning.planned_room import Room, make_room
+from simharness.planning.planned_room import Room
+from simharness.planning.room_file import make_room
 from simharness.planning.room_keys import RoomKeys
 from simharness.planning.search import CandidateSet, Ledger, exchange_search, refine
 

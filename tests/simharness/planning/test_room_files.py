@@ -11,9 +11,8 @@ import pytest
 from simharness.planning.candidates import candidates_in, moved, places_in
 from simharness.planning.limits import Limits
 from simharness.planning.plan_rig import plan_rig
-from simharness.planning.planned_room import Room, make_room
-from simharness.planning.polygons import contains, counter_clockwise, crossing_edges, signed_area
-from simharness.planning.room_file import read_room
+from simharness.planning.planned_room import Room
+from simharness.planning.room_file import make_room, read_room
 from simharness.planning.room_keys import RoomKeys
 
 BOX: dict[str, Any] = {"room": {"size": (6.0, 5.0, 3.0)}, "volume": {"size": (3.0, 3.0)}}
@@ -33,16 +32,15 @@ def test_shipped_room_is_read_and_has_places_on_all_of_its_mounts() -> None:
     lab = read_room("lab")
     kinds = {lab.mounts[mount].kind for mount, _ in places_in(lab, spacing=0.5, levels=0.5)}
     assert kinds == {"wall", "tripod"}
-    assert signed_area(lab.outline) > 0
 
 
 def test_places_are_within_the_room_and_clear_of_obstacles_doors_and_people() -> None:
     lab = read_room("lab")
     for mount, place in places_in(lab, spacing=0.3, levels=0.4):
-        assert contains(lab.outline, place[:2])
+        assert lab.space.contains(place[:2])
         assert all(box.distance(place) >= lab.keys.cameras.from_walls for box in lab.obstacles)
         if lab.mounts[mount].kind == "tripod":
-            assert not contains(lab.volume, place[:2])
+            assert not lab.volume.contains(place[:2])
         x, y = place[:2]
         assert not (5.4 < x < 6.4 and y < 0.3), "before the door"
 
@@ -71,23 +69,6 @@ def test_candidates_have_the_lens_and_direction_of_their_cameras() -> None:
     camera = each.camera(both)
     assert camera.R[2] == pytest.approx(each.direction)
     assert camera.center == pytest.approx(each.place)
-
-
-@pytest.mark.parametrize("outline", [[(0, 0), (2, 2), (2, 0), (0, 2)], [(0, 0), (4, 0), (4, 4), (2, 0), (0, 4)]])
-def test_crossing_outlines_are_found(outline: list[tuple[float, float]]) -> None:
-    assert crossing_edges(np.array(outline, float)) is not None
-
-
-def test_random_star_shapes_do_not_cross_and_are_turned_counter_clockwise() -> None:
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        angle, radius = np.sort(rng.uniform(0, 2 * np.pi, 9)), rng.uniform(1, 3, 9)
-        star = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-        if np.diff(angle).max() < np.pi and 2 * np.pi - np.ptp(angle) < np.pi:
-            assert crossing_edges(star) is None
-            assert signed_area(counter_clockwise(star[::-1])) > 0
-            assert contains(star, 0.999 * star).all()
-            assert not contains(star, 1.001 * star).any()
 
 
 BAD = {

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
+from simharness.types.floor import Floor
 
 if TYPE_CHECKING:
     import mujoco
@@ -56,6 +57,11 @@ class Box:
     def corners(self) -> Floats:
         """The eight corners, (8, 3), metres; x changes slowest and z fastest, low before high."""
         return np.array(self.center) + (_SIGNS * self.half) @ self.axes.T
+
+    @property
+    def footprint(self) -> Floor:
+        """Area of the floor under or over the box."""
+        return Floor(self.corners[[0, 4, 6, 2], :2])
 
     @classmethod
     def around(cls, points: ArrayLike) -> Box:
