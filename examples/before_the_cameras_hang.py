@@ -19,8 +19,8 @@ def row(name: str, prediction: Prediction) -> str:
     figures = prediction.summary()
     pcp, error = figures["pcp"], figures["mpjpe_mm"]
     return (
-        f"{name:<22} PCP {pcp.value:5.1f} % ({pcp.low:.1f} to {pcp.high:.1f})   "
-        f"error {error.value:3.0f} mm ({error.low:.0f} to {error.high:.0f})"
+        f"{name:<22} PCP {pcp.mean:5.1f} % ({pcp.low:.1f} to {pcp.high:.1f})   "
+        f"error {error.mean:3.0f} mm ({error.low:.0f} to {error.high:.0f})"
     )
 
 
@@ -43,7 +43,7 @@ def main() -> None:
     print(row("a ring of five", predict(list(read_rig("ring5")))))
 
     places = list(on_the_walls())
-    worth = [predict([*corners[:3], camera]).summary()["pcp"].value for camera in places]
+    worth = [predict([*corners[:3], camera]).summary()["pcp"].mean for camera in places]
     best = places[worth.index(max(worth))]
     x, y, z = best.center
     print(f"best place of {len(places)} for a fourth camera: x {x:.1f}, y {y:.1f}, z {z:.1f} m, PCP {max(worth):.1f} %")
