@@ -70,7 +70,7 @@ class EpipolarAffinity:
         """Return the affinity matrix, (m, m); see :class:`mvpose.affinity.Affinity`."""
         return _compare_lines(
             rays.view, rays.directions, rays.weights, rig.centers, _image(rig), self.nearest, self.epipole,
-            self.saturation, self.midpoint, self.slope, self.threshold, max(self.least_joints, 1), False,
+            (self.saturation, self.midpoint, self.slope, self.threshold), max(self.least_joints, 1), False,
         )  # fmt: skip
 
 
@@ -87,7 +87,7 @@ def epipolar_distance(rig: Rig, detections: Detections) -> Floats:
     """
     rays = viewing_rays(rig, detections)
     return _compare_lines(
-        rays.view, rays.directions, rays.weights, rig.centers, _image(rig), 0.0, 0.0, np.inf, 0.0, 1.0, 0.0, 1, True
+        rays.view, rays.directions, rays.weights, rig.centers, _image(rig), 0.0, 0.0, (np.inf, 0.0, 1.0, 0.0), 1, True
     )
 
 
@@ -99,11 +99,9 @@ def _image(rig: Rig) -> Floats:
 
 
 @njit(cache=True, fastmath=FASTMATH, error_model="numpy")
-def _compare_lines(
-    view, directions, weights, centers, image, nearest, epipole, saturation, midpoint, slope, threshold, least,
-    distances,
-):  # fmt: skip
-    """Return affinities, or mean distances if ``distances`` is set."""
+def _compare_lines(view, directions, weights, centers, image, nearest, epipole, curve, least, distances):
+    """Return affinities by a curve (saturation, midpoint, slope, threshold), or mean distances if they are wanted."""
+    saturation, midpoint, slope, threshold = curve
     order, start = group_by_view(view)
     pose = pack_poses(directions, weights, order, 6)  # channels 4 and 5 are the pixel
     m, _, padded = pose.shape

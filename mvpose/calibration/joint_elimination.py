@@ -6,8 +6,11 @@ are described in :mod:`mvpose.calibration.normal_equations`.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from mvpose.arrays import Floats, Integers
 from mvpose.kernels import njit
 
 PARAMETERS = 11
@@ -213,28 +216,54 @@ def _unbent(u, v, camera):
     return x, y
 
 
+class SightingArrays(NamedTuple):
+    """Sightings of G joints by k keypoints, as kernels take them.
+
+    Attributes:
+        start: first sighting of each joint, and k, (G + 1,).
+        block: block of time of each joint, (G,).
+        view: view of each sighting, (k,).
+        velocity: velocities of keypoints, pixels/s, (k, 2).
+        sigma: standard deviations of keypoints, pixels, (k,).
+    """
+
+    start: Integers
+    block: Integers
+    view: Integers
+    velocity: Floats
+    sigma: Floats
+
+
+class TriangulatedJoints(NamedTuple):
+    """Result of :func:`triangulate`.
+
+    Attributes:
+        joints: places, (G, 3), metres; NaN for a joint that could not be placed.
+        residuals: of the keypoints, (k, 2), pixels.
+        weights: of the keypoints, (k,).
+    """
+
+    joints: Floats
+    residuals: Floats
+    weights: Floats
+
+
 @njit(cache=True)
-def accumulate(
-    H, g, all_cameras, start, block, view, velocity, sigma, cluster, importance, joints, residuals, weights, scale
-):
+def accumulate(H, g, all_cameras, sightings, cluster, importance, found, scale):
     """Add the equations of each joint, without the joint: to the curvature of its block, and gradient of its cluster.
 
     Args:
         H: curvature of each block, (B, 11 V, 11 V), changed.
         g: gradient of each cluster, (clusters, 11 V), changed.
         all_cameras: cameras in each block of time, (B, V, 23).
-        start: first sighting of each joint, and k, (G + 1,).
-        block: block of time of each joint, (G,).
-        view: view of each sighting, (k,).
-        velocity: velocities of keypoints, pixels/s, (k, 2).
-        sigma: standard deviations of keypoints, pixels, (k,).
+        sightings: :class:`SightingArrays` of G joints.
         cluster: cluster of each joint, (G,).
         importance: weight of the evidence of each joint, (G,).
-        joints: from :func:`triangulate`, (G, 3).
-        residuals: from the same, (k, 2).
-        weights: from the same, (k,).
+        found: :class:`TriangulatedJoints`.
         scale: standard deviation of keypoints relative to ``sigma``.
     """
+    start, block, view, velocity, sigma = sightings
+    joints, residuals, weights = found
     n = PARAMETERS
     by_point, by_camera = np.empty((_MOST_VIEWS, 2, 3)), np.zeros((_MOST_VIEWS, 2, n))
     cross, lines = np.empty((_MOST_VIEWS, n, 3)), np.empty((_MOST_VIEWS, n, 3))

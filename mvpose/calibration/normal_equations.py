@@ -23,7 +23,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Bools, Floats, Integers
-from mvpose.calibration.joint_elimination import PARAMETERS, accumulate, triangulate
+from mvpose.calibration.joint_elimination import (
+    PARAMETERS,
+    SightingArrays,
+    TriangulatedJoints,
+    accumulate,
+    triangulate,
+)
 from mvpose.calibration.sightings import Sightings
 from mvpose.camera import Camera
 
@@ -150,10 +156,8 @@ def normal_equations(
     importance = np.ones(len(first)) if s.importance is None else s.importance
     H = np.zeros((s.blocks, size, size))
     g = np.zeros((s.blocks if s.cluster is None else int(cluster.max(initial=0)) + 1, size))
-    accumulate(
-        H, g, cameras, s.start, s.block, s.view, s.velocity, s.sigma, cluster, importance,
-        found, residuals, weights, scale_now,
-    )  # fmt: skip
+    seen = SightingArrays(s.start, s.block, s.view, s.velocity, s.sigma)
+    accumulate(H, g, cameras, seen, cluster, importance, TriangulatedJoints(found, residuals, weights), scale_now)
     square = np.nan_to_num((residuals**2).sum(axis=1) / (scale_now * s.sigma) ** 2, nan=_UNSEEN)
     cost = 0.5 * (FREEDOM + 2.0) * float(importance[s.joint] @ np.log1p(square / FREEDOM))
     return NormalEquations(H, g, found, residuals, weights, scale_now, cost)

@@ -227,10 +227,9 @@ def _score_pairs(pairs, starts, frame, view, centers, directions, change, angle,
             else:
                 for j in range(joints):
                     if angle[a, j] < np.inf and angle[b, j] < np.inf:
-                        kind = _regressor(
-                            centers[va], centers[vb], directions[a, j], directions[b, j], change[a, j], change[b, j],
-                            angle[a, j], angle[b, j], error, sigma, jacobian, n,
-                        )  # fmt: skip
+                        one = centers[va], directions[a, j], change[a, j], angle[a, j]
+                        other = centers[vb], directions[b, j], change[b, j], angle[b, j]
+                        kind = _regressor(one, other, error, sigma, jacobian, n)
                         if kind == 1:
                             n += 1
                         elif kind == 2:
@@ -251,12 +250,17 @@ def _score_pairs(pairs, starts, frame, view, centers, directions, change, angle,
 
 
 @njit(cache=True)
-def _regressor(ca, cb, u, v, du, dv, angle_a, angle_b, error, sigma, jacobian, row):
+def _regressor(one, other, error, sigma, jacobian, row):
     """Write the signed distance of two lines of sight, its standard deviation and its derivatives into a row.
+
+    A line of sight is its origin (3,), its direction (3,), the derivative of this by the offset of the clock (3,) and
+    its standard deviation, rad.
 
     Returns:
         1; 0 where the lines are nearly parallel, and 2 where they meet behind a camera: then nothing is written.
     """
+    ca, u, du, angle_a = one
+    cb, v, dv, angle_b = other
     nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
     sine = np.sqrt(nx * nx + ny * ny + nz * nz)
     if sine < _LEAST_SINE:

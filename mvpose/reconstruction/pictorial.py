@@ -16,15 +16,17 @@ likeliest.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mvpose.arrays import Floats, Integers
 from mvpose.heatmaps import height
 from mvpose.kernels import njit
 from mvpose.lens import distort
 from mvpose.rays import Rays
-from mvpose.reconstruction.bone_graph import bone_graph
+from mvpose.reconstruction.bone_graph import BoneGraph, bone_graph
 from mvpose.reconstruction.bone_length_prior import personal_prior, published_bones
 from mvpose.reconstruction.error_scale import person_scale
 from mvpose.reconstruction.inference import max_product
@@ -43,6 +45,40 @@ from mvpose.skeleton import Skeleton
 _SINGLE_VIEW_STATES = 16  # room for two depths per neighbour
 _NEARER = 1e-9  # likelihood per metre; decides ties only
 _SAME = 0.25  # squared distance, in variances of the joint, below which refinement moves two proposals to one point
+
+
+class _ModeRays(NamedTuple):
+    """Viewing rays of the K modes of every keypoint of m detections.
+
+    Attributes:
+        origins: optical centres, (m, 3), metres.
+        directions: unit vectors, (m, J, K, 3).
+        weights: scores, (m, J, K); 0 for a missing keypoint.
+        pixel: least angle of an error, (m,), radians.
+    """
+
+    origins: Floats
+    directions: Floats
+    weights: Floats
+    pixel: Floats
+
+
+class _BodyPrior(NamedTuple):
+    """What is known of every body on a skeleton of B bones.
+
+    Attributes:
+        graph: the bones.
+        length: their mean lengths, (B,), metres.
+        definition: standard deviation of their lengths by definition.
+        concentrations: of the directions of limbs, (B,).
+        segments: segment of the trunk that each joint belongs to, (J,).
+    """
+
+    graph: BoneGraph
+    length: Floats
+    definition: Floats
+    concentrations: Floats
+    segments: Integers
 
 
 @dataclass(frozen=True)
@@ -81,37 +117,30 @@ class PictorialStructure:
         length, definition = published_bones(skeleton)
         modes = rays.modes
         maps = None if modes is None else (modes.values, modes.row, modes.grid, modes.cameras)
-        poses = _structures(
-            labels,
+        views = _ModeRays(
             rays.origins,
             rays.directions[:, :, None] if modes is None else modes.directions,
             rays.weights[:, :, None] if modes is None else modes.weights,
             self.noise.pixels * rays.pixel,
-            maps,
-            self.noise.sigmas(skeleton),
-            self.noise.floor,
-            bone_graph(skeleton),
-            length,
-            definition,
-            direction_concentrations(skeleton),
-            trunk_segments(skeleton),
-            self.personal,
-            self.most_pairs,
-            self.most_states,
         )
+        body = _BodyPrior(
+            bone_graph(skeleton), length, definition, direction_concentrations(skeleton), trunk_segments(skeleton)
+        )
+        limits = self.personal, self.most_pairs, self.most_states
+        poses = _structures(labels, views, maps, self.noise.sigmas(skeleton), self.noise.floor, body, limits)
         return Poses(*poses)
 
 
 @njit(cache=True)
-def _structures(
-    labels, origins, directions, weights, pixel, maps, sigmas, floor,
-    graph, length, definition, concentrations, segments, personal, most_pairs, most_states,
-):  # fmt: skip
+def _structures(labels, views, maps, sigmas, floor, body, limits):
+    graph, length, definition, concentrations, segments = body
+    personal, most_pairs, most_states = limits
     poses, trunk = empty_poses(labels, len(sigmas)), np.empty(3)
     for person in range(len(poses[0])):
         joints, scores, covariance, freedom = poses[0][person], poses[1][person], poses[2][person], poses[3][person]
         clear(joints, scores, covariance, freedom)
-        centers, rays, scores_2d, angles = gather(labels, person, origins, directions, weights, pixel)
+        own = gather(labels, person, views.origins, views.directions, views.weights, views.pixel)
+        centers, rays, scores_2d, angles = own
         states, unary, count, scale = propose_all(
             centers, rays, scores_2d, angles, sigmas, floor, most_pairs, most_states
         )  # fmt: skip
@@ -119,9 +148,7 @@ def _structures(
             rescore(states, unary, count, labels, person, scores_2d, maps, floor)
         lengths, precision = personal_prior(states, count, scores_2d, sigmas, graph, length, definition, personal)
         trunk_direction(states, count, segments, trunk)
-        propose_single_views(
-            states, unary, count, centers, rays, scores_2d, floor, graph, lengths, precision, concentrations, trunk
-        )
+        propose_single_views(states, unary, count, own, floor, graph, lengths, precision, concentrations, trunk)
         chosen = max_product(states, unary, count, graph, lengths, precision)
         deviations = np.empty(len(sigmas))
         for j in range(len(sigmas)):
@@ -134,10 +161,8 @@ def _structures(
         # (empirical Bayes).
         weakened = precision * fit_scale(joints, centers, rays, scores_2d, angles, deviations, floor)
         climb(joints, centers, rays, scores_2d, angles, deviations, floor, graph, lengths, weakened)
-        write_uncertainty(
-            scores, covariance, freedom, joints, centers, rays, scores_2d, angles, sigmas, deviations, floor, graph,
-            lengths, precision, concentrations, trunk,
-        )  # fmt: skip
+        pose = joints, scores, covariance, freedom
+        write_uncertainty(pose, own, sigmas, deviations, floor, graph, precision, concentrations, trunk)
     return poses
 
 
@@ -247,20 +272,7 @@ def _agreement(point, origins, directions, first, mode, second, other, sigma):
 
 
 @njit(cache=True)
-def propose_single_views(
-    states,
-    unary,
-    count,
-    origins,
-    directions,
-    weights,
-    floor,
-    graph,
-    length,
-    precision,
-    concentrations,
-    trunk,
-):
+def propose_single_views(states, unary, count, views, floor, graph, length, precision, concentrations, trunk):
     """Add, in place, proposals for joints that a single view sees: where the ray is a bone length from a neighbour.
 
     Such a joint has no pair of views, but its ray is known, and the bone length leaves two depths on it. The prior on
@@ -268,6 +280,7 @@ def propose_single_views(
     nearest to the camera comes first, because a body hides its far side. Joints placed in one round serve their
     neighbours in the next.
     """
+    origins, directions, weights, _ = views
     joints, n, _ = weights.shape
     only = np.empty(joints, np.int64)
     for j in range(joints):

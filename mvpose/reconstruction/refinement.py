@@ -53,19 +53,8 @@ def refine(
     graph = bone_graph(skeleton)
     skeletal = (graph, length, graph.share / deviation**2)
     climb(refined, *views, noise.sigmas(skeleton), noise.floor, *skeletal)
-    write_uncertainty(
-        scores,
-        covariance,
-        freedom,
-        refined,
-        *views,
-        noise.sigmas(skeleton),
-        noise.sigmas(skeleton),
-        noise.floor,
-        *skeletal,
-        np.zeros(len(length)),
-        np.zeros(3),
-    )
+    pose, sigmas = (refined, scores, covariance, freedom), noise.sigmas(skeleton)
+    write_uncertainty(pose, views, sigmas, sigmas, noise.floor, graph, skeletal[2], np.zeros(len(length)), np.zeros(3))
     return refined, scores, covariance, freedom
 
 
@@ -248,16 +237,16 @@ _MOST_ALIKE = 0.95  # of the variances; the keypoints of a detector never agree 
 
 
 @njit(cache=True)
-def write_uncertainty(
-    scores, covariance, freedom, joints, origins, directions, weights, pixel, sigmas, deviations, floor, graph, length,
-    precision, concentrations, trunk,
-):  # fmt: skip
+def write_uncertainty(pose, views, sigmas, deviations, floor, graph, precision, concentrations, trunk):
     """Write scores (J,), covariances (J, 3, 3) and degrees of freedom (J,) of a pose at the maximum of its posterior.
 
-    The pose was found with the standard deviations ``deviations``; those of the error model are ``sigmas``, (J,),
-    metres. See :mod:`mvpose.reconstruction.error_scale`. A joint that is NaN is skipped, and one that no view supports
-    becomes NaN.
+    A pose is its joints (J, 3) and these three arrays, as in :class:`mvpose.reconstruction.poses.Poses`; its views are
+    those of :func:`mvpose.reconstruction.poses.gather`. The pose was found with the standard deviations ``deviations``;
+    those of the error model are ``sigmas``, (J,), metres. See :mod:`mvpose.reconstruction.error_scale`. A joint that is
+    NaN is skipped, and one that no view supports becomes NaN.
     """
+    joints, scores, covariance, freedom = pose
+    origins, directions, weights, pixel = views
     n, count = len(pixel), len(joints)
     misfit, responsibilities, supports = np.zeros(count), np.zeros(count), np.zeros(count)
     information, b = np.zeros((count, 3, 3)), np.empty(3)

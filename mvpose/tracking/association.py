@@ -64,17 +64,13 @@ class TrackAffinity:
             covariance: their covariances, (n, J, 6, 6).
             lead: time from the states to the picture of each detection, (m,), seconds.
         """
-        return _join(
-            affinity, view, rays.origins, rays.directions, rays.weights, state, covariance, lead,
-            self.midpoint, self.slope, self.threshold, self.saturation, self.keypoint, self.least_joints,
-        )  # fmt: skip
+        settings = self.midpoint, self.slope, self.threshold, self.saturation, self.keypoint, self.least_joints
+        return _join(affinity, view, rays.origins, rays.directions, rays.weights, state, covariance, lead, settings)
 
 
 @njit(cache=True)
-def _join(
-    affinity, view, origins, directions, weights, state, covariance, lead,
-    midpoint, slope, threshold, saturation, keypoint, least,
-):  # fmt: skip
+def _join(affinity, view, origins, directions, weights, state, covariance, lead, settings):
+    midpoint, slope, threshold, saturation, keypoint, least = settings
     m, n, joints = len(view), len(state), weights.shape[1]
     joined, views = np.zeros((m + n, m + n)), np.empty(m + n, np.int64)
     joined[:m, :m] = affinity

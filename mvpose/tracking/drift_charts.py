@@ -101,35 +101,37 @@ class Charts(NamedTuple):
         )
 
 
-@njit(cache=True)
-def update_charts(
-    charts, now, since, pictures, reported, labels, groups, view, origins, directions, weights, pixel, lead, state,
-    sigmas, cameras, sizes, smallest, floor, inflation, threshold,
-):  # fmt: skip
-    """Look at the cameras whose turn it is, and test those whose batch is full.
+class DriftTest(NamedTuple):
+    """Settings of the test whether a camera has moved.
 
-    Args:
-        charts: updated in place.
-        now: time of the frame, seconds.
-        since: time since the latest look at any camera, seconds.
-        pictures: whether each camera gave a picture, (V,).
-        reported: as in :func:`mvpose.tracking.picture_shift.measure_shifts`, and so the next eleven.
-        labels: the same.
-        groups: the same.
-        view: the same.
-        origins: the same.
-        directions: the same.
-        weights: the same.
-        pixel: the same.
-        lead: the same.
-        state: the same.
-        sigmas: the same.
-        cameras: the same.
-        sizes: width and height, (V, 2), pixels.
+    Attributes:
         smallest: least shift that counts, of each number of a shift, (4,).
         floor: standard deviation of the numbers between batches that no residual shows, (4,).
         inflation: factor of the variance of the mean of keypoints, which are not independent.
         threshold: sum at which a camera has moved.
+    """
+
+    smallest: Floats
+    floor: Floats
+    inflation: float
+    threshold: float
+
+
+@njit(cache=True)
+def update_charts(charts, now, since, pictures, people, rays, sigmas, cameras, sizes, test):
+    """Look at the cameras whose turn it is, and test those whose batch is full.
+
+    Args:
+        charts: :class:`Charts`, updated in place.
+        now: time of the frame, seconds.
+        since: time since the latest look at any camera, seconds.
+        pictures: whether each camera gave a picture, (V,).
+        people: :class:`mvpose.tracking.picture_shift.ExpectedPeople`.
+        rays: :class:`mvpose.tracking.pose_update.MatchedRays` of the m detections.
+        sigmas: standard deviation of a confident keypoint, (J,), metres.
+        cameras: :attr:`mvpose.camera.Rig.packed`, (V, 22).
+        sizes: width and height, (V, 2), pixels.
+        test: :class:`DriftTest`.
 
     Returns:
         Whether there was a look.
@@ -151,22 +153,23 @@ def update_charts(
         if np.isnan(charts.start[v]):
             charts.start[v] = now
         charts.keypoints[v] += measure_shifts(
-            v, charts.normal[v], charts.residual[v], age, trusted, reported, labels, groups, view, origins,
-            directions, weights, pixel, lead, state, sigmas, cameras,
-        )  # fmt: skip
-        _count_people(charts.people[v], v, reported, labels, groups, view, state, cameras[v], sizes[v])
+            v, charts.normal[v], charts.residual[v], age, trusted, people, rays, sigmas, cameras
+        )
+        _count_people(charts.people[v], v, people, rays, cameras[v], sizes[v])
         full = charts.keypoints[v] >= _LEAST_KEYPOINTS or charts.people[v].sum() >= 5.0
         if full and now - charts.start[v] >= _BATCH:
-            _close_batch(charts, v, now, smallest, floor, inflation, threshold)
+            _close_batch(charts, v, now, test)
     return True
 
 
 @njit(cache=True, borrows=True)
-def _count_people(people, watched, reported, labels, groups, view, state, camera, size):
+def _count_people(counts, watched, people, rays, camera, size):
     """Count the people in a picture whom two other cameras see: those whom its detections fit, and stray ones.
 
     A person is stray where the picture also has a detection that belongs to nobody, one for each stray person.
     """
+    groups, reported, state = people
+    labels, view, _, _, _, _, _ = rays  # numba takes an attribute "view" for the method of arrays
     spare, missing = 0, 0
     for d in range(len(labels)):
         owned = False
@@ -182,15 +185,16 @@ def _count_people(people, watched, reported, labels, groups, view, state, camera
                 others += view[d] != watched
                 found = found or view[d] == watched
         if others >= 2 and found:
-            people[0] += 1.0
+            counts[0] += 1.0
         elif others >= 2 and in_image(camera, size, state[t]):
             missing += 1
-    people[1] += min(spare, missing)
+    counts[1] += min(spare, missing)
 
 
 @njit(cache=True)
-def _close_batch(charts, v, now, smallest, floor, inflation, threshold):
+def _close_batch(charts, v, now, test):
     """Test one camera by its batch, and start the next."""
+    smallest, floor, inflation, threshold = test
     shift, variance = np.zeros(NUMBERS), np.full(NUMBERS, _STRAY_VARIANCE)
     known = charts.keypoints[v] >= _LEAST_KEYPOINTS
     if known:

@@ -13,11 +13,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Bools, Floats, Integers
+from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
 from mvpose.checks import check_numbers
-from mvpose.rays import Rays
-from mvpose.tracking.drift_charts import INTERVAL, NUMBERS, STRAY, Charts, update_charts
+from mvpose.tracking.drift_charts import INTERVAL, NUMBERS, STRAY, Charts, DriftTest, update_charts
+from mvpose.tracking.picture_shift import ExpectedPeople
+from mvpose.tracking.pose_update import MatchedRays
 
 _OFF_CENTRE = math.tan(math.radians(20.0))  # people stand about as far from the image centre as 20 degrees
 _HOUR = 3600.0  # tests of each chart: one a second
@@ -116,21 +117,19 @@ class DriftWatch:
     def __init__(self, model: DriftModel, cameras: int) -> None:
         self.charts = Charts.empty(cameras)
         radians = math.radians(1.0) * np.array([1.0, 1.0, 1.0 / _OFF_CENTRE, 1.0 / _OFF_CENTRE])
-        self._settings = model.smallest * radians, model.floor * radians, model.inflation, model.threshold(cameras)
+        self._test = DriftTest(
+            model.smallest * radians, model.floor * radians, model.inflation, model.threshold(cameras)
+        )
         self._latest = -math.inf  # time of the latest look
         self._enough = cameras >= _FEWEST_CAMERAS
 
     def take(
         self,
-        rays: Rays,
-        labels: Integers,
-        groups: Integers,
-        lead: Floats,
+        rays: MatchedRays,
+        people: ExpectedPeople,
         *,
         now: float,
         pictures: Bools,
-        reported: Bools,
-        state: Floats,
         sigmas: Floats,
         cameras: Floats,
         sizes: Floats,
@@ -139,23 +138,16 @@ class DriftWatch:
 
         Args:
             rays: viewing rays of the m detections.
-            labels: group of each, (m,), or -1.
-            groups: group of each track, (n,), or -1.
-            lead: time from the frame to the picture of each detection, (m,), seconds.
+            people: people who are expected.
             now: time of the frame, seconds.
             pictures: whether each camera gave a picture, (V,).
-            reported: whether each track has been reported as a person, (n,).
-            state: predicted positions and velocities of the tracks, (n, J, 6).
             sigmas: standard deviation of a confident keypoint, (J,), metres.
             cameras: :attr:`mvpose.camera.Rig.packed`, (V, 22).
             sizes: width and height, (V, 2), pixels.
         """
         since = now - self._latest
         if self._enough and since >= INTERVAL / len(pictures):  # the cameras in turn, not all in every frame
-            looked = update_charts(
-                self.charts, now, since, pictures, reported, labels, groups, rays.view, rays.origins,
-                rays.directions, rays.weights, rays.pixel, lead, state, sigmas, cameras, sizes, *self._settings,
-            )  # fmt: skip
+            looked = update_charts(self.charts, now, since, pictures, people, rays, sigmas, cameras, sizes, self._test)
             self._latest = now if looked else self._latest
 
     @property

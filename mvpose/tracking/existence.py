@@ -161,8 +161,8 @@ def log_presence(absent, since, departures, found, seeable):
         absent: effective number of pictures that should have found the person since then, by view, (V,).
         since: time since then, seconds.
         departures: departures of a person who is here, per second.
-        found: as in :class:`Existence`.
-        seeable: the same.
+        found: probability that a person is found in a picture that can show it.
+        seeable: probability that a view can see a person whom no tracked person hides.
     """
     here = 0.0
     for v in range(len(absent)):
@@ -171,31 +171,26 @@ def log_presence(absent, since, departures, found, seeable):
 
 
 @njit(cache=True)
-def gather_evidence(
-    hits, misses, absent, origin, fresh, states, owner, view, cameras, sizes, pictures, last, now, since,
-    independent, memory,
-):  # fmt: skip
+def gather_evidence(evidence, taken, fresh, states, owner, view, now, independent, memory):
     """Update the effective hits and misses (n, V) of tracks by the pictures of a moment, in place.
 
     Args:
-        hits: effective number of pictures that found a track.
-        misses: effective number that should have.
-        absent: those that should have found the track since one last did, (n, V).
-        origin: output for tracks born in this moment: views that they were born from, (n, V).
+        evidence: arrays (n, V) of the tracks: views that those born in this moment were born from (output); effective
+            number of pictures that found a track; effective number that should have; those that should have since one
+            last did; and the time at which each camera last did, seconds.
+        taken: arrays of the cameras: :attr:`mvpose.camera.Rig.packed`, (V, 22); width and height, (V, 2), pixels;
+            whether each gave a picture, (V,); and the time from its previous one, (V,), seconds.
         fresh: whether a track was born in this moment, (n,): pictures that miss it count in full, and those that it
             was born from not at all.
         states: positions and velocities, (n, J, 6).
         owner: track of each detection, (m,), or -1.
         view: camera of each detection, (m,).
-        cameras: :attr:`mvpose.camera.Rig.packed`, (V, 22).
-        sizes: width and height, (V, 2), pixels.
-        pictures: whether each camera gave a picture, (V,).
-        last: time at which each camera last found a track, (n, V), seconds.
         now: seconds.
-        since: time from the previous picture of each camera, (V,), seconds.
-        independent: as in :class:`Existence`.
-        memory: the same.
+        independent: time between independent pictures, seconds.
+        memory: time after which pictures are forgotten, seconds.
     """
+    origin, hits, misses, absent, last = evidence
+    cameras, sizes, pictures, since = taken
     n, views = hits.shape
     centers, depth = np.zeros((n, 3)), np.empty(n)
     for t in range(n):

@@ -30,9 +30,9 @@ def predict_tracks(state, covariance, elapsed, speed, time, trunk, vague):
         state: positions and velocities, (n, J, 6).
         covariance: their covariances, (n, J, 6, 6).
         elapsed: seconds.
-        speed: as in :class:`mvpose.tracking.motion.JointMotion`.
-        time: the same.
-        trunk: the same.
+        speed: standard deviation of a component of the velocity of each joint, (J,), m/s.
+        time: time after which it is correlated by 1/e, (J,), seconds.
+        trunk: whether each joint belongs to the trunk, (J,).
         vague: standard deviation of the best-known joint from which on the place is unknown, metres.
 
     Returns:
@@ -47,35 +47,17 @@ def predict_tracks(state, covariance, elapsed, speed, time, trunk, vague):
 
 
 @njit(cache=True)
-def update_tracks(
-    state, covariance, scores, length, variance, labels, groups, origins, directions, weights, pixel, lead, sigmas,
-    floor, speed, time, trunk, of_pose, places, spreads, confidences, factor, ends, elapsed, keep,
-):  # fmt: skip
+def update_tracks(tracks, groups, rays, sigmas, floor, motion, placed, ends, elapsed, keep):
     """Update tracks by the detections that were matched with them, in place.
 
     Args:
-        state: positions and velocities, (n, J, 6).
-        covariance: their covariances, (n, J, 6, 6).
-        scores: confidence of the joints, (n, J).
-        length: bone lengths, (n, B).
-        variance: their variances, (n, B).
-        labels: group of each detection, (m,), or -1.
+        tracks: :class:`mvpose.tracking.tracks.TrackedPoses` of n tracks.
         groups: group of each track, (n,), or -1.
-        origins: as in :class:`mvpose.rays.Rays`, and so ``directions``, ``weights`` and ``pixel``.
-        directions: the same.
-        weights: the same.
-        pixel: least angle of an error, (m,), radians.
-        lead: time from the frame to the picture of each detection, (m,), seconds.
+        rays: :class:`mvpose.tracking.pose_update.MatchedRays` of m detections.
         sigmas: standard deviation of a confident keypoint, (J,), metres.
         floor: likelihood of a wrong keypoint.
-        speed: as in :class:`mvpose.tracking.motion.JointMotion`, and so ``time`` and ``trunk``.
-        time: the same.
-        trunk: the same.
-        of_pose: as in :func:`mvpose.tracking.pose_update.update_people`, and so the next four.
-        places: the same.
-        spreads: the same.
-        confidences: the same.
-        factor: the same.
+        motion: :class:`mvpose.tracking.motion.JointMotion`.
+        placed: :class:`mvpose.tracking.pose_update.PlacedPeople`.
         ends: joints at the ends of the bones, (B, 2).
         elapsed: time since the previous frame, seconds.
         keep: share of its score that a joint keeps which no view supports.
@@ -84,11 +66,9 @@ def update_tracks(
         The track of each detection, (m,), and the number of its group without a track, (m,), -1 for neither; the number
         of these groups.
     """
+    state, covariance, scores, length, variance = tracks
     supports = np.empty(scores.shape)
-    update_people(
-        state, covariance, supports, labels, groups, origins, directions, weights, pixel, lead, sigmas, floor, speed,
-        time, trunk, of_pose, places, spreads, confidences, factor,
-    )  # fmt: skip
+    update_people(state, covariance, supports, groups, rays, sigmas, floor, motion, placed)
     for t in range(len(state)):
         for j in range(scores.shape[1]):
             faded = scores[t, j] * keep
@@ -98,7 +78,7 @@ def update_tracks(
                 scores[t, j] = faded if faded > MISSING_SCORE else 0.0
         if groups[t] >= 0:
             learn_lengths(length[t], variance[t], state[t], covariance[t], ends, elapsed)
-    return _owners(labels, groups)
+    return _owners(rays.labels, groups)
 
 
 @njit(cache=True)
@@ -137,18 +117,20 @@ def judge_tracks(
 ):  # fmt: skip
     """Gather the evidence of a frame for and against each track, and decide who is a person and who is present.
 
+    The arrays are no named tuples: to pass those from Python takes half as long as the kernel itself.
+
     Args:
         state: positions and velocities, (n, J, 6).
         covariance: their covariances, (n, J, 6, 6).
-        span: as in :class:`mvpose.tracking.tracks.Tracks`, and so the next eight; updated in place.
-        origin: the same.
-        hits: the same.
-        misses: the same.
-        absent: the same.
-        found: the same.
-        anchor: the same.
-        moved: the same.
-        reported: the same.
+        span: time before its birth in which each may have come, (n,), seconds.
+        origin: views that each was born from, (n, V), written for new tracks.
+        hits: effective number of pictures of each camera that found the person, (n, V), updated.
+        misses: effective number of pictures that should have and did not, (n, V), updated.
+        absent: those since one last did, (n, V), updated.
+        found: time at which each camera last found the track, (n, V), seconds, updated.
+        anchor: place of each joint when it was first known, (n, J, 3), metres, updated.
+        moved: how far the body has been from there, (n,), metres, updated.
+        reported: whether the track has ever been reported as a person, (n,), updated.
         new: number of the last tracks that were born in this frame.
         owner: track of each detection, (m,), or -1.
         view: camera of each detection, (m,).
@@ -156,8 +138,8 @@ def judge_tracks(
         sizes: width and height, (V, 2), pixels.
         pictures: whether each camera gave a picture, (V,).
         since: time from the previous picture of each camera, (V,), seconds.
-        independent: :attr:`mvpose.tracking.existence.Existence.correlation`, and so ``memory``.
-        memory: the same.
+        independent: time between independent pictures, seconds.
+        memory: time after which pictures are forgotten, seconds.
         density: false detections in a picture of each view, (V,).
         flashes: groups per second that vanish as soon as they come.
         rates: :attr:`mvpose.tracking.existence.Existence.rates`.
@@ -172,10 +154,8 @@ def judge_tracks(
     """
     n = len(state)
     fresh = np.arange(n) >= n - new
-    gather_evidence(
-        hits, misses, absent, origin, fresh, state, owner, view, cameras, sizes, pictures, found, now, since,
-        independent, memory,
-    )  # fmt: skip
+    evidence, taken = (origin, hits, misses, absent, found), (cameras, sizes, pictures, since)
+    gather_evidence(evidence, taken, fresh, state, owner, view, now, independent, memory)
     note_displacement(anchor, moved, state, found, now)
     departures, in_picture, seeable = presence
     odds, here, spread, agreed = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
@@ -214,22 +194,19 @@ def _latest_two(times):
 
 
 @njit(cache=True)
-def report_tracks(shown, state, covariance, scores, length, variance, ends, shared, owner, chosen, detections):
+def report_tracks(shown, tracks, ends, shared, owner, chosen, detections):
     """Return joints, covariances and scores of the tracks that are reported, and the person of each detection.
 
     Args:
         shown: whether each track is reported, (n,).
-        state: positions and velocities, (n, J, 6).
-        covariance: their covariances, (n, J, 6, 6).
-        scores: confidence of the joints, (n, J).
-        length: bone lengths, (n, B).
-        variance: their variances, (n, B).
+        tracks: :class:`mvpose.tracking.tracks.TrackedPoses`.
         ends: joints at the ends of the bones, (B, 2).
         shared: standard deviation of the error that all views share, (J,), metres: no residual shows it.
         owner: track of each detection that took part, (k,), or -1.
         chosen: their indices, (k,).
         detections: number of detections of the frame, m.
     """
+    state, covariance, scores, length, variance = tracks
     number, count = np.full(len(shown), -1), 0
     for t in range(len(shown)):
         if shown[t]:

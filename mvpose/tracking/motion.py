@@ -135,9 +135,9 @@ def predict(state, covariance, dt, speed, time, trunk):
         state: positions and velocities, (J, 6), metres and m/s; NaN for an unknown joint.
         covariance: their covariances, (J, 6, 6).
         dt: seconds, 0 or more.
-        speed: as in :class:`JointMotion`.
-        time: the same.
-        trunk: the same.
+        speed: standard deviation of a component of the velocity of each joint, (J,), m/s.
+        time: time after which it is correlated by 1/e, (J,), seconds.
+        trunk: whether each joint belongs to the trunk, (J,).
     """
     common, slowest = trunk_velocity(state, trunk), 0
     for j in range(len(state)):

@@ -11,8 +11,11 @@ this time, its place is that which the past predicts.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.kernels import njit
 from mvpose.reconstruction.likelihood import solve
 
@@ -25,11 +28,22 @@ _FREEDOM = 4.0  # degrees of freedom of the t distribution of residuals, a commo
 _MEMORY = 10.0  # seconds that the mean residuals are over
 
 
+class ExpectedPeople(NamedTuple):
+    """People who are expected in the pictures of a frame.
+
+    Attributes:
+        groups: group of each track in the matching, (n,), or -1.
+        reported: whether each has been reported as a person, (n,).
+        state: predicted positions and velocities, (n, J, 6).
+    """
+
+    groups: Integers
+    reported: Bools
+    state: Floats
+
+
 @njit(cache=True)
-def measure_shifts(
-    watched, normal, residual, since, trusted, reported, labels, groups, view, origins, directions, weights,
-    pixel, lead, state, sigmas, cameras,
-):  # fmt: skip
+def measure_shifts(watched, normal, residual, since, trusted, people, rays, sigmas, cameras):
     """Add one picture of a camera to the least squares of its shift, in place.
 
     Args:
@@ -39,22 +53,16 @@ def measure_shifts(
             deviation.
         since: time since the previous look at this camera, seconds.
         trusted: whether the calibration of each camera is believed, (V,).
-        reported: whether each track has been reported as a person, (n,).
-        labels: group of each detection, (m,), or -1.
-        groups: group of each track, (n,), or -1.
-        view: camera of each detection, (m,).
-        origins: as in :class:`mvpose.rays.Rays`, and so the next three.
-        directions: the same.
-        weights: the same.
-        pixel: the same.
-        lead: time from the state to the picture of each detection, (m,), seconds.
-        state: predicted positions and velocities, (n, J, 6).
+        people: :class:`ExpectedPeople`.
+        rays: :class:`mvpose.tracking.pose_update.MatchedRays` of the m detections.
         sigmas: standard deviation of a confident keypoint, (J,), metres.
         cameras: :attr:`mvpose.camera.Rig.packed`, (V, 22).
 
     Returns:
         Number of keypoints that were added.
     """
+    groups, reported, state = people
+    labels, view, origins, directions, weights, pixel, lead = rays
     count, camera, point = 0, cameras[watched], np.empty(3)
     keep = np.exp(-since / _MEMORY)
     for k in range(3):
@@ -72,10 +80,7 @@ def measure_shifts(
         for j in range(weights.shape[1]):
             if not weights[here, j] > 0.0 or np.isnan(state[t, j, 0]):
                 continue
-            _place(
-                point, groups[t], watched, state[t, j], j, trusted, labels, view, origins, directions, weights, lead,
-                work,
-            )  # fmt: skip
+            _place(point, groups[t], watched, state[t, j], j, trusted, rays, work)
             px, py, pz, ox, oy, oz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for r in range(3):
                 offset = point[r] + lead[here] * state[t, j, 3 + r] - origins[here, r]
@@ -101,10 +106,9 @@ def measure_shifts(
 
 
 @njit(cache=True, borrows=True)
-def _place(
-    point, group, watched, state, j, trusted, labels, view, origins, directions, weights, lead, work
-):  # fmt: skip
+def _place(point, group, watched, state, j, trusted, rays, work):
     """Write the place of one joint at the time of its state, from the pictures of the trusted cameras but one."""
+    labels, view, origins, directions, weights, _, lead = rays
     A, inverse, b, origin = work[:3], work[3:6], work[6], work[7]
     count = 0
     for r in range(3):

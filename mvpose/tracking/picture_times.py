@@ -183,9 +183,9 @@ def undo_rolling(readout, view, keypoints, origins, directions, weights, labels,
         readout: of :func:`readouts`, (V, 2).
         view: camera of each detection, (m,).
         keypoints: pixels, (m, J, 2).
-        origins: as in :class:`mvpose.rays.Rays`, and so ``directions`` and ``weights``.
-        directions: the same.
-        weights: the same.
+        origins: optical centres, (m, 3), metres.
+        directions: unit vectors, (m, J, 3).
+        weights: scores of the keypoints, (m, J); 0 where missing.
         labels: group of each detection, (m,), or -1.
         groups: group of each track, (n,), or -1.
         state: predicted positions and velocities, (n, J, 6).

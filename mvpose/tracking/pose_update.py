@@ -34,11 +34,48 @@ _CONVERGED = 1e-6  # m²
 _UNKNOWN = 1.0  # m²: variance of a joint that is seen for the first time, before it is
 
 
+class MatchedRays(NamedTuple):
+    """Viewing rays of the m detections of a frame, as kernels take them, with the groups of the matching.
+
+    Attributes:
+        labels: group of each detection, (m,), or -1.
+        view: camera of each, (m,).
+        origins: optical centres, (m, 3), metres.
+        directions: unit vectors, (m, J, 3).
+        weights: scores, (m, J); 0 for a missing keypoint.
+        pixel: least angle of an error, (m,), radians.
+        lead: time from the frame to the picture of each, (m,), seconds.
+    """
+
+    labels: Integers
+    view: Integers
+    origins: Floats
+    directions: Floats
+    weights: Floats
+    pixel: Floats
+    lead: Floats
+
+
+class PlacedPeople(NamedTuple):
+    """Poses of k of n tracked people, as the stages of one frame place them.
+
+    Attributes:
+        of_pose: row of each track in the poses, (n,); -1 for a track whose rays are the evidence.
+        places: joints, (k, J, 3), metres; NaN for an unknown joint.
+        spreads: their covariances, (k, J, 3, 3).
+        confidences: their scores, (k, J).
+        factor: factor of these covariances, at least 1.
+    """
+
+    of_pose: Integers
+    places: Floats
+    spreads: Floats
+    confidences: Floats
+    factor: float
+
+
 @njit(cache=True)
-def update_people(
-    states, covariances, supports, labels, of_track, origins, directions, weights, pixel, lead, sigmas, floor, speed,
-    time, trunk, of_pose, places, spreads, confidences, factor,
-):  # fmt: skip
+def update_people(states, covariances, supports, of_track, rays, sigmas, floor, motion, placed):
     """Update n tracked people by the rays of their detections, in place.
 
     Pictures of other times than the states show where the joints were then: the states are carried to each of these
@@ -50,24 +87,16 @@ def update_people(
         states: predicted positions and velocities, (n, J, 6); NaN for an unknown joint.
         covariances: their covariances, (n, J, 6, 6).
         supports: output, (n, J): mean over the person's views of score times responsibility, 0 without detections.
-        labels: group of each detection, (m,).
         of_track: group of each track, (n,); -1 without detections.
-        origins: optical centres, (m, 3).
-        directions: viewing rays, (m, J, 3).
-        weights: scores, (m, J).
-        pixel: angle of a pixel, (m,).
-        lead: time from the states to the picture of each detection, (m,), seconds.
+        rays: :class:`MatchedRays` of m detections.
         sigmas: standard deviation of a confident keypoint, (J,), metres.
         floor: likelihood of a wrong keypoint.
-        speed: as in :class:`mvpose.tracking.motion.JointMotion`; also for joints that are seen for the first time.
-        time: the same.
-        trunk: the same.
-        of_pose: row of each track in the poses, (n,); -1 for a track whose rays are the evidence.
-        places: joints of the poses, (k, J, 3), metres; NaN for an unknown joint.
-        spreads: their covariances, (k, J, 3, 3).
-        confidences: their scores, (k, J).
-        factor: factor of these covariances, at least 1.
+        motion: :class:`mvpose.tracking.motion.JointMotion`; also of joints that are seen for the first time.
+        placed: :class:`PlacedPeople`.
     """
+    labels, _, origins, directions, weights, pixel, lead = rays
+    speed, time, trunk = motion
+    of_pose, places, spreads, confidences, factor = placed
     m, joints = weights.shape
     scratch, leads = np.empty((8, 3)), np.unique(lead)
     slowest = 0
@@ -100,8 +129,8 @@ def update_people(
                         centers[v, r], rays[v, 0, r] = origins[d, r], directions[d, j, r]
                     v += 1
                 k = of_pose[t]
-                placed = k >= 0 and seen >= 2 and confidences[k, j] > 0.0 and not np.isnan(states[t, j, 0])
-                if placed and _update_by_place(states[t, j], covariances[t, j], places[k, j], spreads[k, j], factor):
+                certain = k >= 0 and seen >= 2 and confidences[k, j] > 0.0 and not np.isnan(states[t, j, 0])
+                if certain and _update_by_place(states[t, j], covariances[t, j], places[k, j], spreads[k, j], factor):
                     supports[t, j] = confidences[k, j]
                 elif seen:
                     reach, noise, along = trunk_reach, trunk_noise, 0.0
@@ -210,24 +239,6 @@ def _log_posterior(point, state, prior, view):
     origins, directions, weights, pixel, sigma, floor = view
     value = log_likelihood(point, origins, directions, weights, pixel, sigma, floor)
     return value - 0.5 * (_FREEDOM + 3.0) * np.log(1.0 + _mahalanobis2(point, state, prior) / _FREEDOM)
-
-
-class PlacedPeople(NamedTuple):
-    """Poses of k of n tracked people, arguments of :func:`mvpose.tracking.frame_kernels.update_tracks`.
-
-    Attributes:
-        of_pose: row of each track in the poses, (n,); -1 for a track whose rays are the evidence.
-        places: joints, (k, J, 3), metres; NaN for an unknown joint.
-        spreads: their covariances, (k, J, 3, 3).
-        confidences: their scores, (k, J).
-        factor: factor of these covariances, at least 1.
-    """
-
-    of_pose: Integers
-    places: Floats
-    spreads: Floats
-    confidences: Floats
-    factor: float
 
 
 def place_people(

@@ -86,13 +86,13 @@ def _improved(tracker: Tracker, moment: Moment, later: Moment, remember: bool) -
     """Return a moment improved by the next one, which is improved already."""
     tracks, after = moment.tracks, later.tracks
     assert later.predicted is not None, "moments to smooth are kept"
-    row, gain = moment.link or _link(tracker, moment, later)
+    link = moment.link or _link(tracker, moment, later)
     if remember:
-        moment.link = row, gain
+        moment.link = link
+    known_later = after.state, after.covariance, later.odds, later.presence, later.elapsed
     state, covariance, odds, presence, shown = _improve(
-        tracks.state, tracks.covariance, moment.odds, moment.presence, tracks.born_at, moment.time, row, gain,
-        *later.predicted, after.state, after.covariance, later.odds, later.presence, later.elapsed,
-        tracker.model.existence.vague,
+        tracks.state, tracks.covariance, moment.odds, moment.presence, tracks.born_at, moment.time, link,
+        later.predicted, known_later, tracker.model.existence.vague,
     )  # fmt: skip
     improved, smoothed = shallow_copy(moment), shallow_copy(tracks)
     smoothed.state, smoothed.covariance = state, covariance
@@ -123,8 +123,8 @@ def _gains(ids, state, covariance, later_ids, predicted, predicted_covariance, e
         predicted: states predicted for the next moment, (k, J, 6).
         predicted_covariance: their covariances, (k, J, 6, 6).
         elapsed: time to the next moment, seconds.
-        speed: as in :class:`mvpose.tracking.motion.JointMotion`.
-        time: the same.
+        speed: standard deviation of a component of the velocity of each joint, (J,), m/s.
+        time: time after which it is correlated by 1/e, (J,), seconds.
     """
     n, joints = state.shape[:2]
     row, gain, scratch = np.full(n, -1), np.empty((n, joints, 6, 6)), np.empty((7, 6))
@@ -188,10 +188,7 @@ def smoother_gain(gain, covariance, predicted_covariance, reach, decay, scratch)
 
 
 @njit(cache=True)
-def _improve(
-    state, covariance, odds, presence, born_at, time, row, gain, predicted, predicted_covariance,
-    after, after_covariance, later_odds, later_presence, elapsed, vague,
-):  # fmt: skip
+def _improve(state, covariance, odds, presence, born_at, time, link, predictions, later, vague):
     """Return the smoothed states of n tracks, their covariances, odds and presence, and whether each is shown.
 
     Args:
@@ -201,17 +198,15 @@ def _improve(
         presence: log-odds that this person is still here, (n,).
         born_at: time of birth, (n,), seconds.
         time: time of the moment, seconds.
-        row: row of each track in the next moment, (n,), or -1.
-        gain: transposed gains, (n, J, 6, 6).
-        predicted: for the next moment, before its update, (k, J, 6).
-        predicted_covariance: their covariances, (k, J, 6, 6).
-        after: smoothed at the next moment, (k, J, 6).
-        after_covariance: their covariances, (k, J, 6, 6).
-        later_odds: as ``odds``, at the next moment, (k,).
-        later_presence: as ``presence``, at the next moment, (k,).
-        elapsed: time to the next moment, seconds.
+        link: row of each track in the next moment, (n,), or -1; and transposed gains, (n, J, 6, 6).
+        predictions: states for the next moment, before its update, (k, J, 6), and their covariances, (k, J, 6, 6).
+        later: of the next moment: smoothed states, (k, J, 6), their covariances, (k, J, 6, 6), odds and presence,
+            (k,) each, and the time that passes until then, seconds.
         vague: standard deviation of the best-known joint above which nobody is reported, metres.
     """
+    row, gain = link
+    predicted, predicted_covariance = predictions
+    after, after_covariance, later_odds, later_presence, elapsed = later
     state, covariance, odds, presence = state.copy(), covariance.copy(), odds.copy(), presence.copy()
     shown, scratch = np.empty(len(state), np.bool_), np.empty((12, 6))
     for t in range(len(state)):

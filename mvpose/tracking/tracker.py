@@ -32,8 +32,9 @@ from mvpose.tracking.existence import MeasuredClutter
 from mvpose.tracking.frame_kernels import judge_tracks, predict_tracks, report_tracks, update_tracks
 from mvpose.tracking.looks import learn_looks
 from mvpose.tracking.motion import JointMotion
+from mvpose.tracking.picture_shift import ExpectedPeople
 from mvpose.tracking.picture_times import FrameClock, FrameTimes, readouts, undo_rolling
-from mvpose.tracking.pose_update import place_people, repetition
+from mvpose.tracking.pose_update import MatchedRays, place_people, repetition
 from mvpose.tracking.reappearance import Population
 from mvpose.tracking.recent_pictures import RecentPictures
 from mvpose.tracking.state import TrackerState, check_serves, layout, of_tracks
@@ -213,18 +214,18 @@ class Tracker:
         tracks, noise, m = people.tracks, model.noise, len(ordered)
         labels, groups = labels[:m], labels[m:]
         rays = self._undo_rolling_shutter(ordered, frame.rays, labels, groups)
+        matched = MatchedRays(labels, rays.view, rays.origins, rays.directions, rays.weights, rays.pixel, lead)
         self._watch.take(
-            rays, labels, groups, lead, now=times.now, pictures=times.pictures,
-            reported=tracks.reported, state=tracks.state, sigmas=self._sigmas, cameras=rig.packed, sizes=self._sizes,
+            matched, ExpectedPeople(groups, tracks.reported, tracks.state), now=times.now, pictures=times.pictures,
+            sigmas=self._sigmas, cameras=rig.packed, sizes=self._sizes,
         )  # fmt: skip
         placed = place_people(
             self.pipeline.reconstruction, rays, ordered.skeleton, labels, groups, lead,
             factor=repetition(times.elapsed, model.correlation),
         )  # fmt: skip
         owner, fresh, newcomers = update_tracks(
-            tracks.state, tracks.covariance, tracks.scores, tracks.length, tracks.variance, labels, groups,
-            rays.origins, rays.directions, rays.weights, noise.pixels * rays.pixel, lead, self._sigmas, noise.floor,
-            *self.motion, *placed, self._bones.ends, times.elapsed, float(np.exp(-times.elapsed / _FORGETTING)),
+            tracks.poses, groups, matched._replace(pixel=noise.pixels * rays.pixel), self._sigmas, noise.floor,
+            self.motion, placed, self._bones.ends, times.elapsed, float(np.exp(-times.elapsed / _FORGETTING)),
         )  # fmt: skip
         since = self._recent.take(times.now, times.lead, times.pictures)
         poses, shown_by, in_view = None, owner, ordered.view
@@ -274,8 +275,8 @@ class Tracker:
         start = clock.perf_counter()
         tracks = moment.tracks
         joints, covariance, scores, labels = report_tracks(
-            moment.shown, tracks.state, tracks.covariance, tracks.scores, tracks.length, tracks.variance,
-            self._bones.ends, SHARED * self._sigmas, moment.owner, moment.chosen, moment.detections,
+            moment.shown, tracks.poses, self._bones.ends, SHARED * self._sigmas, moment.owner, moment.chosen,
+            moment.detections,
         )  # fmt: skip
         ids, freedom = tracks.ids[moment.shown], None
         if moment.poses is not None:
@@ -321,8 +322,8 @@ class Tracker:
 
         Args:
             state: of the other tracker.
-            pipeline: as for the class; the same as that of the other tracker for the same estimates.
-            model: the same.
+            pipeline: stages of one frame; those of the other tracker for the same estimates.
+            model: settings; those of the other tracker for the same estimates.
         """
         tracker, arrays = cls(pipeline, model=model), state.arrays
         tracker._layout = {name: arrays[name] for name in arrays if name.startswith(("version", "rig.", "skeleton."))}

@@ -4,13 +4,31 @@ from __future__ import annotations
 
 from copy import copy as shallow_copy
 from dataclasses import dataclass, fields, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.reconstruction.poses import Poses
 from mvpose.tracking.bones import BonePrior, scaled_lengths
+
+
+class TrackedPoses(NamedTuple):
+    """Poses of n tracks as kernels take them: fields of :class:`Tracks`, in place.
+
+    Attributes:
+        state: position and velocity of every joint, (n, J, 6), metres and m/s; NaN for an unknown joint.
+        covariance: their covariances, (n, J, 6, 6).
+        scores: confidence of every joint, (n, J), 0 to 1.
+        length: bone lengths, (n, B), metres.
+        variance: variances of the bone lengths, (n, B), square metres.
+    """
+
+    state: Floats
+    covariance: Floats
+    scores: Floats
+    length: Floats
+    variance: Floats
 
 
 @dataclass
@@ -137,6 +155,11 @@ class Tracks:
             described=np.zeros(n),
             rival=np.full(n, np.inf),
         )
+
+    @property
+    def poses(self) -> TrackedPoses:
+        """The poses of the tracks, whose arrays they share."""
+        return TrackedPoses(self.state, self.covariance, self.scores, self.length, self.variance)
 
     @property
     def seen(self) -> Floats:

@@ -13,7 +13,8 @@ from mvpose.reconstruction.likelihood import Noise
 from mvpose.skeleton import COCO17
 from mvpose.tracking import DriftModel, Tracker, TrackerState, TrackingModel
 from mvpose.tracking.drift_watch import DriftWatch
-from mvpose.tracking.picture_shift import TERMS, measure_shifts, solve_shift
+from mvpose.tracking.picture_shift import TERMS, ExpectedPeople, measure_shifts, solve_shift
+from mvpose.tracking.pose_update import MatchedRays
 
 RIG = ring(5)
 SIGMAS = Noise().sigmas(COCO17)
@@ -54,6 +55,13 @@ def tracked(seconds: float, *, moved: Rig | None = None, at: float = 10.0, rig: 
     return tracker
 
 
+def matched_rays(rays, labels) -> MatchedRays:
+    """Return rays of pictures at the time of the frame, with the groups of a matching."""
+    return MatchedRays(
+        labels, rays.view, rays.origins, rays.directions, rays.weights, rays.pixel, np.zeros(len(labels))
+    )
+
+
 def looked_at(rig: Rig, really: Rig, view: int, *, noise: float = 0.0, time: float = 0.0):
     """Return the shift of one camera's picture and its variances, if the others show people where they are."""
     given = pictures(really, time, np.random.default_rng(1), noise=noise)
@@ -62,10 +70,10 @@ def looked_at(rig: Rig, really: Rig, view: int, *, noise: float = 0.0, time: flo
     state = np.concatenate([joints + 0.02, np.zeros_like(joints)], axis=2)  # the prediction is beside the truth
     normal, residual = np.zeros((TERMS, TERMS + 1)), np.zeros(3)
     labels = np.tile(np.arange(count), len(rig))
+    people = ExpectedPeople(np.arange(count), np.ones(count, bool), state)
     added = measure_shifts(
-        view, normal, residual, 1.0, np.ones(len(rig), bool), np.ones(count, bool), labels, np.arange(count), rays.view,
-        rays.origins, rays.directions, rays.weights, rays.pixel, np.zeros(len(labels)), state, SIGMAS, rig.packed,
-    )  # fmt: skip
+        view, normal, residual, 1.0, np.ones(len(rig), bool), people, matched_rays(rays, labels), SIGMAS, rig.packed
+    )
     shift, variance = np.empty(TERMS), np.empty(TERMS)
     solve_shift(shift, variance, normal, 10.0)
     return shift, variance, added, residual
@@ -164,6 +172,7 @@ def _look_for(seconds: int, watch: DriftWatch, *, seed: int, start: int = 0, bia
     exact = viewing_rays(RIG, pictures(RIG, 0.0, rng, noise=0.0))
     state = np.concatenate([joints, np.zeros_like(joints)], axis=2)
     sizes = np.array([camera.size for camera in RIG], float)
+    people = ExpectedPeople(np.arange(3), np.ones(3, bool), state)
     turn = np.radians(bias) * rng.normal(size=(seconds, 5, 1, 1, 2))
     if moved is not None:
         turn[:, moved[0], ..., 0] += np.radians(moved[1])
@@ -173,9 +182,8 @@ def _look_for(seconds: int, watch: DriftWatch, *, seed: int, start: int = 0, bia
         directions = exact.directions + np.einsum("vnjk,vkr->vnjr", turn[second], across).reshape(15, 17, 3)
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
         watch.take(
-            replace(exact, directions=directions), order % 3, np.arange(3), np.zeros(15), now=float(start + second),
-            pictures=np.ones(5, bool), reported=np.ones(3, bool), state=state, sigmas=SIGMAS,
-            cameras=RIG.packed, sizes=sizes,
+            matched_rays(replace(exact, directions=directions), order % 3), people, now=float(start + second),
+            pictures=np.ones(5, bool), sigmas=SIGMAS, cameras=RIG.packed, sizes=sizes,
         )  # fmt: skip
 
 

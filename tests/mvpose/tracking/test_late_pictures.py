@@ -3,14 +3,22 @@
 import numpy as np
 import pytest
 
-from mvpose.tracking.motion import transition
-from mvpose.tracking.pose_update import update_people
+from mvpose.tracking.motion import JointMotion, transition
+from mvpose.tracking.pose_update import MatchedRays, PlacedPeople, update_people
 
 SPEED, TIME, SIGMA = np.array([1.0, 1.3]), np.array([1.6, 0.15]), np.array([0.01, 0.01])
 TRUNK = np.array([True, False])
 CENTERS = np.array([[4.0, 0.0, 1.0], [0.0, 4.0, 1.5], [-3.0, -3.0, 2.0]])
 
-NO_POSES = np.full(1, -1), np.empty((0, 2, 3)), np.empty((0, 2, 3, 3)), np.empty((0, 2)), 1.0
+NO_POSES = PlacedPeople(np.full(1, -1), np.empty((0, 2, 3)), np.empty((0, 2, 3, 3)), np.empty((0, 2)), 1.0)
+
+
+def seen(rays, shift):
+    """Rays of one person from all cameras, as of pictures that were taken ``shift`` seconds ago."""
+    count = len(CENTERS)
+    ones = np.ones((count, rays.shape[1]))
+    labels = np.zeros(count, np.int64)
+    return MatchedRays(labels, labels, CENTERS, rays, ones, np.zeros(count), np.full(count, -shift))
 
 
 def _moved(rng, velocity, shift, joint):
@@ -40,10 +48,11 @@ def test_errors_after_a_late_picture_are_as_large_as_their_covariance_says(shift
         state, covariance = state[None].copy(), np.tile(prior, (1, 2, 1, 1))
         rays = -CENTERS[:, None] + SIGMA[:, None] * rng.standard_normal((3, 2, 3))  # to the origin, where joints were
         rays /= np.linalg.norm(rays, axis=2, keepdims=True)
+        matched = seen(rays, shift)
+        motion = JointMotion(SPEED, TIME, TRUNK)
         update_people(
-            state, covariance, np.empty((1, 2)), np.zeros(3, np.int64), np.zeros(1, np.int64), CENTERS, rays,
-            np.ones((3, 2)), np.zeros(3), np.full(3, -shift), SIGMA, 1e-6, SPEED, TIME, TRUNK, *NO_POSES,
-        )  # fmt: skip
+            state, covariance, np.empty((1, 2)), np.zeros(1, np.int64), matched, SIGMA, 1e-6, motion, NO_POSES
+        )
         for joint in range(2):
             error = state[0, joint, :3] - place[joint]
             squares.append(error @ np.linalg.solve(covariance[0, joint, :3, :3], error))
@@ -59,9 +68,8 @@ def test_backwards_a_joint_moves_as_it_does_forwards():
     covariance[0, 0] = np.diag([25.0] * 3 + [1e-12] * 3)
     rays = -CENTERS[:, None] / np.linalg.norm(CENTERS, axis=1)[:, None, None]
     update_people(
-        state, covariance, np.empty((1, 1)), np.zeros(3, np.int64), np.zeros(1, np.int64), CENTERS, rays,
-        np.ones((3, 1)), np.zeros(3), np.full(3, -shift), SIGMA[:1] * 1e-3, 1e-6, SPEED[:1], TIME[:1], TRUNK[:1],
-        *NO_POSES,
+        state, covariance, np.empty((1, 1)), np.zeros(1, np.int64), seen(rays, shift), SIGMA[:1] * 1e-3, 1e-6,
+        JointMotion(SPEED[:1], TIME[:1], TRUNK[:1]), NO_POSES,
     )  # fmt: skip
     reach, *_ = transition(shift, SPEED[0], TIME[0])
     np.testing.assert_allclose(state[0, 0], [*reach * velocity, *velocity], atol=1e-3)

@@ -9,7 +9,8 @@ from mvpose import COCO17, PANOPTIC19, Pipeline
 from mvpose.reconstruction import Triangulation
 from mvpose.tracking import Tracker, TrackingModel, track
 from mvpose.tracking.bones import bone_prior, scaled_lengths
-from mvpose.tracking.pose_update import number_people, repetition, update_people
+from mvpose.tracking.motion import JointMotion
+from mvpose.tracking.pose_update import MatchedRays, PlacedPeople, number_people, repetition, update_people
 
 CENTERS = np.array([[4.0, 0.0, 1.0], [0.0, 4.0, 1.5]])
 
@@ -23,11 +24,11 @@ def _update(place, spread, *, seen=(1.0, 1.0), factor=1.0, of_pose=0):
     rays = np.array([0.3, 0.3, 0.0]) - CENTERS[:, None]
     rays = rays / np.linalg.norm(rays, axis=2, keepdims=True)
     support = np.empty((1, 1))
-    update_people(
-        state, covariance, support, np.zeros(2, np.int64), np.zeros(1, np.int64), CENTERS, rays,
-        np.array(seen)[:, None], np.zeros(2), np.zeros(2), np.array([0.05]), 0.01, np.array([1.0]), np.array([1.6]),
-        np.array([True]), np.array([of_pose]), place[None, None], spread[None, None], np.array([[0.7]]), factor,
-    )  # fmt: skip
+    both = np.zeros(2, np.int64)
+    matched = MatchedRays(both, both, CENTERS, rays, np.array(seen)[:, None], np.zeros(2), np.zeros(2))
+    motion = JointMotion(np.array([1.0]), np.array([1.6]), np.array([True]))
+    placed = PlacedPeople(np.array([of_pose]), place[None, None], spread[None, None], np.array([[0.7]]), factor)
+    update_people(state, covariance, support, np.zeros(1, np.int64), matched, np.array([0.05]), 0.01, motion, placed)
     return before, (state[0, 0], covariance[0, 0]), support[0, 0]
 
 
