@@ -15,7 +15,7 @@ from mvpose.formats.detections.openpose import read_frame
 from mvpose.recording import People
 from mvpose.tracking import Tracker, TrackingModel, track
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
-from simharness.reality.people_evaluation import evaluate_people
+from simharness.reality.evaluation import evaluate_people
 from simharness.reality.recording_file import read_recording
 
 PERIOD = 0.1  # seconds between frames

@@ -1,4 +1,4 @@
-"""People of a whole recording as arrays over time: what writers, skeleton fits and pages take.
+"""People of a whole recording as arrays over time: what files hold, and what is written, drawn, re-enacted and scored.
 
 A tracker answers frame by frame with :class:`mvpose.Estimate`; files and plots need each person through time.
 """
@@ -6,10 +6,11 @@ A tracker answers frame by frame with :class:`mvpose.Estimate`; files and plots 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.checks import Sealed, as_array, seal
@@ -18,6 +19,10 @@ from mvpose.skeleton import COCO17, Skeleton
 
 PERIOD = 0.04
 """Time between frames where nothing states it, seconds: that of trackers (:class:`mvpose.tracking.TrackingModel`)."""
+
+_TOLERANCE = 0.01  # of the period; a frame nearer than this to its uniform time stays as it is
+_LONGEST = 1.5  # periods; across a longer step nothing is interpolated, because a frame was lost there
+_MOST_FRAMES = 10  # times as many frames as there are; above, the times are no recording
 
 
 @dataclass(frozen=True)
@@ -31,33 +36,41 @@ class People(Sealed):
         times: time of each frame, (T,), seconds, increasing.
         ids: identity of each person, (n,), all different.
         joints: (T, n, J, 3), metres, z up; NaN where absent.
-        scores: confidence, 0 to 1, (T, n, J); 0 where absent.
+        scores: confidence, 0 to 1, (T, n, J), or one for all joints; 0 where absent.
         covariance: covariance of the error of each joint, (T, n, J, 3, 3), square metres, or None.
         skeleton: the J joints.
         freedom: degrees of freedom of the error of each joint as in :class:`mvpose.Estimate`, (T, n, J); NaN where not
             known. None: known of no joint.
+        numbers: number of each frame in the recording, (T,), increasing; empty: they count from 0.
 
     Raises:
-        ValueError: a wrong shape, times that do not increase, repeated ids, or scores outside 0..1.
+        ValueError: a wrong shape, times or numbers that do not increase, repeated ids, or scores outside 0..1.
     """
 
     times: Floats
     ids: Integers
     joints: Floats
-    scores: Floats
+    scores: Floats = field(default_factory=lambda: np.ones(()))
     covariance: Floats | None = None
     skeleton: Skeleton = COCO17
     freedom: Floats | None = None
+    numbers: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def __post_init__(self) -> None:
         times, ids = as_array(self.times, ("T",), "times"), as_array(self.ids, ("n",), "ids", np.int64)
+        numbers = self.numbers if len(self.numbers) else np.arange(len(times))
+        numbers = as_array(numbers, (len(times),), "numbers", np.int64)
+        if (np.diff(numbers) <= 0).any():
+            bad = int(np.flatnonzero(np.diff(numbers) <= 0)[0])
+            raise ValueError(f"frame numbers must increase, got {numbers[bad + 1]} after {numbers[bad]}")
         if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
             bad = int(np.flatnonzero(~np.append(True, np.diff(times) > 0) | ~np.isfinite(times))[0])
             raise ValueError(f"times of frames must be finite and increase, got {times[bad]:.6g} s in frame {bad}")
         if len(np.unique(ids)) != len(ids):
             raise ValueError(f"ids must be different for different people, got {ids.tolist()}")
         shape = len(times), len(ids), len(self.skeleton)
-        joints, scores = as_array(self.joints, (*shape, 3), "joints"), as_array(self.scores, shape, "scores")
+        scores = np.full(shape, self.scores) if np.ndim(self.scores) == 0 else self.scores
+        joints, scores = as_array(self.joints, (*shape, 3), "joints"), as_array(scores, shape, "scores")
         if ((scores < 0) | (scores > 1)).any():
             raise ValueError(f"scores must lie in 0..1, got {np.nanmin(scores):.6g} to {np.nanmax(scores):.6g}")
         present = np.isfinite(joints).all(axis=-1) & (scores > 0)
@@ -72,6 +85,7 @@ class People(Sealed):
             object.__setattr__(self, "freedom", as_array(self.freedom, shape, "freedom"))
         for key, value in (
             ("times", times), ("ids", ids), ("joints", joints), ("scores", scores), ("covariance", covariance),
+            ("numbers", numbers),
         ):  # fmt: skip
             object.__setattr__(self, key, value)
 
@@ -152,6 +166,56 @@ class People(Sealed):
         seen = np.flatnonzero(self.present[:, person].any(axis=1))
         return slice(int(seen[0]), int(seen[-1]) + 1) if len(seen) else slice(0, 0)
 
+    def at(self, numbers: ArrayLike) -> Floats:
+        """Return the joints in the frames of some numbers, (F, n, J, 3); NaN where there is no such frame."""
+        wanted = np.asarray(numbers, np.int64)
+        result = np.full((len(wanted), *self.joints.shape[1:]), np.nan)
+        rows = np.searchsorted(self.numbers, wanted)
+        rows[rows == self.frames] = 0
+        present = self.numbers[rows] == wanted if self.frames else np.zeros(len(wanted), bool)
+        result[present] = self.joints[rows[present]]
+        return result
+
+    def numbered_from(self, first: int) -> Self:
+        """Return the people with ``first`` as the number of the first frame."""
+        return replace(self, numbers=self.numbers - self.numbers[:1] + first)
+
+    def uniform(self) -> People:
+        """Return the people at times ``first + k * period``, where the period is the median of theirs.
+
+        Joints between two frames are interpolated linearly where both have them; a lost frame is a gap. Frames are
+        numbered anew unless they are uniform already.
+
+        Raises:
+            ValueError: pauses so long that there would be ten times as many frames.
+        """
+        period = 1.0 / self.rate
+        steps = (self.times - self.times[:1]) / period
+        if self.frames < 2 or np.abs(steps - np.arange(self.frames)).max() < _TOLERANCE:
+            return self
+        count = round(steps[-1]) + 1
+        if count > _MOST_FRAMES * self.frames:
+            raise ValueError(
+                f"{self.frames} frames over {self.times[-1] - self.times[0]:.6g} s at a median of {period:.6g} s "
+                "between frames have pauses too long for a format with a fixed rate; export the parts separately"
+            )
+        wanted = np.arange(count)
+        after = np.searchsorted(steps, wanted - _TOLERANCE)  # first frame that is not earlier
+        exact = (after < len(steps)) & (np.abs(steps[np.minimum(after, len(steps) - 1)] - wanted) <= _TOLERANCE)
+        after = np.clip(after, 1, len(steps) - 1)
+        gap = steps[after] - steps[after - 1]
+        share = (wanted - steps[after - 1]) / gap
+        share = np.where(exact, np.round(np.clip(share, 0.0, 1.0)), share)
+        usable = exact | ((gap <= _LONGEST) & (share >= 0.0) & (share <= 1.0))
+        return People(
+            self.times[0] + period * wanted,
+            self.ids,
+            _between(self.joints, after, share, usable),
+            np.nan_to_num(_between(self.scores, after, share, usable)),
+            None if self.covariance is None else _between(self.covariance, after, share, usable),
+            self.skeleton,
+        )
+
 
 def _ids(k: int, frame: Estimate, untracked: bool) -> Integers:
     """Return the identity of each person of frame k, (n,)."""
@@ -183,48 +247,7 @@ def _times(frames: list[Estimate], period: float) -> Floats:
     return times
 
 
-_TOLERANCE = 0.01  # of the period; a frame nearer than this to its uniform time stays as it is
-_LONGEST = 1.5  # periods; across a longer step nothing is interpolated, because a frame was lost there
-_MOST_FRAMES = 10  # times as many frames as there are; above, the times are no recording
-
-
-def uniform(people: People) -> People:
-    """Return people at times ``first + k * period``, where the period is the median of theirs.
-
-    Joints between two frames are interpolated linearly where both have them; a lost frame is a gap.
-
-    Raises:
-        ValueError: pauses so long that there would be ten times as many frames.
-    """
-    period = 1.0 / people.rate
-    steps = (people.times - people.times[:1]) / period
-    if people.frames < 2 or np.abs(steps - np.arange(people.frames)).max() < _TOLERANCE:
-        return people
-    count = round(steps[-1]) + 1
-    if count > _MOST_FRAMES * people.frames:
-        raise ValueError(
-            f"{people.frames} frames over {people.times[-1] - people.times[0]:.6g} s at a median of {period:.6g} s "
-            "between frames have pauses too long for a format with a fixed rate; export the parts separately"
-        )
-    wanted = np.arange(count)
-    after = np.searchsorted(steps, wanted - _TOLERANCE)  # first frame that is not earlier
-    exact = (after < len(steps)) & (np.abs(steps[np.minimum(after, len(steps) - 1)] - wanted) <= _TOLERANCE)
-    after = np.clip(after, 1, len(steps) - 1)
-    gap = steps[after] - steps[after - 1]
-    share = (wanted - steps[after - 1]) / gap
-    share = np.where(exact, np.round(np.clip(share, 0.0, 1.0)), share)
-    usable = exact | ((gap <= _LONGEST) & (share >= 0.0) & (share <= 1.0))
-    return People(
-        people.times[0] + period * wanted,
-        people.ids,
-        _between(people.joints, after, share, usable),
-        np.nan_to_num(_between(people.scores, after, share, usable)),
-        None if people.covariance is None else _between(people.covariance, after, share, usable),
-        people.skeleton,
-    )
-
-
-def _between(values: np.ndarray, after: np.ndarray, share: np.ndarray, usable: np.ndarray) -> np.ndarray:
+def _between(values: Floats, after: Integers, share: Floats, usable: Bools) -> Floats:
     """Return values between the frames before and ``after``; NaN where not usable or where either is absent."""
     weight = share.reshape(-1, *[1] * (values.ndim - 1))
     with np.errstate(invalid="ignore"):

@@ -136,7 +136,7 @@ def tracked_people(recording: AnnotatedRecording) -> WalkingPeople:
     """
     tracked = track_people(recording)
     known = np.asarray(np.isfinite(recording.truth[:, :, _LIMBS_14]).all(axis=(2, 3)))
-    people = [int(np.flatnonzero(tracked.actor == actor)[0]) for actor in range(recording.people)]
+    people = [int(np.flatnonzero(tracked.ids == actor)[0]) for actor in range(recording.people)]
     return _over_the_floor(recording, tracked.joints[:, people], known)
 
 

@@ -11,6 +11,7 @@ import os
 import re
 import stat
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -181,6 +182,22 @@ def _check_texts(texts: Any) -> None:
 
 def _too_deep() -> str:
     return f"nested more than {_DEEPEST} deep"
+
+
+def file_numbers(files: Sequence[Path]) -> list[int]:
+    """Return the number of each picture: the last one in the names that differs for all files, or else the row."""
+    found = [[int(digits) for digits in re.findall(r"\d+", file.stem)] for file in files]
+    if len({len(each) for each in found}) == 1:
+        for column in range(len(found[0]) - 1, -1, -1):
+            values = [each[column] for each in found]
+            if len(set(values)) == len(values):
+                return values
+    return list(range(len(files)))
+
+
+def natural_order(path: Path) -> list[tuple[int, str]]:
+    """Return a key that sorts paths by name, with numbers by value: frame_2 before frame_10."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
 def megabytes(size: int) -> str:

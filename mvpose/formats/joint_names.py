@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from mvpose import COCO17, SHELF14
 from mvpose.arrays import Floats
-from mvpose.skeleton import PANOPTIC19, HeadMapping, coco17_to_shelf14
+from mvpose.recording import People
+from mvpose.skeleton import PANOPTIC19, HeadMapping, Skeleton, coco17_to_shelf14
+from mvpose.wholebody import known_names, skeleton_by_name
 
 _SIDES = {"l": "left", "r": "right"}
 
@@ -158,6 +160,42 @@ def known_skeleton(name: str) -> JointNames:
     return KNOWN[plain]
 
 
+def skeleton_of(names: JointNames) -> Skeleton:
+    """Return the skeleton of a file: the shipped one that has its joints, by name and in their order, or another one.
+
+    Another one has no tree: all joints hang at the first one. Equal names get numbers.
+    """
+    plain = [canonical(joint) for joint in names.joints]
+    for known in (COCO17, SHELF14, PANOPTIC19, *map(skeleton_by_name, known_names())):
+        if len(known) == len(plain) and [canonical(joint) for joint in known.joints] == plain:
+            return known
+    joints = [
+        joint if joint not in names.joints[:row] else f"{joint} ({row})" for row, joint in enumerate(names.joints)
+    ]
+    count = len(joints)
+    return Skeleton(names.name, tuple(joints), (-1, *[0] * (count - 1)), tuple(range(count)), (_SIGMA,) * count)
+
+
+def to_skeleton(people: People, skeleton: Skeleton) -> People:
+    """Convert people to another skeleton by the names of joints; joints that they lack are absent.
+
+    Raises:
+        ValueError: they have none of the joints.
+    """
+    if people.skeleton.joints == skeleton.joints:
+        return people
+    rows = _some_rows(JointNames(people.skeleton.name, people.skeleton.joints), skeleton.joints, skeleton.name)
+    covariance, freedom = people.covariance, people.freedom
+    return replace(
+        people,
+        joints=people.joints[:, :, rows],
+        scores=np.where(rows >= 0, people.scores[:, :, rows], 0.0),
+        covariance=None if covariance is None else covariance[:, :, rows],
+        freedom=None if freedom is None else freedom[:, :, rows],
+        skeleton=skeleton,
+    )
+
+
 def to_coco17(keypoints: Floats, scores: Floats, names: JointNames) -> tuple[Floats, Floats]:
     """Convert 2D keypoints to COCO17 by name.
 
@@ -205,6 +243,7 @@ def to_shelf14(joints: Floats, names: JointNames, *, head: HeadMapping = "voxelp
     return np.where(lacking[:, None], computed, found)
 
 
+_SIGMA = 0.08  # OKS standard deviation of a joint of which nothing is known: about that of a knee
 _LIMBS = 12  # joints of SHELF14 before those of the head
 
 

@@ -11,8 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.files.input_files import read_bytes
-from mvpose.formats.detections.openpose import file_numbers, natural_order
+from mvpose.files.input_files import file_numbers, natural_order, read_bytes
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 """Endings of pictures in folders."""

@@ -122,7 +122,8 @@ def evaluate_poses(
     poses: Annotated[
         Path,
         typer.Argument(
-            help="Results of [cyan]mvpose estimate[/] or [cyan]mvpose run[/]: their folder, or poses.parquet.",
+            help="Results of [cyan]mvpose estimate[/] or [cyan]mvpose run[/], their folder or table, or other files of "
+            "people over time: JSON, NPZ, TRC, C3D, Panoptic.",
             metavar="POSES",
         ),
     ],
@@ -141,12 +142,14 @@ def evaluate_poses(
     """Score the results of [cyan]mvpose estimate[/] or [cyan]mvpose run[/] against the truth of a recording."""
     with PROGRAM.exit_on_error():
         start = perf_counter()
-        from mvpose.formats.people_table import read_people
+        from mvpose import COCO17
+        from mvpose.formats.joint_names import KNOWN, to_skeleton
+        from mvpose.formats.people import read_people
         from simharness.cli.evaluation_tables import print_evaluation
-        from simharness.reality.people_evaluation import evaluate_people
+        from simharness.reality.evaluation import evaluate_people
         from simharness.reality.recording_file import find_recording, read_keys, read_recording
 
-        people = read_people(poses)
+        people = to_skeleton(read_people(poses, skeleton=KNOWN["coco17"], rate=1.0), COCO17)
         data = read_recording(recording, folder, head=head.value)
         if first is None:
             first = read_keys(find_recording(recording)).detections.first

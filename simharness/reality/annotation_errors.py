@@ -17,12 +17,13 @@ from scipy.signal import lfilter
 
 from mvpose import SHELF14, Rig
 from mvpose.arrays import Floats
+from mvpose.recording import People
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.bias import SIDE, body_axes
 from simharness.reality.detector_fit.consensus import Consensus
 from simharness.reality.detector_fit.frame_sums import lags
 from simharness.reality.detector_fit.tetrachoric import fit_noisy_life
-from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, SMOOTHING, TrackedPeople
+from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, SMOOTHING, actors_of
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS
 from simharness.scenario.sections.scenario import AnnotationSection, Scenario
 from simharness.types.random_streams import stream
@@ -159,7 +160,7 @@ class AnnotationFit:
 
 def fit_annotation(
     truth: Floats,
-    tracks: TrackedPeople,
+    people: People,
     consensus: Consensus,
     time: Floats,
     *,
@@ -171,11 +172,11 @@ def fit_annotation(
 
     Args:
         truth: annotated joints, SHELF14, (F, A, 14, 3) metres; NaN where unknown.
-        tracks: joints of everyone, as the method places them with all cameras: nothing places them better.
+        people: joints of everyone, as the method places them with all cameras: nothing places them better.
         consensus: joints on which the views agree, of the same people; limbs are compared where three views do.
         time: times of the frames, (F,) seconds.
         sigma: scatter of keypoints by joint, (17,) units of OKS sigma x sqrt(area): what smoothing leaves of it in the
-            tracks is not the annotation's.
+            joints is not the annotation's.
         scatter_life: correlation time of that scatter, seconds; 0: drawn anew in every frame.
         scatter_noise: share of its variance that is drawn anew in every frame, whatever its correlation time.
     """
@@ -185,13 +186,13 @@ def fit_annotation(
     step = _step(time)
     noise = _smoothed(np.arange(1), step, life=scatter_life, noise=scatter_noise)
     agreeing = consensus.agrees.sum(axis=1) >= _AGREEING
-    for person, actor in enumerate(tracks.actor):
+    for person, actor in enumerate(actors_of(people, truth)):
         if actor < 0:
             continue
-        joints = np.where(agreeing[:, person, :, None], tracks.joints[:, person], np.nan)
-        joints[:, : LIMB_JOINTS[0]] = tracks.joints[:, person, : LIMB_JOINTS[0]]
+        joints = np.where(agreeing[:, person, :, None], people.joints[:, person], np.nan)
+        joints[:, : LIMB_JOINTS[0]] = people.joints[:, person, : LIMB_JOINTS[0]]
         offset = truth[:, actor] - coco17_to_shelf14(joints)
-        away[:, actor] = np.einsum("fjc,fkc->fjk", offset, body_axes(tracks.joints[:, person]))
+        away[:, actor] = np.einsum("fjc,fkc->fjk", offset, body_axes(people.joints[:, person]))
         expected[:, actor, :_LIMBS] = _limbs14(consensus.variance[:, person] * sigma**2 * noise)
     compared = np.isfinite(away[..., 0]).sum(axis=0)
     shift = _robust_mean(away)

@@ -1,4 +1,4 @@
-"""Evaluation of a method on recorded data by the published protocol."""
+"""Evaluation of methods, or of people in files, on recorded data by the published protocol."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mvpose import Detections, Estimate, Matching
+from mvpose import COCO17, Detections, Estimate, Matching
 from mvpose.estimators import Estimator, SequenceEstimator
+from mvpose.recording import People
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.scoring.frame_scores import score_frames
@@ -17,6 +18,9 @@ from simharness.scoring.matching import count_violations
 from simharness.scoring.score_summary import VariantScores, summarize
 from simharness.scoring.tracking.identity_figures import tracking_of_some
 from simharness.trial.conditions import estimate_frames
+
+FILES = "files"
+"""Name of the people of files in an evaluation."""
 
 
 @dataclass(frozen=True)
@@ -134,6 +138,40 @@ def score_estimates(
         )
     return Evaluation(
         recording.name, head, len(recording), int(annotated.sum()), variants, violations, recording.scored
+    )
+
+
+def evaluate_people(
+    recording: AnnotatedRecording, people: People, *, first: int = 0, head: HeadMapping = "voxelpose"
+) -> Evaluation:
+    """Score tracked people on a recording.
+
+    Args:
+        recording: the recording of F frames.
+        people: people of T frames.
+        first: number that the recording gives to the first frame of the people.
+        head: mapping to the head of SHELF14.
+
+    Raises:
+        ValueError: people on another skeleton than COCO-17, or without some frames of the recording.
+    """
+    rows = recording.frames - first
+    if len(rows) and not 0 <= rows.min() <= rows.max() < people.frames:
+        raise ValueError(
+            f"the people are of {people.frames} frames, {first} to {first + people.frames - 1} of {recording.name}, "
+            f"which has the frames {recording.frames.min()} to {recording.frames.max()}; estimate all of them, or give "
+            "the number of the first estimated frame as --first"
+        )
+    return score_estimates(recording, {FILES: [_estimate(people, row) for row in rows.tolist()]}, head=head)
+
+
+def _estimate(people: People, row: int) -> Estimate:
+    """Return the people of a frame, with their identities."""
+    if people.skeleton != COCO17:
+        raise ValueError(f"people must be on the skeleton {COCO17.name}, got {people.skeleton.name}")
+    here = people.present[row].any(axis=1)
+    return Estimate(
+        people.joints[row, here], people.scores[row, here], Matching(np.zeros(0, np.int64)), ids=people.ids[here]
     )
 
 

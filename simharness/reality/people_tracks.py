@@ -8,17 +8,17 @@ the consensus of its own views, and the annotation apart from it.
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import linear_sum_assignment
 
 from mvpose import COCO17, SHELF14, preset
-from mvpose.arrays import Bools, Floats
+from mvpose.arrays import Bools, Floats, Integers
+from mvpose.recording import People
 from simharness.detector.bias import body_axes
 from simharness.reality.annotated_recording import AnnotatedRecording
 
@@ -40,31 +40,29 @@ _OUTLYING = 0.25  # metres: distance of a joint from its median over _WINDOW fra
 _WINDOW = 0.4  # seconds
 
 
-@dataclass(frozen=True)
-class TrackedPeople:
-    """Joints of the people of a recording.
-
-    Attributes:
-        joints: COCO-17, (F, P, 17, 3) metres; all joints of a person are known in a frame, or none (NaN).
-        actor: actor of the annotation that each track follows, (P,); -1 for a person who is never annotated.
-    """
-
-    joints: Floats
-    actor: NDArray[np.int64]
-
-    @property
-    def present(self) -> Bools:
-        """Which people are present in which frames, (F, P)."""
-        return np.isfinite(self.joints[:, :, 0, 0])
-
-    def annotated(self, truth: Floats) -> Bools:
-        """Return which people are present and annotated, (F, P), given the truth (F, A, 14, 3) of the recording."""
-        known = np.asarray(np.isfinite(truth[:, :, SHELF14_OF_LIMBS]).all(axis=(2, 3)))
-        return np.asarray(self.present & (self.actor >= 0) & known[:, np.maximum(self.actor, 0)])
+def present(people: People) -> Bools:
+    """Return which people are present in which frames, (F, P)."""
+    return np.asarray(people.present.any(axis=-1))
 
 
-def track_people(recording: AnnotatedRecording) -> TrackedPeople:
-    """Return the tracks of all people of a recording; each actor has at most one track.
+def actors_of(people: People, truth: Floats) -> Integers:
+    """Return the actor of a truth (F, A, 14, 3) that each person is, (P,); -1 for a person who is never annotated."""
+    return np.where(people.ids < truth.shape[1], people.ids, -1)
+
+
+def annotated(people: People, truth: Floats) -> Bools:
+    """Return which people are present and annotated, (F, P), given the truth (F, A, 14, 3) of the recording."""
+    actor = actors_of(people, truth)
+    known = np.asarray(np.isfinite(truth[:, :, SHELF14_OF_LIMBS]).all(axis=(2, 3)))
+    return np.asarray(present(people) & (actor >= 0) & known[:, np.maximum(actor, 0)])
+
+
+def track_people(recording: AnnotatedRecording) -> People:
+    """Return all people of a recording on COCO-17; each actor is at most one of them.
+
+    Returns:
+        People in the frames of the recording, of whom all joints are known in a frame, or none. The identity of a
+        person whose annotation is that of an actor is the actor's index; those of others follow (:func:`actors_of`).
 
     Raises:
         ValueError: nobody is found in any frame.
@@ -85,7 +83,9 @@ def track_people(recording: AnnotatedRecording) -> TrackedPeople:
               sorted(set(actors[actors >= 0]))]  # fmt: skip
     merged += [(track, -1) for track, actor in zip(tracks, actors, strict=True) if actor < 0]
     joints = np.stack([_filled(track, recording) for track, _ in merged], axis=1)
-    return TrackedPeople(joints, np.array([actor for _, actor in merged]))
+    others = itertools.count(recording.people)
+    ids = [actor if actor >= 0 else next(others) for _, actor in merged]
+    return People(recording.time, ids, joints, numbers=recording.frames)
 
 
 def _complete_enough(joints: Floats, truth: Floats) -> Floats:

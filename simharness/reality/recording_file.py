@@ -24,9 +24,10 @@ from mvpose.formats.calibration.calibration_formats import read_calibration
 from mvpose.formats.detection_files import DetectionFiles
 from mvpose.formats.detection_formats import FORMATS as DETECTION_FORMATS
 from mvpose.formats.joint_names import JointNames, to_shelf14
+from mvpose.formats.people.people_files import PeopleFiles
+from mvpose.formats.people.people_formats import FORMATS as PEOPLE_FORMATS
+from mvpose.recording import People
 from mvpose.skeleton import HeadMapping
-from simharness.formats.joint_tracks import JointTracks, TrackFiles
-from simharness.formats.track_formats import FORMATS as TRACK_FORMATS
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.recording_keys import CalibrationKeys, DeclaredSkeleton, RecordingKeys, TruthKeys
 from simharness.scenario.shipped import shipped_folder
@@ -72,9 +73,9 @@ def read_recording(
             )
         )
     with _key(file, "truth"):
-        tracks = _tracks(place, keys.truth, frames)
-        truth = to_shelf14(tracks.at(frames), _joint_names(keys.truth, tracks), head=head)
-        actors = _actors(keys.truth, tracks)
+        people = _people(place, keys, frames)
+        truth = to_shelf14(people.at(frames), _joint_names(keys.truth, people), head=head)
+        actors = _actors(keys.truth, people)
     with _key(file, "recording"):
         return AnnotatedRecording(
             rig,
@@ -179,53 +180,51 @@ def _rig(place: Path, keys: CalibrationKeys) -> Rig:
     return Rig([replace(camera, size=sizes[view]) if unknown[view] else camera for view, camera in enumerate(rig)])
 
 
-def _tracks(place: Path, keys: TruthKeys, frames: NDArray[np.int64]) -> JointTracks:
+def _people(place: Path, keys: RecordingKeys, frames: NDArray[np.int64]) -> People:
     """Read the true joints, numbered by the frames of the recording.
 
-    Files that only count their rows, and have as many as the recording from its first frame to its last, have its
+    Files that only count their frames, and have as many as the recording from its first frame to its last, have its
     frames; ``truth.first`` says it for others.
     """
-    paths = tuple(place / each for each in keys.file)
-    skeleton = keys.skeleton.of(None) if keys.skeleton is not None and keys.skeleton.joints else None
-    tracks = TRACK_FORMATS[keys.format].read(TrackFiles(paths, frames, skeleton, keys.up))
-    if keys.first is not None:
-        tracks = tracks.numbered(keys.first)
-    elif tracks.counted and len(tracks.frames) == frames[-1] - frames[0] + 1:
-        tracks = tracks.numbered(int(frames[0]))
-    if not np.isin(frames, tracks.frames).any():
+    truth = keys.truth
+    paths = tuple(place / each for each in truth.file)
+    declared = truth.skeleton.of(None) if truth.skeleton is not None and truth.skeleton.joints else None
+    read = PEOPLE_FORMATS[truth.format].read
+    assert read is not None, "the keys are checked"
+    people = read(PeopleFiles(paths, declared, truth.up, keys.rate, frames))
+    if truth.first is not None:
+        people = people.numbered_from(truth.first)
+    if not np.isin(frames, people.numbers).any():
+        has = f"frames {people.numbers[0]} to {people.numbers[-1]}" if people.frames else "no frames"
         raise ValueError(
-            f"{paths[0]}: has frames {tracks.frames.min()} to {tracks.frames.max()}, none of the recording's frames "
-            f"{frames[0]} to {frames[-1]}; correct frames, or give truth.first, the number of its first frame"
+            f"{paths[0]}: has {has}, none of the recording's frames {frames[0]} to {frames[-1]}; correct frames, or "
+            "give truth.first, the number of its first frame"
         )
-    return tracks
+    return people
 
 
-def _joint_names(keys: TruthKeys, tracks: JointTracks) -> JointNames:
-    """Return the joints of the truth: as declared, as the file names them, or of the format."""
-    path = keys.file[0]
-    own = JointNames(path, tracks.names) if tracks.names is not None else TRACK_FORMATS[keys.format].skeleton
+def _joint_names(keys: TruthKeys, people: People) -> JointNames:
+    """Return the joints of the truth, as the file names them or as they are declared."""
+    own = JointNames(people.skeleton.name, people.skeleton.joints)
     skeleton = keys.skeleton or DeclaredSkeleton()
-    if tracks.names is not None and own is not None and skeleton.joints:
-        declared = JointNames(skeleton.name, skeleton.joints)
-        if (own.rows(declared.joints) >= 0).all():  # named alike: the order in the file counts
-            return own.renamed(skeleton.map)
+    if skeleton.joints and (own.rows(skeleton.joints) >= 0).all():  # named alike: the order in the file counts
+        return own.renamed(skeleton.map)
     names = skeleton.of(own)
-    if len(names) != tracks.joints.shape[2]:
+    if len(names) != len(own):
         raise ValueError(
-            f"{path}: has {tracks.joints.shape[2]} joints, but skeleton {names.name} has {len(names)}; correct the "
-            "skeleton"
+            f"{keys.file[0]}: has {len(own)} joints, but skeleton {names.name} has {len(names)}; correct the skeleton"
         )
     return names
 
 
-def _actors(keys: TruthKeys, tracks: JointTracks) -> tuple[int, ...] | None:
-    """Return the rows of the people whose PCP is averaged."""
+def _actors(keys: TruthKeys, people: People) -> tuple[int, ...] | None:
+    """Return the columns of the people whose PCP is averaged."""
     if keys.actors is None:
         return None
-    missing = [actor for actor in keys.actors if actor not in tracks.people]
+    ids = people.ids.tolist()
+    missing = [actor for actor in keys.actors if actor not in ids]
     if missing:
         raise ValueError(
-            f"actors: expected people of the file, {', '.join(map(str, tracks.people))}, got {missing[0]}; correct the "
-            "list"
+            f"actors: expected people of the file, {', '.join(map(str, ids))}, got {missing[0]}; correct the list"
         )
-    return tuple(tracks.people.index(actor) for actor in keys.actors)
+    return tuple(ids.index(actor) for actor in keys.actors)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
 from mvpose.formats.detection_formats import FORMATS as DETECTION_FORMATS
 from mvpose.formats.joint_names import KNOWN, JointNames, known_skeleton
-from simharness.formats.track_formats import FORMATS as TRACK_FORMATS
+from mvpose.formats.people.people_formats import readable
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.scenario.sections.section import Section
 
@@ -18,12 +18,13 @@ Whole = Annotated[int, Field(ge=0, le=10**9)]
 Name = Annotated[str, Field(min_length=1)]
 
 
-def _one_of(names: Iterable[str]) -> Any:
+def _one_of(registered: Callable[[], Iterable[str]]) -> Any:
     """Return a validator of names that are registered when the file is read."""
 
     def check(value: Any) -> Any:
+        names = list(registered())
         if isinstance(value, str) and value not in names:
-            near = difflib.get_close_matches(value, list(names), n=1)
+            near = difflib.get_close_matches(value, names, n=1)
             raise ValueError(f"one of {', '.join(names)}{f' (did you mean {near[0]}?)' if near else ''}")
         return value
 
@@ -99,7 +100,7 @@ class CalibrationKeys(Section):
 class DetectionKeys(Section):
     """[detections] of a recording."""
 
-    format: Annotated[str, _one_of(DETECTION_FORMATS)] = Field(description="format of the detections")
+    format: Annotated[str, _one_of(lambda: DETECTION_FORMATS)] = Field(description="format of the detections")
     path: Name = Field(description="folder of the detections, with a folder or file for each camera")
     first: Whole = Field(0, description="frame number of the first file of each camera, of OpenPose")
     skeleton: SkeletonKey | None = Field(None, description="skeleton of the detections")
@@ -109,7 +110,7 @@ class DetectionKeys(Section):
 class TruthKeys(Section):
     """[truth] of a recording."""
 
-    format: Annotated[str, _one_of(TRACK_FORMATS)] = Field(description="format of the true joints")
+    format: Annotated[str, _one_of(readable)] = Field(description="format of the true joints")
     file: Annotated[tuple[Name, ...], BeforeValidator(_listed)] = Field(
         min_length=1, description="file (of Panoptic the folder), or a list with a file for each person"
     )
@@ -118,7 +119,7 @@ class TruthKeys(Section):
     first: Whole | None = Field(
         None, description="frame number of the first frame of the file; by default as the file says"
     )
-    up: Literal["z", "y"] = Field("z", description="axis that points up in TRC, C3D and npz files")
+    up: Literal["z", "y"] = Field("z", description="axis that points up in TRC, C3D, npz and table files")
 
 
 class RecordingKeys(Section):

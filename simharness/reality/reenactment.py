@@ -19,16 +19,17 @@ from mvpose import COCO17, Detections, Rig
 from mvpose.arrays import Bools, Floats
 from mvpose.commands.progress import Silence, Stages
 from mvpose.formats.calibration.opencv import write_calibration
+from mvpose.formats.people import write_people
+from mvpose.recording import People
 from simharness.detector.detect import detect
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.people_tracks import TrackedPeople
+from simharness.reality.people_tracks import present
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import Simulation, capture_trial
 from simharness.types.sequence import LANDMARKS, Sequence
 from simharness.types.views import Views, Visibility
-from simharness.world.motion.mocap.joint_tracks import tracks_file
 from simharness.world.motion.presence import held
 
 _LONGEST = 4.0  # seconds of a take
@@ -90,7 +91,7 @@ class Film:
 
 
 def film(
-    recording: AnnotatedRecording, people: TrackedPeople, *, seed: int, advance: Callable[[int], None] = lambda _: None
+    recording: AnnotatedRecording, people: People, *, seed: int, advance: Callable[[int], None] = lambda _: None
 ) -> Film:
     """Simulate and film a recording.
 
@@ -136,7 +137,7 @@ def _waiting(landmarks: Floats, present: Bools) -> Floats:
     return np.stack([held(landmarks[:, person], here) for person, here in enumerate(present.T)], axis=1)
 
 
-def cut_takes(recording: AnnotatedRecording, people: TrackedPeople) -> list[Take]:
+def cut_takes(recording: AnnotatedRecording, people: People) -> list[Take]:
     """Return the takes of a recording: runs without a gap, cut where people come and go, and when they get long.
 
     Frames without anybody belong to no take.
@@ -144,23 +145,23 @@ def cut_takes(recording: AnnotatedRecording, people: TrackedPeople) -> list[Take
     takes: list[Take] = []
     shortest, longest = (max(1, round(seconds * recording.rate)) for seconds in (_SHORTEST, _LONGEST))
     for segment in recording.segments:
-        present = people.present[segment]
-        changes = 1 + np.flatnonzero((present[1:] != present[:-1]).any(axis=1))
+        here = present(people)[segment]
+        changes = 1 + np.flatnonzero((here[1:] != here[:-1]).any(axis=1))
         cuts = [0]
         for change in changes:
-            if change - cuts[-1] >= shortest and len(present) - change >= shortest:
+            if change - cuts[-1] >= shortest and len(here) - change >= shortest:
                 cuts.append(int(change))
-        for start, stop in zip(cuts, [*cuts[1:], len(present)], strict=True):
+        for start, stop in zip(cuts, [*cuts[1:], len(here)], strict=True):
             pieces = -(-(stop - start) // longest)
             edges = np.linspace(start, stop, pieces + 1).round().astype(int)
             for first, last in itertools.pairwise(edges):
-                here = tuple(np.flatnonzero(present[first:last].mean(axis=0) >= _PRESENT).tolist())
-                if here:
-                    takes.append(Take(range(segment.start + int(first), segment.start + int(last)), here))
+                cast = tuple(np.flatnonzero(here[first:last].mean(axis=0) >= _PRESENT).tolist())
+                if cast:
+                    takes.append(Take(range(segment.start + int(first), segment.start + int(last)), cast))
     return takes
 
 
-def floor_height(people: TrackedPeople) -> float:
+def floor_height(people: People) -> float:
     """Return the height of the floor, metres: a usual ankle's height below the lower ankles of standing people."""
     ankles = people.joints[:, :, 15:, 2].min(axis=-1)
     return float(np.nanquantile(ankles, _STANDING)) - _ANKLE
@@ -169,8 +170,9 @@ def floor_height(people: TrackedPeople) -> float:
 def _film_take(recording: AnnotatedRecording, rig: Rig, joints: Floats, *, seed: int) -> Simulation:
     """Simulate and film one take, with joints (T, P, 17, 3) over a floor at z = 0."""
     with tempfile.TemporaryDirectory() as folder:
-        tracks, calibration = Path(folder, "tracks.npz"), Path(folder, "cameras.yml")
-        tracks_file(tracks, joints, recording.rate)
+        calibration = Path(folder, "cameras.yml")
+        recorded = People(np.arange(len(joints)) / recording.rate, np.arange(joints.shape[1]), joints)
+        (file,) = write_people(recorded, Path(folder), formats=["npz"])
         write_calibration(calibration, rig)
         reach = max(np.abs(joints[..., :2]).max(), np.abs(rig.centers[:, :2]).max()) + _MARGIN
         height = max(3.0, float(rig.centers[:, 2].max()) + 0.5)
@@ -181,7 +183,7 @@ def _film_take(recording: AnnotatedRecording, rig: Rig, joints: Floats, *, seed:
                 "duration": len(joints) / recording.rate,
                 "rate": recording.rate,
                 "room": {"size": (2 * reach, 2 * reach, height), "walls": False},
-                "people": {"count": joints.shape[1], "area": reach - 0.7, "motion": {"file": str(tracks)}},
+                "people": {"count": joints.shape[1], "area": reach - 0.7, "motion": {"file": str(file)}},
                 "cameras": {"layout": "file", "file": str(calibration)},
                 "rendering": {"renderer": "rays"},
             }

@@ -13,11 +13,12 @@ import numpy as np
 
 from mvpose import COCO17
 from mvpose.commands.progress import Reporter, Silence
+from mvpose.recording import People
 from simharness.detector.bias import world_offsets
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationModel
 from simharness.reality.detector_fit.fit import DetectorFit
-from simharness.reality.people_tracks import TrackedPeople
+from simharness.reality.people_tracks import actors_of
 from simharness.reality.reenactment import Film, cut_takes, film
 from simharness.scenario.sections.detector_section import DetectorSection
 
@@ -39,7 +40,7 @@ class TwinModel:
     """
 
     recording: AnnotatedRecording
-    people: TrackedPeople
+    people: People
     detector: DetectorSection
     annotation: AnnotationModel
     films: tuple[Film, ...] = ()
@@ -75,7 +76,7 @@ def detected_twin(model: TwinModel, filmed: Film, *, seed: int) -> AnnotatedReco
     joints = np.full((len(recording), recording.people, len(COCO17), 3), np.nan)
     # Annotated heads are fitted to the detected face; limbs of the film are the detected ones already.
     shown = filmed.joints + world_offsets(filmed.joints, model.detector.bias.of_face())
-    for person, actor in enumerate(model.people.actor):
+    for person, actor in enumerate(actors_of(model.people, recording.truth)):
         if actor >= 0:
             joints[:, actor] = shown[:, person]
     truth = model.annotation.annotate(joints, recording.time, seed=seed)

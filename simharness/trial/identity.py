@@ -34,6 +34,7 @@ from typing import Any
 import mvpose
 import simharness
 from mvpose.formats.calibration.camera_folder import calibration_files
+from mvpose.formats.people.people_formats import people_files
 from simharness.runtime.code_digest import digest_of_folders
 from simharness.scenario.sections.scenario import FILE_KEYS, Scenario
 from simharness.trial.stages.estimators import sources_of
@@ -45,8 +46,9 @@ PACKAGES = ("mujoco", "numpy", "scipy", "numba", "opencv-python-headless", "onnx
 SIMULATION = ("types", "scenario/sections", "assets", "world", "capture", "detector", "trial/stages")
 """Folders of ``simharness`` that make detections and estimates. Scenarios count as resolved, not how they are read."""
 
-BORROWED = ("formats/calibration", "wholebody")
-"""Folders of ``mvpose`` that simulations use: readers of rigs, skeletons with feet and hands and their estimates."""
+BORROWED = ("formats/calibration", "formats/joint_names.py", "formats/people", "recording.py", "wholebody")
+"""Folders and modules of ``mvpose`` that simulations use: readers of rigs and of people to re-enact, skeletons with
+feet and hands and their estimates."""
 
 BESIDE_THE_METHOD = (
     "cli", "commands", "files", "formats", "networks/detector.py", "networks/people.py", "recording.py", "report",
@@ -156,6 +158,8 @@ def _files(scenario: Scenario) -> dict[str, list[Path]]:
             files[key].append(file.with_suffix(".json"))
         elif suffix == ".amc":  # the skeleton beside a motion
             files[key] += _beside(file, ".asf")
+        elif key == "people.motion.file" and suffix != ".bvh":  # people over time, in one or more files
+            files[key] = people_files(file)
         elif file.is_dir():  # a calibration with a file for each camera, or in the folder of a project
             files[key] = calibration_files(file)
         elif suffix in (".yml", ".yaml", ".xml"):  # calibrations in two files

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from mvpose import Rig
+from mvpose.files.input_files import natural_order
 from mvpose.files.message_text import listed, shown
 from mvpose.formats.calibration.calibration_file import CalibrationFile
 from mvpose.formats.calibration.camera_entry import is_camera, read_camera
 from mvpose.formats.calibration.opencv import values_of, write_values
-from mvpose.formats.detections.openpose import natural_order
 
 SUFFIXES = (".json", ".yml", ".yaml", ".xml", ".toml")
 """Endings of calibration files."""

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from mvpose import COCO17, Detections
 from mvpose.arrays import Floats
-from mvpose.files.input_files import read_json_object
+from mvpose.files.input_files import natural_order, read_json_object
 from mvpose.formats.detection_files import DetectionFiles
 from mvpose.formats.joint_names import BODY_25, KNOWN, JointNames, to_coco17
 from mvpose.skeleton import Skeleton
@@ -139,22 +139,6 @@ def _files_of(folder: Path) -> list[Path]:
     if not paths:
         raise ValueError(f"{folder}: has no *.json; expected {_WHAT}, one for each frame")
     return paths
-
-
-def file_numbers(files: Sequence[Path]) -> list[int]:
-    """Return the number of each picture: the last one in the names that differs for all files, or else the row."""
-    found = [[int(digits) for digits in re.findall(r"\d+", file.stem)] for file in files]
-    if len({len(each) for each in found}) == 1:
-        for column in range(len(found[0]) - 1, -1, -1):
-            values = [each[column] for each in found]
-            if len(set(values)) == len(values):
-                return values
-    return list(range(len(files)))
-
-
-def natural_order(path: Path) -> list[tuple[int, str]]:
-    """Return a key that sorts paths by name, with numbers by value: frame_2 before frame_10."""
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
 def people_file(keypoints: ArrayLike, scores: ArrayLike, *, skeleton: Skeleton = COCO17) -> dict[str, Any]:

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mvpose.files.input_files import read_json
+from mvpose.files.input_files import natural_order, read_json
 from mvpose.files.message_text import listed, one_line
-from mvpose.formats.detections.openpose import natural_order
 
 SUFFIXES = (".json", ".npz")
 """Endings of files of detections."""

@@ -22,7 +22,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.files.archives import arrays_of
-from mvpose.files.input_files import read_bytes, read_json
+from mvpose.files.input_files import file_numbers, natural_order, read_bytes, read_json
 from mvpose.files.message_text import listed, shown
 from mvpose.formats.detections import coco_results, openpose
 from mvpose.formats.detections.sources import SUFFIXES, Source
@@ -131,13 +131,11 @@ def _with_somebody(picture: Picture) -> Picture:
 
 def _read_folder(source: Source, skeleton: JointNames | None) -> ViewPeople:
     """Read a folder with a file for each picture."""
-    files = sorted(
-        (each for each in source.path.iterdir() if each.suffix.lower() in SUFFIXES), key=openpose.natural_order
-    )
+    files = sorted((each for each in source.path.iterdir() if each.suffix.lower() in SUFFIXES), key=natural_order)
     if not files:
         raise ValueError(f"{source.path}: an empty folder; expected a *.json file for each picture")
     pictures, kind = {}, "OpenPose"
-    for number, file in zip(openpose.file_numbers(files), files, strict=True):
+    for number, file in zip(file_numbers(files), files, strict=True):
         content = read_json(file, what=_WHAT)
         if isinstance(content, dict) and "people" in content:
             pictures[number] = _of_openpose(file, content["people"], skeleton)

@@ -1,22 +1,38 @@
 """Markers in a C3D file (https://www.c3d.org), the binary format of motion capture systems.
 
-Millimetres, z up. The residual of a point is the standard deviation of its error, the root mean square over the axes,
-in whole millimetres up to 255, or 0 where it is unknown; -1 marks a point that is undefined, as the format has it.
+Points of the group POINT in the unit POINT:UNITS, with their labels; points with a negative residual are undefined. In
+files that we write, millimetres, z up, the residual is the standard deviation of a point's error, the root mean square
+over the axes, in whole millimetres up to 255, or 0 where it is unknown.
 """
 
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.formats.people.people_files import Export, each_person, marker_label
+from mvpose.files.input_files import read_bytes
+from mvpose.files.message_text import one_line, shown
+from mvpose.formats.joint_names import JointNames, skeleton_of
+from mvpose.formats.people.people_files import (
+    METRES,
+    Export,
+    PeopleFiles,
+    each_person,
+    identity_of,
+    marker_label,
+    side_by_side,
+)
 from mvpose.recording import People
 
+_WHAT = "a C3D file of motion capture"
+_OF_PERSON = re.compile(r"P(-?\d+):(.*)")  # labels of a file with several people
 _MOST_TEXTS = 255  # of a parameter; the following ones are in LABELS2, LABELS3 and so on
 
 
@@ -74,3 +90,70 @@ def _set_texts(group: Any, name: str, what: str, texts: Sequence[str]) -> None:
         some = texts[start : start + _MOST_TEXTS]
         joined = "".join(text.ljust(width) for text in some)
         group.add_str(name + (str(part) if part > 1 else ""), what, joined, width, len(some))
+
+
+def read(files: PeopleFiles) -> People:
+    """Read the markers of one person from each file, or of all people from one file with labels such as ``P3:LHip``.
+
+    The axis that points up is that of the files, of POINT:Y_SCREEN, or z.
+
+    Raises:
+        ValueError: a file is missing, truncated or no C3D file, has no points or points in an unknown unit, or other
+            markers than the first file; or the package c3d is not installed.
+    """
+    return side_by_side([_read_file(path, files) for path in files.paths], files)
+
+
+def _read_file(path: Path, files: PeopleFiles) -> People:
+    try:
+        from c3d import Reader
+    except ImportError:
+        raise ValueError(f"{path}: needs the package c3d, which is not installed; pip install c3d") from None
+
+    content = read_bytes(path, what=_WHAT)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            reader = Reader(io.BytesIO(content))
+            frames = [(number, points) for number, points, _ in reader.read_frames()]
+            labels = tuple(str(label).strip() for label in reader.point_labels[: reader.point_used])
+            unit, screen, rate = _text(reader, "UNITS"), _text(reader, "Y_SCREEN"), float(reader.point_rate)
+    except Exception as error:  # the package raises many types of errors on damaged files
+        why = one_line(f"{type(error).__name__}: {error}", 160)
+        raise ValueError(
+            f"{path}: cannot be read as C3D ({why}; it has {len(content)} bytes); expected {_WHAT}"
+        ) from None
+    if len(frames) != reader.last_frame - reader.first_frame + 1:
+        raise ValueError(
+            f"{path}: expected frames {reader.first_frame} to {reader.last_frame}, got {len(frames)} frames; it was "
+            "probably cut off: copy it again"
+        )
+    if unit not in METRES:
+        raise ValueError(f"{path}: POINT:UNITS must be one of {', '.join(METRES)}, got {shown(unit)}")
+    if not labels:
+        raise ValueError(f"{path}: has no points; expected labelled markers (POINT:LABELS)")
+    points = np.stack([each for _, each in frames]).astype(float)[:, : len(labels)]
+    markers = METRES[unit] * np.where(points[..., 3:4] >= 0, points[..., :3], np.nan)
+    axes = files.axes("y" if screen == "+y" else "z")
+    numbers = int(frames[0][0]) + np.arange(len(frames))
+    ids, names, joints = _by_person(path, labels, markers @ axes.T)
+    try:
+        times = files.times(numbers - 1, rate=rate)
+        return People(times, ids, joints, skeleton=skeleton_of(JointNames(path.name, names)), numbers=numbers)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _by_person(path: Path, labels: tuple[str, ...], markers: Floats) -> tuple[list[int], tuple[str, ...], Floats]:
+    """Return identities (n,), names of joints and joints (T, n, J, 3) of labelled markers (T, k, 3)."""
+    found = [_OF_PERSON.fullmatch(label) for label in labels]
+    ids = list(dict.fromkeys(int(each[1]) for each in found if each))
+    names = tuple(each[2] for each in found if each and int(each[1]) == ids[0])
+    if list(labels) != [f"P{identity}:{name}" for identity in ids for name in names]:
+        return [identity_of(path)], labels, markers[:, None]
+    return ids, names, markers.reshape(len(markers), len(ids), len(names), 3)
+
+
+def _text(reader: Any, name: str) -> str:
+    stated = reader.get(f"POINT:{name}")
+    return "" if stated is None else str(stated.string_value).strip("\0 ").lower()

@@ -1,16 +1,19 @@
-"""What a writer gets: people, the choices of the user, and what several formats compute from them."""
+"""What readers and writers of people get: files or people, the choices of the user, and what several formats need."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from mvpose.arrays import Floats
-from mvpose.recording import People, uniform
+from mvpose.arrays import Floats, Integers
+from mvpose.formats.joint_names import JointNames
+from mvpose.recording import People
 from mvpose.skeleton_fit import FittedBody, fit_bodies
 
 Up = Literal["z", "y"]
@@ -20,6 +23,109 @@ AXES: dict[Up, Floats] = {"z": np.eye(3), "y": np.array([[0.0, 1.0, 0.0], [0.0, 
 
 With y up, x, y, z of the file are our y, z, x, as Pose2Sim converts for OpenSim: a turn of the axes, not a mirror.
 """
+
+METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 0.01, "mm": 0.001, "inches": 0.0254, "in": 0.0254}
+"""Metres per unit of length, by the name of the unit in files."""
+
+
+@dataclass(frozen=True)
+class PeopleFiles:
+    """Files of people, and what is known about them.
+
+    Attributes:
+        paths: one or more files (of Panoptic the folder); of formats that hold one person, one for each person.
+        skeleton: joints of files that do not name them; None: those that are usual in the format.
+        up: axis that points up in files that do not say it; None: the convention of the format.
+        rate: frames per second of files that do not say it; None: not known.
+        numbers: numbers of the wanted frames, (F,); a reader may leave out others. None: all.
+    """
+
+    paths: tuple[Path, ...]
+    skeleton: JointNames | None = None
+    up: Up | None = None
+    rate: float | None = None
+    numbers: Integers | None = None
+
+    def single(self) -> Path:
+        """Return the path of a format that holds all people in one file.
+
+        Raises:
+            ValueError: several files.
+        """
+        if len(self.paths) != 1:
+            raise ValueError(f"{self.paths[1]}: expected one file, which holds all people, got {len(self.paths)}")
+        return self.paths[0]
+
+    def axes(self, usual: Up) -> Floats:
+        """Return the rotation from the axes of the files to ours, (3, 3), for a format with a usual up axis."""
+        return AXES[self.up or usual].T
+
+    def renumbered(self, numbers: Integers, *, counted: bool) -> Integers:
+        """Return the numbers of the frames of files, (T,): the wanted ones where the files only count their frames.
+
+        Args:
+            numbers: as the files have them, (T,).
+            counted: whether they only count the frames, from 0 or 1. They are then the wanted ones, from the first to
+                the last, if there are as many.
+        """
+        wanted = self.numbers
+        if wanted is None or not counted or len(numbers) != wanted[-1] - wanted[0] + 1:
+            return numbers
+        return np.arange(wanted[0], wanted[-1] + 1)
+
+    def times(self, numbers: Integers, given: ArrayLike | None = None, *, rate: float | None = None) -> Floats:
+        """Return the times of frames, (T,), seconds: those of a file if they increase, or else by its rate.
+
+        Args:
+            numbers: numbers of the frames, (T,).
+            given: times in the file, (T,); None: it has none.
+            rate: frames per second that the file states; None or not positive: it states none.
+
+        Raises:
+            ValueError: neither the file nor the user states them.
+        """
+        times = np.asarray(numbers if given is None else given, float)
+        if given is not None and np.isfinite(times).all() and (np.diff(times) > 0).all():
+            return times
+        known = rate if rate is not None and 0.0 < rate < np.inf else self.rate
+        if known is None and len(numbers):
+            raise ValueError("states neither the times of frames nor frames per second; write it with one of them")
+        return np.asarray(numbers / (known or 1.0), float)
+
+
+def side_by_side(people: Sequence[People], files: PeopleFiles) -> People:
+    """Return the people of several files, each of one person, in all frames of any of them.
+
+    Frames are numbered as in the files; they only count the frames where all begin at 0 or 1.
+
+    Raises:
+        ValueError: files of different joints; the message names them.
+    """
+    first = people[0]
+    for each, path in zip(people, files.paths, strict=True):
+        if each.skeleton.joints != first.skeleton.joints:
+            raise ValueError(
+                f"{path}: expected the markers of {files.paths[0].name}, {', '.join(first.skeleton.joints)}; "
+                f"got {', '.join(each.skeleton.joints)}"
+            )
+    numbers = np.unique(np.concatenate([each.numbers for each in people]))
+    times = np.full(len(numbers), np.nan)
+    for each in people:
+        times[np.searchsorted(numbers, each.numbers)] = each.times
+    ids = np.concatenate([each.ids for each in people])
+    return People(
+        files.times(numbers, times, rate=first.rate),
+        ids if len(np.unique(ids)) == len(ids) else np.arange(len(ids)),
+        np.concatenate([each.at(numbers) for each in people], axis=1),
+        skeleton=first.skeleton,
+        numbers=files.renumbered(numbers, counted=all(each.numbers[0] in (0, 1) for each in people)),
+    )
+
+
+def identity_of(path: Path) -> int:
+    """Return the identity in the name of a file of one person, as our writers name it: 7 of "person_7.trc"; else 0."""
+    number = path.stem.removeprefix("person_")
+    return int(number) if number != path.stem and number.isdecimal() else 0
 
 
 @dataclass(frozen=True)
@@ -66,7 +172,7 @@ class Export:
     @cached_property
     def uniform(self) -> People:
         """The people at uniform times, for formats that state a rate instead of the time of each frame."""
-        return uniform(self.people)
+        return self.people.uniform()
 
     @cached_property
     def bodies(self) -> list[FittedBody]:

@@ -1,20 +1,36 @@
-"""Registry of the formats of tracked people, and the function that writes them.
+"""Registry of the formats of people over time, and the functions that read and write them.
 
 To add a format, write one module beside this one with a function ``write(export)`` that yields the name and the
-content of every file (:mod:`.trc` is an example), and add it to :data:`FORMATS`. Programs that use mvpose as a library
-call :func:`register` instead.
+content of every file, a function ``read(files) -> People``, or both (:mod:`.people_npz` is an example), and add it to
+:data:`FORMATS`. It is then written by ``mvpose estimate --format`` and read by ``simharness`` as truth, as people to
+score and as people to re-enact. Programs that use mvpose as a library call :func:`register` instead.
 """
 
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable, Iterable, Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from mvpose.files.atomic_files import write_atomic
-from mvpose.formats.people import bvh, c3d, gltf, panoptic_poses, people_json, people_tables, rerun, trc
-from mvpose.formats.people.people_files import Export, Options
+from mvpose.files.input_files import natural_order
+from mvpose.files.message_text import one_line
+from mvpose.formats.joint_names import JointNames
+from mvpose.formats.people import (
+    actors_mat,
+    bvh,
+    c3d,
+    gltf,
+    panoptic_poses,
+    people_json,
+    people_npz,
+    people_tables,
+    rerun,
+    trc,
+)
+from mvpose.formats.people.people_files import Export, Options, PeopleFiles, Up
 from mvpose.recording import People
 
 
@@ -23,36 +39,122 @@ class PeopleFormat:
     """Format of people over time.
 
     Attributes:
-        write: function that yields, for each file, its name relative to the folder and its content.
         files: names of its files, for help texts.
+        write: function that yields, for each file, its name relative to the folder and its content; None: only read.
+        read: function that reads people; None: only written.
+        found: pattern of its files in a folder, whose ending is that of a single file; "": not searched for.
+        in_folder: whether the reader takes the folder with its files.
         requires: packages that it imports.
         install: what ``pip install`` needs for these packages.
     """
 
-    write: Callable[[Export], Iterator[tuple[str, bytes]]]
     files: str
+    write: Callable[[Export], Iterator[tuple[str, bytes]]] | None = None
+    read: Callable[[PeopleFiles], People] | None = None
+    found: str = ""
+    in_folder: bool = False
     requires: tuple[str, ...] = ()
     install: str = "mvpose[recordings]"
 
 
 FORMATS: dict[str, PeopleFormat] = {
-    "trc": PeopleFormat(trc.write, "person_ID.trc"),
-    "c3d": PeopleFormat(c3d.write, "person_ID.c3d, or people.c3d", ("c3d",)),
-    "csv": PeopleFormat(people_tables.write_csv, "poses.csv", ("polars",)),
-    "parquet": PeopleFormat(people_tables.write_parquet, "poses.parquet", ("polars",)),
-    "json": PeopleFormat(people_json.write, "people.json"),
-    "panoptic": PeopleFormat(panoptic_poses.write, "hdPose3d/body3DScene_FRAME.json"),
-    "bvh": PeopleFormat(bvh.write, "person_ID.bvh"),
-    "gltf": PeopleFormat(gltf.write, "people.glb"),
-    "lengths": PeopleFormat(people_tables.write_lengths, "bone_lengths.csv"),
-    "rrd": PeopleFormat(rerun.write, "people.rrd", ("rerun",), "rerun-sdk"),
+    "parquet": PeopleFormat(
+        "poses.parquet", people_tables.write_parquet, people_tables.read, "poses.parquet", requires=("polars",)
+    ),
+    "json": PeopleFormat("people.json", people_json.write, people_json.read, "people.json"),
+    "npz": PeopleFormat("people.npz", people_npz.write, people_npz.read, "people.npz"),
+    "csv": PeopleFormat("poses.csv", people_tables.write_csv, people_tables.read, "poses.csv", requires=("polars",)),
+    "panoptic": PeopleFormat(
+        "hdPose3d/body3DScene_FRAME.json", panoptic_poses.write, panoptic_poses.read, "body3DScene_*.json", True
+    ),
+    "trc": PeopleFormat("person_ID.trc", trc.write, trc.read, "*.trc"),
+    "c3d": PeopleFormat("person_ID.c3d, or people.c3d", c3d.write, c3d.read, "*.c3d", requires=("c3d",)),
+    "actors-mat": PeopleFormat("actorsGT.mat", read=actors_mat.read, found="*.mat"),
+    "bvh": PeopleFormat("person_ID.bvh", bvh.write),
+    "gltf": PeopleFormat("people.glb", gltf.write),
+    "lengths": PeopleFormat("bone_lengths.csv", people_tables.write_lengths),
+    "rrd": PeopleFormat("people.rrd", rerun.write, requires=("rerun",), install="rerun-sdk"),
 }
-"""Registered formats by name."""
+"""Registered formats by name. Of a folder with files of several formats the first one is read."""
 
 
 def register(name: str, added: PeopleFormat) -> None:
     """Register a format."""
     FORMATS[name] = added
+
+
+def readable() -> list[str]:
+    """Return the names of the formats that are read."""
+    return [name for name, each in FORMATS.items() if each.read is not None]
+
+
+def writable() -> list[str]:
+    """Return the names of the formats that are written."""
+    return [name for name, each in FORMATS.items() if each.write is not None]
+
+
+def read_people(
+    paths: str | Path | Sequence[str | Path],
+    *,
+    format: str | None = None,
+    skeleton: JointNames | None = None,
+    up: Up | None = None,
+    rate: float | None = None,
+) -> People:
+    """Read people from files of any registered format.
+
+    Args:
+        paths: a file, a file for each person, or a folder of results: of ``mvpose estimate``, or of one of the formats.
+        format: name of the format; None: by the names of the files.
+        skeleton: joints of files that do not name them.
+        up: axis that points up in files that do not say it; None: the convention of the format.
+        rate: frames per second of files that do not say it.
+
+    Returns:
+        The people on the skeleton of the files, see :func:`mvpose.formats.joint_names.to_skeleton`.
+
+    Raises:
+        ValueError: no files, files of no known format, or anything wrong with one of them; the message names it.
+    """
+    given = tuple(map(Path, [paths] if isinstance(paths, str | Path) else paths))
+    name, files = _format_of(given) if format is None else (format, given)
+    read = FORMATS[name].read if name in FORMATS else None
+    if read is None:
+        raise ValueError(f"people in the format {name!r} cannot be read; expected one of {', '.join(readable())}")
+    return read(PeopleFiles(files, skeleton, up, rate))
+
+
+def people_files(path: Path) -> list[Path]:
+    """Return the files that :func:`read_people` may read, given a file or folder; itself where it is none of people."""
+    try:
+        name, files = _format_of((path,))
+    except ValueError:
+        return [path]
+    folder = files[0] if FORMATS[name].in_folder else files[0].parent
+    about = folder / people_tables.INPUTS
+    found = sorted(folder.glob(FORMATS[name].found)) if FORMATS[name].in_folder else list(files)
+    return found + [about] * about.is_file()
+
+
+def _format_of(paths: tuple[Path, ...]) -> tuple[str, tuple[Path, ...]]:
+    """Return the format of files, and the files that its reader takes."""
+    first = paths[0]
+    if len(paths) > 1 or not os.path.isdir(first):
+        endings = {name: Path(FORMATS[name].found).suffix for name in readable() if not FORMATS[name].in_folder}
+        for name, ending in endings.items():
+            if ending and first.suffix.lower() == ending:
+                return name, paths
+        known = ", ".join(f"*{each}" for each in dict.fromkeys(filter(None, endings.values())))
+        raise ValueError(one_line(f"{first}: expected people over time, {known}, or a folder with such files"))
+    for name in readable():
+        for folder in (first, *sorted(each for each in first.iterdir() if each.is_dir())):
+            pattern = FORMATS[name].found
+            if pattern and (found := sorted(folder.glob(pattern), key=natural_order)):
+                return name, (folder,) if FORMATS[name].in_folder else tuple(found)
+    known = ", ".join(FORMATS[name].found for name in readable() if FORMATS[name].found)
+    raise ValueError(
+        one_line(f"{first}: has no files of people; expected a folder that `mvpose estimate --out` made, or {known}")
+    )
 
 
 def check_formats(names: Iterable[str]) -> None:
@@ -62,8 +164,8 @@ def check_formats(names: Iterable[str]) -> None:
         ValueError: an unknown format, or a package that is missing; the message has the command to install it.
     """
     for name in names:
-        if name not in FORMATS:
-            raise ValueError(f"unknown format {name!r} of people; expected one of {', '.join(FORMATS)}")
+        if name not in writable():
+            raise ValueError(f"unknown format {name!r} of people; expected one of {', '.join(writable())}")
         missing = [package for package in FORMATS[name].requires if importlib.util.find_spec(package) is None]
         if missing:
             raise ValueError(
@@ -97,7 +199,9 @@ def write_people(
     export = Export(people, options or Options())
     written = []
     for name in formats:
-        for file, content in list(FORMATS[name].write(export)):  # complete in memory before the first file
+        write = FORMATS[name].write
+        assert write is not None, "checked above"
+        for file, content in list(write(export)):  # complete in memory before the first file
             path = folder / file
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)

@@ -14,9 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from mvpose.formats.people.people_files import Export
+from mvpose.checks import as_array
+from mvpose.files.input_files import read_json_object
+from mvpose.files.message_text import one_line
+from mvpose.formats.joint_names import JointNames, skeleton_of
+from mvpose.formats.people.people_files import AXES, Export, PeopleFiles
+from mvpose.recording import People
+from mvpose.skeleton import Skeleton
 
+_FORMAT = "mvpose people"
 _DECIMALS = 6  # micrometres, microseconds
+_WHAT = "people.json of mvpose: an object with skeleton and frames"
 
 
 def write(export: Export) -> Iterator[tuple[str, bytes]]:
@@ -24,7 +32,7 @@ def write(export: Export) -> Iterator[tuple[str, bytes]]:
     people = export.people
     skeleton = people.skeleton
     head = {
-        "format": "mvpose people",
+        "format": _FORMAT,
         "version": 1,
         "units": "m",
         "up": export.options.up or "z",
@@ -40,7 +48,7 @@ def write(export: Export) -> Iterator[tuple[str, bytes]]:
             {"id": int(people.ids[column]), key: _nulls(values[k, column].ravel().tolist())}
             for column in np.flatnonzero(present[k])
         ]
-        frames.append(_compact({"frame": k, "time": round(time, _DECIMALS), "bodies": bodies}))
+        frames.append(_compact({"frame": int(people.numbers[k]), "time": round(time, _DECIMALS), "bodies": bodies}))
     text = json.dumps(head, indent=1)[:-2] + ',\n "frames": [\n' + ",\n".join(frames) + "\n]}\n"
     yield "people.json", text.encode()
 
@@ -52,3 +60,48 @@ def _compact(value: object) -> str:
 def _nulls(values: list[float]) -> list[float | None]:
     """Return values with None, which JSON writes as null, instead of NaN."""
     return [None if math.isnan(value) else value for value in values]
+
+
+def read(files: PeopleFiles) -> People:
+    """Read the people of a file.
+
+    Raises:
+        ValueError: no such file, or one of another layout.
+    """
+    path = files.single()
+    content = read_json_object(path, what=_WHAT)
+    try:
+        return _people(content, files)
+    except (KeyError, TypeError, IndexError) as error:
+        raise ValueError(one_line(f"{path}: {type(error).__name__}: {error}; expected {_WHAT}")) from None
+    except (ValueError, OverflowError) as error:
+        raise ValueError(one_line(f"{path}: {error}; expected {_WHAT}")) from None
+
+
+def _people(content: dict[str, Any], files: PeopleFiles) -> People:
+    skeleton = _skeleton(content["skeleton"])
+    frames, count = content["frames"], len(skeleton)
+    ids = sorted({int(body["id"]) for frame in frames for body in frame["bodies"]})
+    values = np.full((len(frames), len(ids), count, 4), np.nan)
+    for row, frame in enumerate(frames):
+        for body in frame["bodies"]:
+            flat = as_array(body[f"joints{count}"], (4 * count,), f"frame {row}: joints{count}")
+            values[row, ids.index(int(body["id"]))] = flat.reshape(count, 4)
+    numbers = np.array([frame["frame"] for frame in frames], np.int64)
+    return People(
+        files.times(numbers, [frame["time"] for frame in frames], rate=float(content["rate"])),
+        ids,
+        values[..., :3] @ AXES[content["up"]],
+        np.nan_to_num(values[..., 3]),
+        skeleton=skeleton,
+        numbers=files.renumbered(numbers, counted=bool(len(numbers)) and numbers[0] == 0),
+    )
+
+
+def _skeleton(given: dict[str, Any]) -> Skeleton:
+    """Return the shipped skeleton of these joints, or the tree of the file."""
+    name, joints = str(given["name"]), tuple(map(str, given["joints"]))
+    known = skeleton_of(JointNames(name, joints))
+    if known.name != name or known.parents == tuple(given["parents"]):
+        return known
+    return Skeleton(name, joints, tuple(given["parents"]), known.mirror, known.sigmas)

@@ -1,22 +1,37 @@
-"""Markers of one person in a TRC file, the text format of Motion Analysis that OpenSim and Pose2Sim read.
+"""Markers of one person in a TRC file, the text format of Motion Analysis that OpenSim and Pose2Sim read and write.
 
-Five lines of header, then a line for each frame from the first to the last in which the person is present: its number
-from 1, its time, and x, y, z of every marker. An empty cell is an undefined coordinate. Every cell ends with a tab, as
-in the files of OpenSim, whose reader would not see an empty last cell otherwise (``OpenSim/Common/FileAdapter.cpp``).
+Five lines of header, the third of which names the markers, then a line for each frame: its number, its time, and x, y,
+z of every marker in the unit of the header, separated by tabs. An empty cell is an undefined coordinate. Files that we
+write have the frames from the first to the last in which the person is present, numbered from 1, and a tab behind every
+cell, as files of OpenSim, whose reader would not see an empty last cell otherwise (``OpenSim/Common/FileAdapter.cpp``).
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
-from mvpose.formats.people.people_files import Export, each_person, marker_label
+from mvpose.files.input_files import read_bytes
+from mvpose.formats.joint_names import JointNames, skeleton_of
+from mvpose.formats.people.people_files import (
+    METRES,
+    Export,
+    PeopleFiles,
+    each_person,
+    identity_of,
+    marker_label,
+    side_by_side,
+)
+from mvpose.recording import People
 
 _KEYS = (
     "DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame", "OrigNumFrames",
 )  # fmt: skip
 _DECIMALS = {"m": 6, "mm": 3}  # micrometres
+_WHAT = "a TRC file: a header with Units, a line 'Frame# Time MARKER ...', and a line for each frame"
 
 
 def write(export: Export) -> Iterator[tuple[str, bytes]]:
@@ -41,3 +56,74 @@ def write(export: Export) -> Iterator[tuple[str, bytes]]:
             cells = "".join("\t" if missing else cell % x for x, missing in zip(pose, np.isnan(pose), strict=True))
             lines.append(f"{frame + 1}\t{people.times[frame]:.6f}\t{cells}")
         yield name, ("\n".join(lines) + "\n").encode()
+
+
+def read(files: PeopleFiles) -> People:
+    """Read the markers of one person from each file; y up unless the files are said to have z up.
+
+    Raises:
+        ValueError: a file is missing or of another layout, has a marker in an unknown unit, or other markers than the
+            first file.
+    """
+    return side_by_side([_read_person(path, files) for path in files.paths], files)
+
+
+def _read_person(path: Path, files: PeopleFiles) -> People:
+    lines = read_bytes(path, what=_WHAT).decode("utf-8-sig", errors="replace").splitlines()
+    header = next((row for row, line in enumerate(lines) if line.lower().startswith("frame#")), None)
+    if header is None or header < 2:
+        raise ValueError(f"{path}: no line that begins with Frame#; expected {_WHAT}")
+    names = tuple(cell.strip() for cell in lines[header].split("\t")[2:] if cell.strip())
+    if not names:
+        raise ValueError(f"{path}: no marker behind Frame# and Time; expected {_WHAT}, separated by tabs")
+    metres, rate = _units_and_rate(path, lines[:header])
+    numbers, times, values = [], [], []
+    for row, line in enumerate(lines[header + 1 :], start=header + 2):
+        cells = [cell.strip() for cell in line.split("\t")]
+        if not cells[0]:  # the line X1 Y1 Z1 ..., and empty lines
+            continue
+        try:
+            found = [float(cell) if cell else np.nan for cell in cells[2 : 2 + 3 * len(names)]]
+            numbers.append(int(float(cells[0])))
+        except (ValueError, OverflowError):  # an infinite frame number
+            raise ValueError(f"{path}, line {row}: expected numbers, got {line[:60]!r}") from None
+        if any(cells[2 + 3 * len(names) :]):
+            raise ValueError(
+                f"{path}, line {row}: expected {3 * len(names)} coordinates of {len(names)} markers, got "
+                f"{len(cells) - 2}"
+            )
+        times.append(_number(cells[1]) if len(cells) > 1 else np.nan)
+        values.append(found + [np.nan] * (3 * len(names) - len(found)))
+    if not values:
+        raise ValueError(f"{path}: has no frames; expected {_WHAT}")
+    markers = metres * np.array(values).reshape(-1, len(names), 3)
+    try:
+        return People(
+            files.times(np.array(numbers), times, rate=rate),
+            [identity_of(path)],
+            (markers @ files.axes("y").T)[:, None],
+            skeleton=skeleton_of(JointNames(path.name, names)),
+            numbers=np.array(numbers),
+        )
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _units_and_rate(path: Path, header: list[str]) -> tuple[float, float]:
+    """Return the metres per unit and the frames per second (NaN: none) below the words of a header."""
+    for keys, values in itertools.pairwise(header):
+        columns = [cell.strip().lower() for cell in keys.split("\t")]
+        if "units" in columns:
+            cells = dict(zip(columns, [cell.strip().lower() for cell in values.split("\t")], strict=False))
+            unit = cells.get("units", "")
+            if unit in METRES:
+                return METRES[unit], _number(cells.get("datarate", ""))
+            raise ValueError(f"{path}: Units must be one of {', '.join(METRES)}, got {unit!r}")
+    raise ValueError(f"{path}: the header has no Units; expected {_WHAT}")
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return np.nan

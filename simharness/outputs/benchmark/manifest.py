@@ -10,7 +10,7 @@ import numpy as np
 from mvpose.formats.joint_names import BODY_25
 from mvpose.skeleton import COCO17, PANOPTIC19
 from mvpose.wholebody import skeleton_by_name
-from simharness.formats.panoptic_poses import CONFIDENCES
+from simharness.outputs.benchmark.joint_confidences import CONFIDENCES
 from simharness.outputs.benchmark.layout import BODIES, FORMAT, PEOPLE, PICTURES
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.provenance import provenance

@@ -24,9 +24,11 @@ from mvpose.commands.progress import Reporter, Silence, Stages
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.formats.calibration.panoptic import write_calibration
 from mvpose.formats.detections.openpose import people_file
+from mvpose.formats.people import write_people
+from mvpose.formats.people.panoptic_poses import body_scene
+from mvpose.recording import People
 from mvpose.skeleton import PANOPTIC19
-from simharness.formats.npz_joints import write_tracks
-from simharness.formats.panoptic_poses import body_scene, confidences
+from simharness.outputs.benchmark.joint_confidences import confidences
 from simharness.outputs.benchmark.layout import Layout, check_place
 from simharness.outputs.benchmark.manifest import manifest
 from simharness.reality.annotation_errors import annotate_simulation
@@ -205,11 +207,12 @@ def _write_description(layout: Layout, scenario: Scenario, joints: Floats, frame
         frames: exported frames.
         believed: whether the layout has a believed calibration, which is then the calibration of the recording.
     """
-    numbers = list(range(len(frames)))
-    write_tracks(layout.truth, joints[list(frames)], names=SHELF14.joints, frames=numbers)
+    rate = scenario.rate / frames.step
+    truth = People(np.arange(len(frames)) / rate, np.arange(joints.shape[1]), joints[list(frames)], skeleton=SHELF14)
+    write_people(truth, layout.truth.parent, formats=["npz"])[0].rename(layout.truth)
     keys: dict[str, Any] = {
         "name": scenario.name,
-        "rate": scenario.rate / frames.step,
+        "rate": rate,
         "frames": [[0, len(frames) - 1]],
         "calibration": {"file": (layout.believed if believed else layout.calibration).name},
         "detections": {

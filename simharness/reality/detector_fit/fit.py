@@ -21,6 +21,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.files.atomic_files import write_atomic
+from mvpose.recording import People
 from simharness.detector.bias import SIDE, body_axes
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationFit, fit_annotation
@@ -33,7 +34,7 @@ from simharness.reality.detector_fit.detector_measurement import (
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.profile import as_toml, settings
 from simharness.reality.detector_fit.sample import Sample, sample_of
-from simharness.reality.people_tracks import LIMB_JOINTS, TrackedPeople, track_people
+from simharness.reality.people_tracks import LIMB_JOINTS, track_people
 from simharness.reality.reenactment import Film, film
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
 
@@ -74,7 +75,7 @@ class DetectorFit:
 
     real: MeasuredDetector
     annotation: AnnotationFit
-    people: TrackedPeople
+    people: People
     film: Film
     profile: DetectorSection
     text: str

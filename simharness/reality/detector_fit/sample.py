@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from mvpose import COCO17, Detections, Rig
 from mvpose.arrays import Bools, Floats
 from mvpose.checks import as_array
+from mvpose.recording import People
 from simharness.detector.conditions import Conditions
 from simharness.reality.annotated_recording import AnnotatedRecording, DetectorKind
-from simharness.reality.people_tracks import LIMB_JOINTS, TrackedPeople
+from simharness.reality.people_tracks import LIMB_JOINTS, annotated
 from simharness.reality.reenactment import Film
 
 
@@ -80,25 +81,25 @@ class Sample:
         return float(np.min(np.diff(self.time), initial=np.inf)) if len(self.time) > 1 else 1.0
 
 
-def sample_of(recording: AnnotatedRecording, tracks: TrackedPeople, film: Film | None = None) -> Sample:
+def sample_of(recording: AnnotatedRecording, people: People, film: Film | None = None) -> Sample:
     """Return the sample of a recording: the joints of everyone in it, and its detections.
 
     The detections of people who are annotated are measured; where nobody is, those of everyone.
 
     Args:
         recording: the recording.
-        tracks: who is where.
+        people: who is where.
         film: its re-enactment, which shows what hides what; None: estimated from skeletons.
     """
-    annotated = tracks.annotated(recording.truth)
+    measured = annotated(people, recording.truth)
     return Sample(
         recording.name,
         recording.rig,
         recording.time,
-        tracks.joints,
+        people.joints,
         recording.detections,
         recording.kind,
         staged=None if film is None else film.joints,
         occlusion=None if film is None else Conditions.of(film.views).occlusion,
-        measured=annotated if annotated.any() else None,
+        measured=measured if measured.any() else None,
     )

@@ -42,16 +42,17 @@ class MocapSection(Section):
 
     file: str = Field(
         "",
-        description="AMC or BVH file, which people perform in random places, or NPZ file of joint tracks, which they "
-        "re-enact at the recorded places, person i track i; relative to the scenario file; empty: none",
+        description="AMC or BVH file, which people perform in random places; or a file or folder of people over time, "
+        "in any format that mvpose reads, whom they re-enact at the recorded places, person by person; relative to the "
+        "scenario file; empty: none",
     )
     skeleton: str = Field("", description="ASF file of an AMC file; empty: the only one in the same folder")
     start: Span = Field(0.0, description="start time in the recording, seconds")
 
     @property
     def tracks(self) -> bool:
-        """Whether the file holds joint tracks, which people re-enact."""
-        return self.file.lower().endswith(".npz")
+        """Whether the file holds recorded people, whom those of the scenario re-enact."""
+        return bool(self.file) and not self.file.lower().endswith((".amc", ".bvh"))
 
 
 class TrafficSection(Section):
@@ -166,7 +167,7 @@ class PeopleSection(Section):
             raise ValueError(f"people.push.person below people.count = {self.count}, got {self.push.person}")
         if self.motion.tracks and set(self.activities) != {"mocap"}:
             raise ValueError(
-                'people.activities = ["mocap"] with the joint tracks of people.motion.file, because every person '
-                "re-enacts a track: leave activities out"
+                'people.activities = ["mocap"] with the recorded people of people.motion.file, because every person '
+                "re-enacts one of them: leave activities out"
             )
         return self

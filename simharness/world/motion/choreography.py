@@ -188,16 +188,16 @@ def _recorded(scenario: Scenario) -> Activity:
 
 
 def _reenacted(scenario: Scenario, cast: Sequence[Kinematics], time: Floats) -> tuple[Motion, ...]:
-    """Return the motions of people who re-enact joint tracks.
+    """Return the motions of people who re-enact recorded ones.
 
     Raises:
-        ValueError: the file is not valid or does not fit the scenario, or a track leaves the room.
+        ValueError: the file is not valid or does not fit the scenario, or somebody leaves the room.
     """
-    from simharness.world.motion.mocap import load_tracks, reenact
+    from simharness.world.motion.mocap import load_people, reenact
 
-    tracks = load_tracks(scenario.people)
+    recorded = load_people(scenario.people)
     motions = tuple(
-        replace(reenact(tracks, person, mover, time=time + scenario.people.motion.start), time=time)
+        replace(reenact(recorded, person, mover, time=time + scenario.people.motion.start), time=time)
         for person, mover in enumerate(cast)
     )
     size = scenario.room.size[:2]

@@ -29,7 +29,7 @@ from simharness.world.humans.population import draw_shape, is_child
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import Look, draw_looks
 from simharness.world.motion.choreography import choreograph
-from simharness.world.motion.mocap import load_tracks, recorded_shape
+from simharness.world.motion.mocap import load_people, recorded_shape
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.presence import Presence, held
@@ -165,13 +165,13 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
 
 
 def _shapes(scenario: Scenario) -> list[Shape]:
-    """Return the shapes of all people; people who re-enact joint tracks have the recorded size."""
+    """Return the shapes of all people; people who re-enact recorded ones have their size."""
     seed, people = scenario.seed, scenario.people
     shapes = [shape_of_person(seed, i, people.children) for i in range(people.count)]
     if not people.motion.tracks:
         return shapes
-    tracks = load_tracks(people)
-    return [recorded_shape(shape, tracks, i) for i, shape in enumerate(shapes)]
+    recorded = load_people(people)
+    return [recorded_shape(shape, recorded, i) for i, shape in enumerate(shapes)]
 
 
 def compile_model(cast: Sequence[Kinematics], solids: Sequence[Solid]) -> mujoco.MjModel:

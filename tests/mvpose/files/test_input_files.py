@@ -105,7 +105,7 @@ AROUND = {
     "mvpose/kernels.py": "code",
     "mvpose/files/input_files.py": "the reader",
     "mvpose/files/archives.py": "bytes that were read",
-    "mvpose/formats/people_table.py": "bytes that were read",
+    "mvpose/formats/people/people_tables.py": "bytes that were read",
     "simharness/runtime/parquet_tables.py": "bytes that were read",
     "simharness/planning/search.py": "text that was just written",
     "simharness/outputs/run/run_film.py": "a film that was just written",

@@ -251,7 +251,7 @@ class TestUniformTimes:
 
 class TestRegistry:
     def test_unknown_formats_and_missing_packages_are_found_before_anything_is_written(self, tmp_path):
-        with pytest.raises(ValueError, match="unknown format 'fbx' of people; expected one of trc, c3d"):
+        with pytest.raises(ValueError, match="unknown format 'fbx' of people; expected one of parquet, json"):
             write_people(recording(), tmp_path / "out", formats=["trc", "fbx"])
         register("odd", PeopleFormat(FORMATS["trc"].write, "x", ("no_such_package",), "mvpose[odd]"))
         try:

@@ -16,33 +16,33 @@ from onnx_graphs import Graph
 from pair_of_cameras import RIG
 from test_mocap_asf import AMC, ASF
 from test_mocap_bvh import BVH
+from test_people_readers import cells, tracks, write_c3d, write_mat, write_trc
 from test_store import make_record
-from test_track_formats import cells, tracks, write_c3d, write_mat, write_trc
 
 from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
 from mvpose.formats.calibration.calibration_formats import read_calibration
 from mvpose.formats.detection_files import DetectionFiles
 from mvpose.formats.detection_formats import FORMATS as DETECTIONS
+from mvpose.formats.people import FORMATS, PeopleFiles, write_people
 from mvpose.networks import Session
+from mvpose.recording import People
+from mvpose.skeleton import PANOPTIC19
 from simharness.detector.descriptor_model import DescriptorModel
-from simharness.formats.joint_tracks import TrackFiles
-from simharness.formats.npz_joints import write_tracks
-from simharness.formats.panoptic_poses import body_scene
-from simharness.formats.track_formats import FORMATS as TRACKS
 from simharness.gate.baseline import KEPT, Measurement, read_baseline, write_baseline
 from simharness.gate.trial_command import TrialKey
 from simharness.outputs.benchmark.layout import check_place
 from simharness.reality.recording_file import read_keys
 from simharness.scenario.load import load
 from simharness.scenario.presets import read_profile
+from simharness.scenario.sections.people_section import MocapSection, PeopleSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import load_study
 from simharness.study.study_folder import Tables, read_study, write_study
 from simharness.study.trial_store import Entry, Store
 from simharness.trial.run_folder import read_run, write_run
+from simharness.world.motion.mocap import load_people
 from simharness.world.motion.mocap.asf import read_amc, read_asf
 from simharness.world.motion.mocap.bvh import read_bvh
-from simharness.world.motion.mocap.joint_tracks import read_joint_tracks, tracks_file
 
 TESTS = Path(__file__).parents[2]
 IDENTITY = "ab" * 16
@@ -92,20 +92,20 @@ def detections(file, kind):
 
 def joints(kind, file, write):
     path = "." if kind == "panoptic" else file
-    return ReaderCase(file, write, lambda folder: TRACKS[kind].read(TrackFiles((folder / path,), np.arange(4))))
+    return ReaderCase(file, write, lambda folder: FORMATS[kind].read(PeopleFiles((folder / path,), rate=25.0)))
 
 
 def write_panoptic_people(folder):
-    people = np.random.default_rng(0).normal(size=(2, 19, 3))
-    scene = body_scene(people, np.ones((2, 19)), ids=(0, 1), time=0.0, rate=25.0)
-    (folder / "body3DScene_00000000.json").write_text(json.dumps(scene))
+    joints = np.random.default_rng(0).normal(size=(1, 2, 19, 3))
+    (file,) = write_people(People([0.0], [0, 1], joints, skeleton=PANOPTIC19), folder, formats=["panoptic"])
+    file.rename(folder / file.name)
 
 
 def write_standing(folder):
     from_person = np.zeros((3, 1, 17, 3))
     from_person[..., 5, :], from_person[..., 6, :] = (0, 0.2, 1.4), (0, -0.2, 1.4)
     from_person[..., 11, :], from_person[..., 12, :] = (0, 0.1, 0.9), (0, -0.1, 0.9)
-    tracks_file(folder / "people.npz", from_person, 25.0)
+    write_people(People(np.arange(3) / 25.0, [0], from_person), folder, formats=("npz", "json", "csv", "parquet"))
 
 
 def write_acclaim(folder):
@@ -213,13 +213,14 @@ CASES = {
     "Panoptic people": joints("panoptic", "body3DScene_00000000.json", write_panoptic_people),
     "TRC markers": joints("trc", "a.trc", lambda folder: write_trc(folder / "a.trc", tracks()[:, 0])),
     "C3D markers": joints("c3d", "a.c3d", lambda folder: write_c3d(folder / "a.c3d", tracks()[:, 0])),
-    "NumPy joints": joints(
-        "npz",
-        "a.npz",
-        lambda folder: write_tracks(folder / "a.npz", tracks(), names=("a", "b", "c"), frames=np.arange(4)),
-    ),
-    "NumPy people to re-enact": ReaderCase(
-        "people.npz", write_standing, lambda folder: read_joint_tracks(folder / "people.npz")
+    "NumPy people": joints("npz", "people.npz", write_standing),
+    "JSON people": joints("json", "people.json", write_standing),
+    "CSV people": joints("csv", "poses.csv", write_standing),
+    "Parquet people": joints("parquet", "poses.parquet", write_standing),
+    "people to re-enact": ReaderCase(
+        "people.npz",
+        write_standing,
+        lambda folder: load_people(PeopleSection(count=1, motion=MocapSection(file=str(folder / "people.npz")))),
     ),
     "BVH motion": written("a.bvh", BVH, lambda path: read_bvh(path).pose()),
     "AMC motion": ReaderCase("a.amc", write_acclaim, read_acclaim),

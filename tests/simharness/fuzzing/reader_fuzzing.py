@@ -17,7 +17,7 @@ from pathlib import Path
 
 LONGEST = 5.0  # seconds of processor time that a reader may take for a file
 _PATIENCE = 60.0  # seconds of waiting for an answer, on a machine with other work
-_HELPERS = (".", *(f"simharness/{name}" for name in ("formats", "trial", "study", "outputs", "world/motion")))
+_HELPERS = (".", "mvpose/formats", *(f"simharness/{name}" for name in ("trial", "study", "outputs", "world/motion")))
 _SHOWN = 12  # problems of a reader that the table lists
 _START = 300.0  # seconds of waiting for a worker: kernels compile
 

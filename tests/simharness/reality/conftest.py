@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from filmed_people import FilmedPeople, Reenacted, film_people
 
-from simharness.reality.people_tracks import TrackedPeople
+from mvpose.recording import People
 from simharness.reality.reenactment import film
 
 
@@ -23,6 +23,6 @@ def reenacted(filmed) -> Reenacted:
     joints[30:, 2] = np.nan
     truth = recording.truth.copy()
     truth[30:, 2] = np.nan
-    people = TrackedPeople(joints, np.array([1, 0, 2]))
+    people = People(frames / 25.0, [1, 0, 2], joints, numbers=frames)
     recording = replace(recording, truth=truth, frames=frames)
     return Reenacted(recording, people, film(recording, people, seed=0))

@@ -6,12 +6,12 @@ import numpy as np
 
 from mvpose import Detections, Rig
 from mvpose.commands.progress import Silence, Stages
+from mvpose.recording import People
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.sample import Sample
-from simharness.reality.people_tracks import TrackedPeople
 from simharness.reality.reenactment import Film
 from simharness.scenario.load import load
 from simharness.scenario.sections.detector_section import DetectorSection
@@ -62,7 +62,7 @@ class Reenacted:
     """Recording, its people, and the film in which bodies re-enact them."""
 
     recording: AnnotatedRecording
-    people: TrackedPeople
+    people: People
     film: Film
 
 

@@ -10,12 +10,12 @@ from small_recording import PERSON, small_recording
 from typer.testing import CliRunner
 
 from mvpose import COCO17, Skeleton
-from mvpose.formats.people import write_people
-from mvpose.formats.people_table import read_people
+from mvpose.formats.joint_names import to_skeleton
+from mvpose.formats.people import read_people, write_people
 from mvpose.recording import People
 from simharness.cli import app
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
-from simharness.reality.people_evaluation import evaluate_people
+from simharness.reality.evaluation import evaluate_people
 from simharness.scenario.load import load
 
 
@@ -97,7 +97,7 @@ class TestReading:
         (tmp_path / "inputs.json").unlink()
         assert read_people(tmp_path).frames == 5  # nobody is in the last one
         few = skeleton("few", "left_knee", "nose", "tail")
-        knees = read_people(tmp_path, skeleton=few)
+        knees = to_skeleton(read_people(tmp_path), few)
         np.testing.assert_array_equal(knees.joints[:, :, 0], people.joints[:5, :, COCO17.index("left_knee")])
         assert not knees.present[:, :, 2].any()
 
@@ -106,7 +106,6 @@ class TestReading:
         [
             (lambda table: table.drop("score"), "has no column score"),
             (lambda table: pl.concat([table, table[:1]]), "two rows for one joint"),
-            (lambda table: table.with_columns(joint=pl.lit("tail")), "has no joint of the skeleton coco17, but tail"),
             (lambda table: table.with_columns(frame=pl.col("frame") + 0.5), "frame must hold whole numbers"),
             (lambda table: table.with_columns(frame=pl.col("frame") - 1), "count from 0, got -1 to 1"),
             (lambda table: table.with_columns(score=pl.lit(7.0)), "scores must lie in 0..1"),
@@ -126,7 +125,8 @@ class TestReading:
         with pytest.raises(ValueError, match=r"poses\.parquet: "):
             read_people(tmp_path)
         (tmp_path / "poses.parquet").unlink()
-        with pytest.raises(ValueError, match=r"has no poses.parquet; expected a folder that `mvpose estimate"):
+        (tmp_path / "inputs.json").unlink(missing_ok=True)
+        with pytest.raises(ValueError, match=r"has no files of people; expected a folder that `mvpose estimate"):
             read_people(tmp_path)
         write_people(two_people(), tmp_path, formats=("parquet",))
         (tmp_path / "inputs.json").write_text('{"numbers": [1]}')
@@ -162,4 +162,4 @@ class TestCommand:
     def test_messages(self, tmp_path):
         result = CliRunner().invoke(app, ["evaluate", "poses", "shelf", str(tmp_path)])
         assert result.exit_code == 2
-        assert "has no poses.parquet" in result.stderr
+        assert "has no files of people" in result.stderr

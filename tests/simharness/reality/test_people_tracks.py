@@ -8,7 +8,7 @@ from filmed_people import without_views
 from turning_people import walkers
 
 from mvpose import Detections
-from simharness.reality.people_tracks import LIMB_JOINTS, track_people
+from simharness.reality.people_tracks import LIMB_JOINTS, annotated, present, track_people
 
 NOISY = {
     "keypoints": {"scatter": 0.4, "jitter": 0.1, "miss": 0.03, "drop": {"self_occluded": 0.1, "occluded": 0.3}},
@@ -31,12 +31,12 @@ def tracked(noisy):
 
 def errors(tracks, joints):
     """Distances (F, P, 17) of tracks from the joints (F, A, 17, 3) of their actors."""
-    return np.linalg.norm(tracks.joints - joints[:, tracks.actor], axis=-1)
+    return np.linalg.norm(tracks.joints - joints[:, tracks.ids], axis=-1)
 
 
 def test_tracks_of_perfect_detections_are_within_centimetres_of_the_truth(filmed):
     tracks = track_people(filmed.recording())
-    assert sorted(tracks.actor) == [0, 1, 2]
+    assert sorted(tracks.ids) == [0, 1, 2]
     assert tracks.present.all()
     away = errors(tracks, filmed.sequence.joints)[..., LIMB_JOINTS]
     assert np.median(away) < 0.003
@@ -44,9 +44,9 @@ def test_tracks_of_perfect_detections_are_within_centimetres_of_the_truth(filmed
 
 
 def test_tracks_of_a_poor_detector_are_within_centimetres_of_the_truth(filmed, tracked):
-    assert sorted(tracked.actor) == [0, 1, 2]  # one track for each person, none for phantoms
+    assert sorted(tracked.ids) == [0, 1, 2]  # one track for each person, none for phantoms
     assert tracked.present.mean() > 0.97
-    away = errors(tracked, filmed.sequence.joints)[..., LIMB_JOINTS][tracked.present]
+    away = errors(tracked, filmed.sequence.joints)[..., LIMB_JOINTS][present(tracked)]
     assert np.median(away) < 0.02
     assert np.quantile(away, 0.95) < 0.06
 
@@ -60,7 +60,7 @@ def test_tracks_move_as_smoothly_as_people(filmed, tracked):
 def test_all_joints_of_a_person_are_known_or_none(tracked):
     known = np.isfinite(tracked.joints).all(axis=-1)
     assert (known.all(axis=-1) == known.any(axis=-1)).all()
-    assert (known.all(axis=-1) == tracked.present).all()
+    assert (known.all(axis=-1) == present(tracked)).all()
 
 
 def test_people_who_are_never_annotated_have_a_track_without_an_actor(filmed):
@@ -68,11 +68,11 @@ def test_people_who_are_never_annotated_have_a_track_without_an_actor(filmed):
     truth = recording.truth.copy()
     truth[:, 1] = np.nan
     tracks = track_people(replace(recording, truth=truth))
-    assert sorted(tracks.actor) == [-1, 0, 2]
-    stranger = tracks.joints[:, tracks.actor == -1]
+    assert sorted(tracks.ids) == [0, 2, 3]  # 3 is the first number that is no actor
+    stranger = tracks.joints[:, tracks.ids == 3]
     away = np.linalg.norm(stranger[:, 0] - filmed.sequence.joints[:, 1], axis=-1)
     assert np.median(away[:, LIMB_JOINTS]) < 0.003
-    assert not tracks.annotated(truth)[:, tracks.actor == -1].any()
+    assert not annotated(tracks, truth)[:, tracks.ids == 3].any()
 
 
 def test_annotated_people_are_present_and_annotated_in_the_frame(filmed):
@@ -81,10 +81,10 @@ def test_annotated_people_are_present_and_annotated_in_the_frame(filmed):
     truth[:50, 0] = np.nan
     truth[60, 2, 3] = np.nan
     tracks = track_people(replace(recording, truth=truth))
-    annotated = tracks.annotated(truth)
+    found = annotated(tracks, truth)
     expected = np.ones((len(recording), 3), bool)
     expected[:50, 0] = expected[60, 2] = False
-    np.testing.assert_array_equal(annotated, expected[:, tracks.actor])
+    np.testing.assert_array_equal(found, expected[:, tracks.ids])
     assert tracks.present.all()  # also where nobody annotated them
 
 
@@ -117,12 +117,12 @@ def test_people_who_leave_and_come_back_are_absent_in_between_and_keep_their_act
     truth = recording.truth.copy()
     truth[list(away), person] = np.nan
     tracks = track_people(replace(left, truth=truth))
-    assert sorted(tracks.actor) == [0, 1, 2]
-    present = tracks.present[:, list(tracks.actor).index(person)]
-    assert not present[list(away)].any()
-    assert present[: away[0]].all()
-    assert present[away[-1] + 1 :].all()
-    assert tracks.present[:, tracks.actor != person].all()
+    assert sorted(tracks.ids) == [0, 1, 2]
+    here = present(tracks)[:, list(tracks.ids).index(person)]
+    assert not here[list(away)].any()
+    assert here[: away[0]].all()
+    assert here[away[-1] + 1 :].all()
+    assert tracks.present[:, tracks.ids != person].all()
 
 
 def test_gaps_between_frames_are_not_bridged(filmed):
@@ -137,11 +137,11 @@ def test_gaps_between_frames_are_not_bridged(filmed):
         detections=tuple(recording.detections[row] for row in order),
     )
     tracks = track_people(cut)
-    assert sorted(tracks.actor) == [0, 1, 2]
+    assert sorted(tracks.ids) == [0, 1, 2]
     away = errors(tracks, filmed.sequence.joints[order])[..., LIMB_JOINTS]
     assert away[[78, 79, 80, 81]].mean() < 0.01
     whole = track_people(recording.during(range(80)))
-    order = [list(whole.actor).index(actor) for actor in tracks.actor]
+    order = [list(whole.ids).index(actor) for actor in tracks.ids]
     np.testing.assert_allclose(tracks.joints[:80], whole.joints[:, order], atol=1e-9)
 
 
@@ -154,8 +154,8 @@ def test_actors_without_any_estimate_are_taken_from_the_annotation(filmed):
         return int(np.argmin(far)) == 0
 
     tracks = track_people(without_views(recording, is_first))
-    assert sorted(tracks.actor) == [0, 1, 2]
-    away = errors(tracks, filmed.sequence.joints)[:, tracks.actor == 0][..., LIMB_JOINTS]
+    assert sorted(tracks.ids) == [0, 1, 2]
+    away = errors(tracks, filmed.sequence.joints)[:, tracks.ids == 0][..., LIMB_JOINTS]
     assert np.quantile(away, 0.99) < 0.03
 
 
@@ -173,7 +173,7 @@ def test_ghosts_that_last_less_than_a_second_are_no_people(filmed):
         scores = np.concatenate([found.scores, np.full((len(moved), 17), 0.9)])
         view = np.concatenate([found.view, np.arange(len(moved))])
         frames.append(Detections.from_keypoints(view, keypoints, scores))
-    assert sorted(track_people(replace(recording, detections=tuple(frames))).actor) == [0, 1, 2]
+    assert sorted(track_people(replace(recording, detections=tuple(frames))).ids) == [0, 1, 2]
 
 
 def test_recordings_in_which_nobody_is_found_are_refused():

@@ -268,7 +268,7 @@ class TestTruth:
         ({"rate": 0.0}, "rate .*: expected greater than 0, got 0"),
         ({"detections": {"kind": "botom-up"}}, r'detections\.kind .* did you mean "bottom-up"\?'),
         ({"detections": {"format": "opnpose"}}, r"detections\.format .* \(did you mean openpose\?\)"),
-        ({"truth": {"format": "mat"}}, r"truth\.format .*: expected one of actors-mat, panoptic, trc, c3d, npz"),
+        ({"truth": {"format": "mat"}}, r"truth\.format .*: expected one of parquet, json, npz"),
         ({"truth": {"skeleton": "shelf15"}}, r"truth\.skeleton .*: expected one of coco17, .* or a table with joints"),
         ({"frames": [[10, 9]]}, r"frames\[0\]: expected \[first, last\] with first <= last, got \[10, 9\]"),
         ({"frames": [[10, 12], [12, 13]]}, r"frames\[1\]: expected ranges in order without overlap"),

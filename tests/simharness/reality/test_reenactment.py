@@ -8,7 +8,8 @@ import pytest
 from turning_people import walkers
 
 from mvpose import Rig
-from simharness.reality.people_tracks import LIMB_JOINTS, TrackedPeople
+from mvpose.recording import People
+from simharness.reality.people_tracks import LIMB_JOINTS, present
 from simharness.reality.reenactment import cut_takes, film, floor_height
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.views import Visibility
@@ -16,10 +17,14 @@ from simharness.types.views import Visibility
 SHIFT = np.array([0.0, 0.0, -0.14])
 
 
+def people_of(joints):
+    return People(np.arange(len(joints)) / 25.0, np.arange(joints.shape[1]), joints)
+
+
 def present_people(present):
     """Return tracks (F, P) of people who stand at the origin where they are present."""
     joints = np.where(np.asarray(present, bool)[..., None, None], np.zeros((17, 3)), np.nan)
-    return TrackedPeople(joints, np.full(joints.shape[1], -1))
+    return people_of(joints)
 
 
 def recording_of(frames):
@@ -79,11 +84,11 @@ def test_frames_without_people_belong_to_no_take():
 
 def test_the_floor_is_below_standing_people_and_not_below_raised_feet(filmed):
     joints = filmed.sequence.joints + SHIFT
-    people = TrackedPeople(joints, np.arange(3))
+    people = people_of(joints)
     assert floor_height(people) == pytest.approx(-0.14, abs=0.04)
     jumping = joints.copy()
     jumping[: len(joints) // 4] += [0, 0, 0.5]
-    assert floor_height(TrackedPeople(jumping, np.arange(3))) == pytest.approx(floor_height(people), abs=0.03)
+    assert floor_height(people_of(jumping)) == pytest.approx(floor_height(people), abs=0.03)
 
 
 @pytest.fixture(scope="module")
@@ -102,17 +107,17 @@ def made(reenacted):
 
 
 def test_bodies_are_within_centimetres_of_the_people(made, people):
-    np.testing.assert_array_equal(made.sequence.present, people.present)
+    np.testing.assert_array_equal(made.sequence.present, present(people))
     away = np.linalg.norm(made.joints - people.joints, axis=-1)[..., LIMB_JOINTS]
-    np.testing.assert_array_equal(np.isnan(away).all(axis=-1), ~people.present)
-    away = away[people.present]
+    np.testing.assert_array_equal(np.isnan(away).all(axis=-1), ~present(people))
+    away = away[present(people)]
     assert np.median(away) < 0.02
     assert np.quantile(away, 0.95) < 0.07
 
 
 def test_pictures_are_those_of_the_recording(filmed, made, recording, people):
     """Boxes and visibility are those of the people, although bodies and clothes are others."""
-    rows, actor = recording.frames, people.actor
+    rows, actor = recording.frames, people.ids
     pixels = np.stack([camera.project(made.joints) for camera in recording.rig], axis=1)
     shown = np.isfinite(made.views.pixels) & np.isfinite(pixels)
     np.testing.assert_allclose(made.views.pixels[shown], pixels[shown], atol=0.01)

@@ -46,16 +46,16 @@ def labels(sample):
 def true_joints(shelf, people):
     """Annotated limb joints of each track, (F, P, 17, 3)."""
     result = np.full(people.joints.shape, np.nan)
-    for person, actor in enumerate(people.actor):
+    for person, actor in enumerate(people.ids):
         result[:, person][:, LIMB_JOINTS] = shelf.truth[:, actor][:, SHELF14_OF_LIMBS]
     return result
 
 
 def test_everybody_has_one_track(shelf, people):
-    assert sorted(people.actor) == [0, 1, 2, 3]
+    assert sorted(people.ids) == [0, 1, 2, 3]
     annotated = np.isfinite(shelf.truth).all(axis=(2, 3)).sum(axis=0)
-    present = people.present.sum(axis=0)
-    for person, actor in enumerate(people.actor):
+    present = people.present.any(axis=2).sum(axis=0)
+    for person, actor in enumerate(people.ids):
         assert present[person] >= annotated[actor] - 5  # people are there before and after they are annotated
 
 

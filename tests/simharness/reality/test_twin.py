@@ -62,7 +62,7 @@ class TestTwin:
         exact = AnnotationModel(np.zeros((4, 14, 3)), np.zeros((4, 14)), 0.0, 0.0)
         truth = detected_twin(replace(model, annotation=exact), model.films[0], seed=0).truth
         made = coco17_to_shelf14(model.films[0].joints)
-        for person, actor in enumerate(model.people.actor):
+        for person, actor in enumerate(model.people.ids):
             known = np.isfinite(truth[:, actor])
             np.testing.assert_array_equal(truth[:, actor][known], made[:, person][known])
 
@@ -133,7 +133,7 @@ def test_a_twin_measures_as_its_recording(filmed):
     assert len(different) <= 0.2 * compared, different
     hips = [each.annotation.bias[6, 2] for each in (fitted, again)]
     assert hips == pytest.approx([0.03, 0.03], abs=0.015)
-    order = [list(again.people.actor).index(actor) for actor in fitted.people.actor]
+    order = [list(again.people.ids).index(actor) for actor in fitted.people.ids]
     before, after = fitted.people.joints, again.people.joints[:, order]
     assert np.nanmedian(np.linalg.norm((after - before)[..., LIMB_JOINTS, :], axis=-1)) < 0.04
     raised = (after - before)[..., 11:13, 2] - (after - before)[..., 5:7, 2]  # hips, relative to the shoulders

@@ -202,6 +202,7 @@ class TestCode:
             ("mvpose/matching/admm.py", {"method"}),
             ("mvpose/networks/data/reid.onnx", {"method"}),
             ("mvpose/formats/calibration/opencv.py", {"simulation"}),
+            ("mvpose/formats/people/trc.py", {"simulation"}),
             ("mvpose/formats/detections/openpose.py", set()),
             ("mvpose/files/input_files.py", set()),
             ("mvpose/pyproject.toml", set()),

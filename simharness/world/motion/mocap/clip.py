@@ -142,8 +142,6 @@ def load_clip(mocap: MocapSection) -> Clip:
         ValueError: the file does not exist or is not valid; the message names the key, or file and line.
     """
     file = Path(mocap.file)
-    if file.suffix.lower() not in (".amc", ".bvh"):
-        raise ValueError(f"people.motion.file = {mocap.file!r}: expected the name of an AMC, a BVH or an NPZ file")
     if not os.path.isfile(file):
         raise ValueError(f"people.motion.file = {mocap.file!r}: no such file")
     if file.suffix.lower() == ".bvh":

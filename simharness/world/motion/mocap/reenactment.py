@@ -1,8 +1,8 @@
-"""Re-enactment: a body performs a recorded joint track at its recorded place and time.
+"""Re-enactment: a body performs the recorded joints of a person at the recorded place and time.
 
-The track becomes the source motion of a retargeting to a body of the recorded size. The joints of COCO-17 are not the
-axes of the hinges, and joints have ranges, so the result is compared with the track, and trunk, head and arms are
-corrected by what they are off. The pelvis follows its recorded path on the floor; its height is that of feet on the
+The joints over time become the source motion of a retargeting to a body of the recorded size. The joints of COCO-17
+are not the axes of the hinges, and joints have ranges, so the result is compared with them, and trunk, head and arms
+are corrected by what they are off. The pelvis follows its recorded path on the floor; its height is that of feet on the
 floor.
 """
 
@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
+from mvpose.recording import People
 from simharness.world.humans.anatomy import DOFS, SIDES
 from simharness.world.motion.mocap.joint_directions import (
     chest_turn,
@@ -25,7 +26,6 @@ from simharness.world.motion.mocap.joint_directions import (
     segment,
     unit,
 )
-from simharness.world.motion.mocap.joint_tracks import PeopleTracks
 from simharness.world.motion.mocap.retarget import SourceMotion, retarget, tilt_pelvis
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
@@ -36,21 +36,20 @@ _CORRECTIONS = 2  # rounds; the next ones change little
 _MOST = np.radians(40.0)  # largest correction of a direction in one round: one beyond a joint's range has no end
 
 
-def reenact(tracks: PeopleTracks, person: int, kinematics: Kinematics, *, time: Floats) -> Motion:
-    """Return the motion of a body that re-enacts the track of one person.
+def reenact(people: People, person: int, kinematics: Kinematics, *, time: Floats) -> Motion:
+    """Return the motion of a body that re-enacts one person.
 
     Args:
-        tracks: joint tracks of all people.
-        person: index of the person in the tracks.
+        people: recorded people on COCO-17, all joints in all frames, at times from 0.
+        person: column of the person in them.
         kinematics: body, preferably of the recorded size, see ``recorded_shape``.
         time: times in the recording, (N,) seconds, ascending; the pose is held before the first and after the last
             frame.
     """
     time = np.asarray(time, float)
-    start, end = np.clip([time[0] - _CONTEXT, time[-1] + _CONTEXT], 0.0, tracks.duration)
+    start, end = np.clip([time[0] - _CONTEXT, time[-1] + _CONTEXT], 0.0, people.times[-1])
     clock = np.linspace(start, end, round((end - start) * RATE) + 1)
-    frames = np.arange(len(tracks.joints)) / tracks.rate
-    joints = interpolate(frames, tracks.joints[:, person].reshape(len(frames), -1), clock)
+    joints = interpolate(people.times, people.joints[:, person].reshape(people.frames, -1), clock)
     motion = follow(joints.reshape(len(clock), -1, 3), kinematics, time=clock)
     return Motion(time, *motion.read(time))
 

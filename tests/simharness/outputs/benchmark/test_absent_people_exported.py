@@ -6,9 +6,8 @@ import json
 
 import numpy as np
 
+from mvpose.formats.people import read_people
 from simharness import load_scenario
-from simharness.formats.joint_tracks import TrackFiles
-from simharness.formats.track_formats import FORMATS
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
 
 
@@ -31,6 +30,6 @@ def test_an_absent_person_has_no_body_in_the_frame_and_undefined_joints_in_the_t
     here = [{body["id"] for body in json.loads(file.read_text())["bodies"]} for file in files]
     assert here[0] == {0}
     assert {0, 1} in here
-    truth = FORMATS["npz"].read(TrackFiles((folder / "truth.npz",), np.arange(len(files)))).joints
+    truth = read_people(folder / "truth.npz").joints
     defined = np.isfinite(truth).all(axis=(2, 3))
     assert [{int(person) for person in np.flatnonzero(row)} for row in defined] == here

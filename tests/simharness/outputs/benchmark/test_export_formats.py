@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from mvpose import COCO17
 from mvpose.formats.detections.openpose import people_file, read_people
 from mvpose.formats.joint_names import BODY_25
+from mvpose.formats.people.panoptic_poses import body_scene
 from mvpose.skeleton import PANOPTIC19
 from mvpose.wholebody import skeleton_by_name
-from simharness.formats.panoptic_poses import body_scene, confidences
+from simharness.outputs.benchmark.joint_confidences import confidences
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence, hd_names
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.views import Visibility

@@ -76,8 +76,8 @@ def test_the_sample_of_a_recording_measures_those_who_are_annotated(filmed):
     tracks = track_people(recording)
     sample = sample_of(recording, tracks)
     expected = np.ones((len(filmed), 3), bool)
-    expected[:10, tracks.actor == 1] = False
-    expected[:, tracks.actor == -1] = False
+    expected[:10, tracks.ids == 1] = False
+    expected[:, tracks.ids >= 3] = False
     np.testing.assert_array_equal(sample.known, expected)
     assert np.isfinite(sample.reference).all()  # everybody hides others
     assert sample.step == pytest.approx(0.04)

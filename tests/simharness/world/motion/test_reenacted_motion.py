@@ -8,6 +8,8 @@ import pytest
 from casting import foot_vertices, performer
 from scipy.spatial.transform import Rotation
 
+from mvpose.formats.people import write_people
+from mvpose.recording import People
 from mvpose.skeleton import COCO17
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
@@ -16,7 +18,7 @@ from simharness.world.humans.body_size import body_lengths
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.activity_registry import activities
 from simharness.world.motion.choreography import choreograph
-from simharness.world.motion.mocap import PeopleTracks, recorded_shape, reenact, tracks_file
+from simharness.world.motion.mocap import recorded_shape, reenact
 from simharness.world.motion.mocap.joint_directions import middle
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop, Spot, make_loop
@@ -36,7 +38,7 @@ TRACKS += [Spot(np.array([0.8 * k - 2.0, 0.5]), 1.1 * k) for k in range(1, len(A
 class Recorded:
     """Simulated recording, and the same people re-enacted by other bodies."""
 
-    tracks: PeopleTracks
+    tracks: People
     originals: list[Motion]
     cast: list[Kinematics]
     motions: list[Motion]
@@ -46,6 +48,10 @@ class Recorded:
         """Joints of the re-enactment at the recorded times, (T, P, 17, 3)."""
         pairs = zip(self.cast, self.motions, strict=True)
         return np.stack([mover.joints(motion) for mover, motion in pairs], axis=1)
+
+
+def people_at(rate: float, joints: np.ndarray) -> People:
+    return People(np.arange(len(joints)) / rate, np.arange(joints.shape[1]), joints)
 
 
 def record(name: str, k: int, rate: float = RATE) -> tuple[Motion, np.ndarray]:
@@ -58,8 +64,8 @@ def record(name: str, k: int, rate: float = RATE) -> tuple[Motion, np.ndarray]:
 @pytest.fixture(scope="module")
 def recorded() -> Recorded:
     originals, joints = zip(*(record(name, k) for k, name in enumerate(ACTIVITIES)), strict=True)
-    tracks = PeopleTracks("recorded", np.stack(joints, axis=1), RATE)
-    shapes = [recorded_shape(draw_shape(stream(70 + k, "other")), tracks, k) for k in range(tracks.people)]
+    tracks = people_at(RATE, np.stack(joints, axis=1))
+    shapes = [recorded_shape(draw_shape(stream(70 + k, "other")), tracks, k) for k in range(len(tracks))]
     cast = [Kinematics(make_body(shape)) for shape in shapes]
     motions = [reenact(tracks, k, mover, time=TIME) for k, mover in enumerate(cast)]
     return Recorded(tracks, list(originals), cast, motions)
@@ -128,7 +134,7 @@ def test_a_moved_recording_gives_the_moved_motion(recorded, person):
         np.array([3.0, -1.0, 0.4]),
     )  # the recorded height does not matter
     joints = recorded.tracks.joints @ turn.T + shift
-    moved = reenact(PeopleTracks("moved", joints, RATE), person, recorded.cast[person], time=TIME)
+    moved = reenact(people_at(RATE, joints), person, recorded.cast[person], time=TIME)
     still = recorded.motions[person]
     np.testing.assert_allclose(moved.root[:, :3], still.root[:, :3] @ turn.T + [3.0, -1.0, 0.0], atol=1e-3)
     np.testing.assert_allclose(moved.angles, still.angles, atol=0.02)
@@ -137,14 +143,14 @@ def test_a_moved_recording_gives_the_moved_motion(recorded, person):
 def test_the_rate_of_the_recording_does_not_matter(recorded):
     joints = np.stack([record(name, k, rate=50.0)[1] for k, name in enumerate(ACTIVITIES)], axis=1)
     for person, mover in enumerate(recorded.cast):
-        fine = mover.joints(reenact(PeopleTracks("fine", joints, 50.0), person, mover, time=TIME))
+        fine = mover.joints(reenact(people_at(50.0, joints), person, mover, time=TIME))
         off = np.linalg.norm(fine - recorded.joints[:, person], axis=-1)
         assert np.median(off) < 0.01
         assert np.percentile(off, 99) < 0.06
 
 
 def test_a_single_frame_is_a_pose(recorded):
-    tracks = PeopleTracks("pose", recorded.tracks.joints[:1], RATE)
+    tracks = people_at(RATE, recorded.tracks.joints[:1])
     motion = reenact(tracks, 1, recorded.cast[1], time=np.array([0.0, 1.0]))
     np.testing.assert_array_equal(motion.root[0], motion.root[1])
     off = np.linalg.norm(recorded.cast[1].joints(motion)[0] - tracks.joints[0, 1], axis=-1)
@@ -154,10 +160,8 @@ def test_a_single_frame_is_a_pose(recorded):
 class TestScenario:
     @pytest.fixture
     def planned(self, recorded, tmp_path):
-        path = tmp_path / "tracks.npz"
-
         def plan(joints: np.ndarray, *, size: tuple[float, float, float] = (8.0, 8.0, 3.0), start: float = 0.0):
-            tracks_file(path, joints, RATE)
+            (path,) = write_people(people_at(RATE, joints), tmp_path, formats=["npz"])
             people = {"count": joints.shape[1], "motion": {"file": str(path), "start": start}}
             scenario = Scenario(name="again", people=people, room={"size": size})
             return choreograph(scenario, recorded.cast[: joints.shape[1]], TIME[:25])

@@ -3,9 +3,10 @@ import numpy as np
 import pytest
 
 from mvpose import Rig
+from mvpose.formats.people import write_people
+from mvpose.recording import People
 from simharness.scenario.sections.scenario import Scenario
 from simharness.world.humans.anatomy import RANGES
-from simharness.world.motion.mocap import tracks_file
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.rigs.layouts import build_rig, look_at
 from simharness.world.scene.build import Scene
@@ -233,10 +234,10 @@ def test_a_camera_inside_an_object_is_refused(scene):
 
 
 def test_a_re_enacted_recording_has_its_places_and_sizes_and_objects_keep_clear(scene, tmp_path):
-    file = tmp_path / "tracks.npz"
     recorded = simulate(scene)
     rate = 1 / np.diff(recorded.time).mean()
-    tracks_file(file, recorded.joints, rate)
+    people = People(recorded.time, recorded.ids, recorded.joints)
+    (file,) = write_people(people, tmp_path, formats=["npz"])
     again = build(scenario(seed=8, rate=float(rate), people={"activities": ("mocap",), "motion": {"file": str(file)}}))
     off = np.linalg.norm(simulate(again).joints - recorded.joints, axis=-1)
     assert np.median(off) < 0.04

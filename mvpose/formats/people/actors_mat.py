@@ -14,22 +14,24 @@ import numpy as np
 from mvpose.files.archives import MOST
 from mvpose.files.input_files import read_bytes
 from mvpose.files.message_text import one_line
-from simharness.formats.joint_tracks import JointTracks, TrackFiles
-from simharness.formats.matlab5 import read_variable
+from mvpose.formats.joint_names import KNOWN, skeleton_of
+from mvpose.formats.people.matlab5 import read_variable
+from mvpose.formats.people.people_files import PeopleFiles
+from mvpose.recording import People
 
-_JOINTS = 14
 _WHAT = "the truth of Shelf or Campus: a MATLAB 5 file with actor3D, for each actor a cell of frames of joints x 3"
 
 
-def read_tracks(files: TrackFiles) -> JointTracks:
-    """Read the joints of all actors in all frames, (n, A, J, 3); J is 14 unless another skeleton is declared.
+def read(files: PeopleFiles) -> People:
+    """Read the joints of all actors in all frames; those of SHELF14 unless another skeleton is declared.
 
     Raises:
         ValueError: the file is missing, truncated, no MATLAB 5 file, or of another layout.
     """
     path = files.single()
     actors = _read_actors(path)
-    count = len(files.skeleton) if files.skeleton is not None else _JOINTS
+    names = files.skeleton or KNOWN["shelf14"]
+    count = len(names)
     frames = max(map(len, actors))
     if frames * len(actors) * count * 24 > MOST:
         raise ValueError(f"{path}: {frames} frames of {len(actors)} actors are too many; expected {_WHAT}")
@@ -44,7 +46,11 @@ def read_tracks(files: TrackFiles) -> JointTracks:
                     f"{path}: actor {actor + 1}, frame {frame}: expected {count} x 3 joints or nothing, got "
                     f"{pose.shape}"
                 )
-    return JointTracks(np.arange(len(joints)), joints)
+    numbers = np.arange(frames)
+    try:
+        return People(files.times(numbers), np.arange(len(actors)), joints, skeleton=skeleton_of(names))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
 
 
 def _read_actors(path: Path) -> list[np.ndarray]:

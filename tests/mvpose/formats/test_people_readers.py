@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from mvpose.formats.joint_names import KNOWN
-from simharness.formats.joint_tracks import JointTracks, TrackFiles
-from simharness.formats.track_formats import FORMATS
+from mvpose.formats.joint_names import KNOWN, JointNames, skeleton_of
+from mvpose.formats.people import FORMATS, PeopleFiles
+from mvpose.recording import People
 
 NAMES = ("LHip", "RHip", "Nose")
 Y_UP = np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]])  # x, y, z of a file with y up, from our x, y, z
@@ -19,8 +19,8 @@ def tracks(frames=4, people=1, joints=3, seed=0):
     return np.random.default_rng(seed).normal(size=(frames, people, joints, 3))
 
 
-def read(kind, *paths, frames=range(100), **options):
-    return FORMATS[kind].read(TrackFiles(paths, np.array(frames), **options))
+def read(kind, *paths, frames=range(100), up="z", rate=25.0, **options):
+    return FORMATS[kind].read(PeopleFiles(paths, up=up, rate=rate, numbers=np.array(frames), **options))
 
 
 def cells(*poses):
@@ -45,7 +45,7 @@ class TestActorsMat:
         path = write_mat(tmp_path / "gt.mat", *(cells(*joints[:, actor]) for actor in range(count)))
         got = read("actors-mat", path)
         np.testing.assert_array_equal(got.joints, joints)
-        assert got.frames.tolist() == list(range(6))
+        assert got.numbers.tolist() == list(range(6))
 
     def test_frames_without_annotation_are_nan(self, tmp_path):
         pose = np.arange(42.0).reshape(14, 3)
@@ -81,7 +81,7 @@ class TestPanoptic:
         got = read("panoptic", tmp_path, skeleton=KNOWN[f"panoptic{count}"])
         np.testing.assert_allclose(got.at([7, 9]), joints)
         assert np.isnan(got.at([8])).all()
-        assert got.people == (3, 8)
+        assert got.ids.tolist() == [3, 8]
 
     def test_joints_of_no_confidence_are_undefined(self, tmp_path):
         body = np.concatenate([np.ones((19, 3)), np.full((19, 1), 0.5)], axis=1)
@@ -113,8 +113,9 @@ class TestPanoptic:
         with pytest.raises(ValueError, match=r"00000001\.json: joints19 must be 76 numbers, got 75"):
             read("panoptic", tmp_path)
         self.write(tmp_path, 1, [{"id": 0, "joints15": [0.0] * 60}])
+        assert len(read("panoptic", tmp_path).skeleton) == 15
         with pytest.raises(ValueError, match=r"00000001\.json: lacks 'joints19'"):
-            read("panoptic", tmp_path)
+            read("panoptic", tmp_path, skeleton=KNOWN["panoptic19"])
 
 
 def write_trc(path, joints, *, first=1, unit="mm", scale=1000.0, names=NAMES):
@@ -182,13 +183,13 @@ class TestMarkers:
         joints = tracks()
         got = read(kind, WRITERS[kind](tmp_path / f"a.{kind}", joints[:, 0], unit=unit, scale=scale))
         np.testing.assert_allclose(got.joints, joints, atol=1e-6)
-        assert got.names == NAMES
+        assert got.skeleton.joints == NAMES
 
     def test_one_file_for_each_person(self, tmp_path, kind):
         joints = tracks(people=2)
         paths = [WRITERS[kind](tmp_path / f"{k}.{kind}", joints[:, k], first=5 + k) for k in range(2)]
         got = read(kind, *paths)
-        assert got.frames.tolist() == [5, 6, 7, 8, 9]
+        assert got.numbers.tolist() == [5, 6, 7, 8, 9]
         np.testing.assert_allclose(got.joints[:4, 0], joints[:, 0], atol=1e-6)
         np.testing.assert_allclose(got.joints[1:, 1], joints[:, 1], atol=1e-6)
         assert np.isnan(got.joints[4, 0]).all()
@@ -205,13 +206,13 @@ class TestMarkers:
         path = WRITERS[kind](tmp_path / f"a.{kind}", joints[:, 0] @ Y_UP.T)
         np.testing.assert_allclose(read(kind, path, up="y").joints, joints, atol=1e-6)
 
-    @pytest.mark.parametrize(("first", "counted"), [(0, True), (1, True), (300, False)])
+    @pytest.mark.parametrize(("first", "counted"), [(0, True), (1, True), (298, False)])
     def test_a_first_frame_of_0_or_1_is_only_a_count(self, tmp_path, kind, first, counted):
         if (kind, first) == ("c3d", 0):
             pytest.skip("frames of C3D files count from 1")
-        got = read(kind, WRITERS[kind](tmp_path / f"a.{kind}", tracks()[:, 0], first=first))
-        assert got.frames[0] == first
-        assert got.counted is counted
+        path = WRITERS[kind](tmp_path / f"a.{kind}", tracks()[:, 0], first=first)
+        assert read(kind, path).numbers[0] == first  # 4 frames are not the 100 that are wanted
+        assert read(kind, path, frames=range(300, 304)).numbers[0] == (300 if counted else first)
 
     def test_faults_are_named(self, tmp_path, kind):
         one, other = (
@@ -249,23 +250,37 @@ class TestNpz:
         np.savez(tmp_path / "a.npz", joints=joints, names=np.array(NAMES), frames=np.array([2, 4, 5, 9]))
         got = read("npz", tmp_path / "a.npz")
         np.testing.assert_array_equal(got.joints, joints)
-        assert (got.names, got.frames.tolist(), got.counted) == (NAMES, [2, 4, 5, 9], False)
+        assert (got.skeleton.joints, got.numbers.tolist()) == (NAMES, [2, 4, 5, 9])
+        np.testing.assert_allclose(got.times, [0.08, 0.16, 0.2, 0.36])
 
     def test_without_numbers_rows_are_counted(self, tmp_path):
         np.savez(tmp_path / "a.npz", joints=tracks())
-        got = read("npz", tmp_path / "a.npz")
-        assert (got.names, got.frames.tolist(), got.counted) == (None, [0, 1, 2, 3], True)
+        skeleton = JointNames("declared", NAMES)
+        got = read("npz", tmp_path / "a.npz", skeleton=skeleton)
+        assert (got.skeleton.joints, got.numbers.tolist()) == (NAMES, [0, 1, 2, 3])
+        assert read("npz", tmp_path / "a.npz", skeleton=skeleton, frames=range(7, 11)).numbers.tolist() == [7, 8, 9, 10]
+        with pytest.raises(ValueError, match="does not name its joints"):
+            read("npz", tmp_path / "a.npz")
+
+    def test_a_file_states_times_or_a_rate_unless_the_user_does(self, tmp_path):
+        path = tmp_path / "a.npz"
+        for stated in ({"rate": 50.0}, {"times": np.arange(4) / 50}):
+            np.savez(path, joints=tracks(), names=np.array(NAMES), **stated)
+            np.testing.assert_allclose(read("npz", path).times, np.arange(4) / 50)
+        np.savez(path, joints=tracks(), names=np.array(NAMES))
+        with pytest.raises(ValueError, match="states neither the times of frames nor frames per second"):
+            read("npz", path, rate=None)
 
     def test_faults_are_named(self, tmp_path):
         path = tmp_path / "a.npz"
         for arrays, message in (
-            ({"points": tracks()}, "has no array joints"),
+            ({"points": tracks()}, "has no array 'joints'"),
             ({"joints": np.zeros((4, 3, 3))}, "joints must be"),
             ({"joints": tracks(), "frames": np.arange(3)}, "joints must be"),
             ({"joints": tracks(), "frames": np.array([0, 1, 1, 2])}, "frame numbers must increase"),
-            ({"joints": tracks(), "names": np.array(["nose"])}, "expected 3 joint names, got 1"),
+            ({"joints": tracks(), "names": np.array(["nose"])}, "has 3 joints, but skeleton a.npz has 1"),
         ):
-            np.savez(path, **arrays)
+            np.savez(path, **{"names": np.array(NAMES), **arrays})
             with pytest.raises(ValueError, match=rf"a\.npz: .*{message}"):
                 read("npz", path)
         path.write_bytes(path.read_bytes()[:100])
@@ -280,11 +295,11 @@ def test_people_of_one_file_need_one_file(tmp_path):
 
 
 def test_tracks_are_looked_up_by_frame():
-    given = JointTracks(np.array([3, 5]), tracks(2))
+    given = People([0.0, 0.1], [0], tracks(2), skeleton=skeleton_of(JointNames("three", NAMES)), numbers=[3, 5])
     got = given.at([2, 3, 4, 5, 6])
     np.testing.assert_array_equal(got[[1, 3]], given.joints)
     assert np.isnan(got[[0, 2, 4]]).all()
-    assert given.numbered(10).frames.tolist() == [10, 12]
+    assert given.numbered_from(10).numbers.tolist() == [10, 12]
 
 
 def test_infinite_numbers_of_frames_and_people_are_refused(tmp_path):

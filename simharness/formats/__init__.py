@@ -1,1 +1,0 @@
-"""Readers of the true joints of recordings; :mod:`mvpose.formats` reads calibrations and detections."""
