@@ -39,7 +39,7 @@ def apply(diff: str, root: Path) -> None:
 def write(block: str, root: Path) -> None:
     """Write a new file, whose first line is a comment with its path."""
     path, _, content = block.partition("\n")
-    file = root / path.removeprefix("# ")
+    file = root / path.removeprefix("# ").removeprefix("<!-- ").removesuffix(" -->")
     assert not file.exists(), f"{file} exists already"
     file.write_text(content, encoding="utf-8")
 
@@ -50,7 +50,7 @@ def extended(tmp_path_factory):
     root = tmp_path_factory.mktemp("extended")
     for folder in ("mvpose", "simharness", "scenarios"):
         shutil.copytree(ROOT / folder, root / folder, ignore=shutil.ignore_patterns("build", "*.egg-info"))
-    for block in blocks("python"):
+    for block in [*blocks("python"), *blocks("xml")]:
         if not block.startswith(_USE):
             write(block, root)
     for block in blocks("diff"):
@@ -74,6 +74,7 @@ def run(root: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 def test_every_extension_is_used():
     assert list(SECTIONS) == [
         "An activity",
+        "An object",
         "A detector error",
         "A calibration format",
         "A format of detections",
@@ -86,8 +87,8 @@ def test_every_extension_is_used():
     for name, text in SECTIONS.items():
         python = blocks("python", text)
         assert any(block.startswith(_USE) for block in python), name
-        assert any(not block.startswith(_USE) for block in python), name
-    assert {language for language, _ in _FENCE.findall(PAGE)} == {"python", "diff"}
+        assert any(not block.startswith(_USE) for block in python) or blocks("xml", text), name
+    assert {language for language, _ in _FENCE.findall(PAGE)} == {"python", "diff", "xml"}
 
 
 def test_the_changes_fit_the_code(tmp_path):

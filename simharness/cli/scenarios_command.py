@@ -1,4 +1,4 @@
-"""``simharness scenarios``, ``show`` and ``schema``: the shipped scenarios, and the contents of scenario files."""
+"""``simharness scenarios``, ``show``, ``schema`` and ``mjcf``: the shipped scenarios, and what is in their files."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ def add_to(app: typer.Typer) -> None:
     app.command()(scenarios)
     app.command()(show)
     app.command()(schema)
+    app.command()(mjcf)
 
 
 def scenarios() -> None:
@@ -104,6 +105,35 @@ def schema(
             out.write_text(dumps(), encoding="utf-8")
         except OSError as error:
             raise ValueError(f"--out {out}: cannot be written: {error.strerror}") from None
+
+
+def mjcf(
+    scenario: ScenarioFile,
+    overrides: Overrides = None,
+    seed: Seed = None,
+    out: Annotated[
+        Path,
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder in which the scene gets a folder with the name of the scenario.",
+            file_okay=False,
+        ),
+    ] = Path("results/mjcf"),
+) -> None:
+    """Write the scene of a scenario, with its people at the first frame and its cameras, as MJCF.
+
+    MuJoCo's viewer opens it: python -m mujoco.viewer --mjcf=FOLDER/NAME/scene.xml
+    """
+    with PROGRAM.exit_on_error():
+        from simharness.outputs.benchmark.mjcf_scene import write_mjcf
+        from simharness.scenario.load import load
+        from simharness.trial.stages.build_trial import true_rig
+        from simharness.world.scene.build import build
+
+        loaded = load(scenario, overrides=overrides or (), seed=seed)
+        rig = true_rig(loaded)
+        file = write_mjcf(build(loaded, rig), rig, out / loaded.name)
+    typer.echo(f"python -m mujoco.viewer --mjcf={file}")
 
 
 def _table(title: str, rows: Sequence[tuple[str, str, str]], width: int, *, trials: bool = False) -> Table:
