@@ -42,7 +42,7 @@ class Outline:
     edges: NDArray[np.int64]
 
     @classmethod
-    def of(cls, body: Body) -> Outline:
+    def from_body(cls, body: Body) -> Outline:
         """Choose the outermost vertices of a body: the extreme vertices of the skin of each bone in all directions."""
         directions = even_directions(_DIRECTIONS)
         share = np.zeros((len(body.vertices), len(body.bones)), np.float32)
@@ -149,10 +149,11 @@ def bounding_box(points, edges, cameras, first_row, last_row, out):
         places[0, i], places[1, i], places[2, i] = points[i, 0], points[i, 1], points[i, 2]
     for view in range(len(cameras)):
         c = cameras[view]
-        image[:] = -0.5, first_row * c[23] - 0.5, c[22] - 0.5, last_row * c[23] - 0.5
-        if c[25] == 0.0 and _frame_whole(places[0], places[1], places[2], c, image, out[view]):
+        # One by one: an assignment of arrays or tuples takes seconds to compile, as it brings the text of an error.
+        image[0], image[1], image[2], image[3] = -0.5, first_row * c[23] - 0.5, c[22] - 0.5, last_row * c[23] - 0.5
+        if c[25] == 0.0 and _frame_inside(places[0], places[1], places[2], c, image, out[view]):
             continue
-        box[:] = np.inf, np.inf, -np.inf, -np.inf
+        box[0], box[1], box[2], box[3] = np.inf, np.inf, -np.inf, -np.inf
         all_in = True
         for i in range(n):
             x, y, z = points[i, 0] + 0.0, points[i, 1] + 0.0, points[i, 2] + 0.0
@@ -172,13 +173,13 @@ def bounding_box(points, edges, cameras, first_row, last_row, out):
             for e in range(len(edges)):
                 i, j = edges[e, 0], edges[e, 1]
                 if state[i] + state[j] < 2 * _IN_IMAGE:
-                    _cut(i, j, local, pixel, state, c, image, box)
-        for k in range(4):  # an assignment of arrays takes a second to compile: it brings the text of an error
+                    _clip_edge(i, j, local, pixel, state, c, image, box)
+        for k in range(4):
             out[view, k] = box[k]
 
 
 @njit(cache=True, fastmath={"nnan", "nsz"})  # vectorised by the compiler: least and greatest numbers, no sums
-def _frame_whole(xs, ys, zs, c, image, box):
+def _frame_inside(xs, ys, zs, c, image, box):
     """Write the box of points if a camera without distortion sees all of them; return whether it does."""
     left, top, right, bottom, nearest = _FAR, _FAR, -_FAR, -_FAR, _FAR
     for i in range(len(xs)):
@@ -218,7 +219,7 @@ def _widen(box, u, v):
 
 
 @njit(cache=True)
-def _cut(i, j, local, pixel, state, c, image, box):
+def _clip_edge(i, j, local, pixel, state, c, image, box):
     """Widen a box by the part of an edge inside the image (Liang and Barsky, ACM Trans. Graphics 3, 1984)."""
     one, two = state[i], state[j]
     if one == _BEYOND or two == _BEYOND or (one == _BEHIND and two == _BEHIND):

@@ -62,7 +62,7 @@ class OuterJointFilm:
             bands = np.stack([self._at(state) for state in states])
             here = np.all([state.present for state in states], axis=0)
             targets = np.stack([joints_at_exposure(bands, camera) for camera in cameras])
-            self._cameras = arrays = CameraArrays.of(cameras, self._cameras)
+            self._cameras = arrays = CameraArrays.of_cameras(cameras, self._cameras)
             at, inside = arrays.pixels_of(targets)
             inside &= here[:, None] & np.isfinite(self._depths)
             owner, in_front = cast_bands(self._caster, states, arrays, at, targets, inside)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 import numpy as np
@@ -68,21 +68,15 @@ def raw_picture(
     shape = (1 if sensor.mosaic else 3, *rgb.shape[:2])
     noisy = sensor.shot_noise > 0 or sensor.read_noise > 0
     raw = np.empty(shape, np.uint16)
-    expose(
-        np.ascontiguousarray(rgb),
-        linear_table(),
-        random.integers(0, 1 << 16, shape, np.uint16) if noisy else np.empty((0, *shape[1:]), np.uint16),
-        _normals(),
+    optics = Optics(
         _axis(camera),
         (exposure * _falloff(sensor.vignetting)).astype(np.float32),
         np.float32(min(sensor.softness, _LARGEST) ** 2),
         np.float32(sensor.aberration),
-        np.float32(sensor.shot_noise**2),
-        np.float32(sensor.read_noise**2),
-        np.array([BLACK, WHITE], np.float32),
-        sensor.mosaic,
-        raw,
     )
+    words = random.integers(0, 1 << 16, shape, np.uint16) if noisy else np.empty((0, *shape[1:]), np.uint16)
+    noise = SensorNoise(words, _normals(), np.float32(sensor.shot_noise**2), np.float32(sensor.read_noise**2))
+    expose(np.ascontiguousarray(rgb), linear_table(), optics, noise, sensor.mosaic, raw)
     return cv2.demosaicing(raw[0], cv2.COLOR_BayerRGGB2RGB) if sensor.mosaic else cv2.merge(tuple(raw))
 
 
@@ -121,26 +115,52 @@ def _falloff(vignetting: float) -> NDArray[np.float64]:
     return np.concatenate([factors[::-1], [1.0 - factors.sum()]])
 
 
+class Optics(NamedTuple):
+    """Lens of a sensor.
+
+    Attributes:
+        axis: column and row of the optical axis, and 1 / focal length^2, pixels, (3,) float32.
+        falloff: coefficients of the polynomial of cos^2 that gives the share of light far from the axis, (k,) float32,
+            the highest power first.
+        variance: variance of the blur along each axis, pixels^2.
+        aberration: magnification of red over that of green, less 1; that of blue is as much smaller.
+    """
+
+    axis: NDArray[np.float32]
+    falloff: NDArray[np.float32]
+    variance: np.float32
+    aberration: np.float32
+
+
+class SensorNoise(NamedTuple):
+    """Noise of one picture.
+
+    Attributes:
+        words: random numbers, (c, h, w) uint16; no elements for no noise.
+        normals: quantiles of the standard normal distribution, (4096,) float32.
+        shot: variance of the noise of light at white.
+        read: variance of the noise of the readout.
+    """
+
+    words: NDArray[np.uint16]
+    normals: NDArray[np.float32]
+    shot: np.float32
+    read: np.float32
+
+
 @njit(cache=True)
-def expose(rgb, linear, words, normals, axis, falloff, variance, aberration, shot, read, levels, mosaic, raw):
+def expose(rgb, linear, optics, noise, mosaic, raw):
     """Write the values that a sensor reads.
 
     Args:
         rgb: the picture, (h, w, 3) uint8.
         linear: light that its values stand for, (256,) float32, 1 is white.
-        words: random numbers, (c, h, w) uint16; no elements for no noise.
-        normals: quantiles of the standard normal distribution, (4096,) float32.
-        axis: column and row of the optical axis, and 1 / focal length^2, pixels, (3,) float32.
-        falloff: coefficients of the polynomial of cos^2 that gives the share of light far from the axis, (k,) float32,
-            the highest power first.
-        variance: variance of the blur along each axis, pixels^2, float32.
-        aberration: magnification of red over that of green, less 1; that of blue is as much smaller; float32.
-        shot: variance of the noise of light at white, float32.
-        read: variance of the noise of the readout, float32.
-        levels: values of black and white, (2,) float32.
+        optics: the lens.
+        noise: the noise.
         mosaic: whether every pixel has one colour filter, red and green in even rows, green and blue in odd ones.
         raw: the result, (c, h, w) uint16, c is 1 for a mosaic, else 3.
     """
+    axis, falloff, variance, aberration = optics
     height, width = rgb.shape[:2]
     aside = np.empty(width, np.float32)
     for x in range(width):
@@ -179,7 +199,7 @@ def expose(rgb, linear, words, normals, axis, falloff, variance, aberration, sho
             _interleave(rows[y & 1], rows[1 + (y & 1)], mixed)
         for channel in range(len(raw)):
             row = mixed if mosaic else rows[channel]
-            _read_row(row, words[:, y], channel, normals, shot, read, levels, raw[channel, y])
+            _read_row(row, noise, y, channel, raw[channel, y])
 
 
 @njit(cache=True)
@@ -256,14 +276,15 @@ def _interleave(even, odd, row):
 
 
 @njit(cache=True)
-def _read_row(row, words, channel, normals, shot, read, levels, raw):
+def _read_row(row, noise, y, channel, raw):
     """Write light as numbers with noise, whose variance grows with the light: the counted photons, and the readout."""
+    words, normals, shot, read = noise
     if words.size:
-        draws = words[channel]
+        draws = words[channel, y]
         for x in range(len(row)):
             light = row[x] if row[x] > 0 else np.float32(0)
             row[x] += math.sqrt(shot * light + read) * normals[draws[x] >> 4]
-    scale, bias, top = levels[1] - levels[0], levels[0] + np.float32(0.5), levels[1]
+    scale, bias, top = np.float32(WHITE) - np.float32(BLACK), np.float32(BLACK) + np.float32(0.5), np.float32(WHITE)
     for x in range(len(row)):
         value = row[x] * scale + bias
         value = value if value > 0 else np.float32(0)

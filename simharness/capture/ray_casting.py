@@ -9,7 +9,7 @@ Rays start at a camera and end at their target; of the surfaces between, the fir
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import mujoco
 import numpy as np
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 _OBJECT_GROUPS = np.array([group != SKIN_GROUP for group in range(6)], np.uint8)  # geom groups tested by MuJoCo
 _ROUNDING = 1e-5  # metres: boxes around objects are larger by this than those of MuJoCo, which rounds meshes
 _ENDLESS = 1e9  # metres: half size of a plane
+_STEEPEST = 1e30  # 1/m: greatest inverse of a direction; finite, so that no product with it is undefined
+_ROUND_OFF = 1e-9  # metres: spheres that a ray must come near before the capsule in it is tested are this much larger
 
 
 class RayCaster:
@@ -56,18 +58,18 @@ class RayCaster:
         self._rest = np.reshape([c[2:4] for c in capsules], (-1, 2, 3))
         self._radii = np.array([c[4] for c in capsules], float)
         self._first = np.searchsorted(self._person, np.arange(self._people + 1))
-        self._placed = np.empty((len(capsules), 2, 3))
-        self._around = np.empty((self._people, 4))
+        placed, around = np.empty((len(capsules), 2, 3)), np.empty((self._people, 4))
+        self._capsules = PlacedCapsules(placed, self._radii, self._first, around)
         self._objects = np.flatnonzero(model.geom_group != SKIN_GROUP)
         self._local = np.array(model.geom_aabb)
         self._local[model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE, 3:] = _ENDLESS
-        self._low, self._high = np.empty((2, 3, len(self._objects)))
+        self._boxes = tuple(np.empty((2, 3, len(self._objects))))
         self._box_objects()
 
     def place(self, state: PlaybackState) -> None:
         """Move all people and objects to their positions in a state."""
         bones = np.ascontiguousarray(state.bones)
-        place_capsules(self._rest, self._bone, self._radii, self._first, bones, self._placed, self._around)
+        place_capsules(self._rest, self._bone, bones, self._capsules)
         if len(self._moving):
             self._data.mocap_pos[self._moving] = state.placements[:, :3]
             self._data.mocap_quat[self._moving] = state.placements[:, 3:]
@@ -76,12 +78,12 @@ class RayCaster:
 
     def _box_objects(self) -> None:
         data = self._data
-        box_geoms(self._objects, self._local, data.geom_xpos, data.geom_xmat, _ROUNDING, self._low, self._high)
+        box_geoms(self._objects, self._local, data.geom_xpos, data.geom_xmat, _ROUNDING, *self._boxes)
 
     def capsules_of(self, person: int) -> tuple[Floats, Floats]:
         """Return ends (c, 2, 3) and radii (c,), metres, of the capsules of a person in the state placed last."""
         own = slice(self._first[person], self._first[person + 1])
-        return self._placed[own].copy(), self._radii[own]
+        return self._capsules.placed[own].copy(), self._radii[own]
 
     def cast(self, camera: Camera, targets: Floats) -> tuple[Integers, Floats]:
         """Cast rays from a camera to targets (n, 3), starting ``NEAR`` in front of it; return the first hits.
@@ -110,10 +112,8 @@ class RayCaster:
         count = np.count_nonzero(wanted)
         owner, distance, met = np.full(count, -1), np.full(count, np.inf), np.empty(count, bool)
         direction, length, near = np.empty((count, 3)), np.empty(count), np.empty(count)
-        first = cast_views(
-            centers, axes, targets, wanted, NEAR, self._placed, self._radii, self._first, self._around, self._low,
-            self._high, direction, length, near, owner, distance, met,
-        )  # fmt: skip
+        cast_rays = CastRays(direction, length, near, owner, distance, met)
+        first = cast_views((centers, axes), targets, wanted, NEAR, self._capsules, self._boxes, cast_rays)
         rays = np.flatnonzero(met)
         for v, of_view in enumerate(np.split(rays, np.searchsorted(rays, first[1:-1]))):
             if len(of_view):
@@ -162,13 +162,53 @@ def _ends(model: mujoco.MjModel, geom: int, head: Floats) -> tuple[Floats, Float
     return head + model.geom_pos[geom] - reach, head + model.geom_pos[geom] + reach
 
 
-_ROUND_OFF = 1e-9  # metres: spheres that a ray must come near before the capsule in it is tested are this much larger
-_STEEPEST = 1e30  # 1/m: greatest inverse of a direction; finite, so that no product with it is undefined
+class PlacedCapsules(NamedTuple):
+    """Capsules of people where they are.
+
+    Attributes:
+        placed: ends of their axes, (c, 2, 3), metres.
+        radii: their radii, (c,), metres.
+        first: first capsule of each person, and the end, (P + 1,).
+        around: bounding spheres of the people, centre and radius, (P, 4).
+    """
+
+    placed: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    first: NDArray[np.int64]
+    around: NDArray[np.float64]
+
+
+class CastRays(NamedTuple):
+    """Rays of several views, one after the other, r in all.
+
+    Attributes:
+        direction: unit vectors, (r, 3).
+        length: distance of the targets from the centres, metres, (r,).
+        near: distance from the centres at which the rays start, metres, (r,).
+        owner: person hit first, (r,).
+        distance: distance of the hit from the centre, metres, (r,).
+        met: which rays meet a box, (r,) bool.
+    """
+
+    direction: NDArray[np.float64]
+    length: NDArray[np.float64]
+    near: NDArray[np.float64]
+    owner: NDArray[np.int64]
+    distance: NDArray[np.float64]
+    met: NDArray[np.bool_]
 
 
 @njit(cache=True)
-def place_capsules(rest, bone, radii, first, bones, placed, around):
-    """Transform capsules (c, 2, 3) by their bones (P, B, 3, 4) and compute a bounding sphere of each person, (P, 4)."""
+def place_capsules(rest, bone, bones, people):
+    """Place capsules.
+
+    Args:
+        rest: ends of their axes in the rest pose, (c, 2, 3).
+        bone: bone of each, (c,).
+        bones: transforms of the bones of each person, (P, B, 3, 4).
+        people: the capsules; their places and bounding spheres are written.
+    """
+    placed, radii, first, around = people
     for person in range(len(bones)):
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for c in range(first[person], first[person + 1]):
@@ -180,7 +220,8 @@ def place_capsules(rest, bone, radii, first, bones, placed, around):
                         at += transform[k, j] * rest[c, end, j]
                     placed[c, end, k] = at
                     low[k], high[k] = min(low[k], at - radii[c]), max(high[k], at + radii[c])
-        around[person, :3] = (low + high) / 2
+        for k in range(3):
+            around[person, k] = (low[k] + high[k]) / 2
         around[person, 3] = np.sqrt(((high - low) ** 2).sum()) / 2
 
 
@@ -208,34 +249,24 @@ def box_geoms(geoms, local, position, turn, margin, low, high):
 
 
 @njit(cache=True)
-def cast_views(
-    centers, axes, targets, wanted, nearest, placed, radii, first, around, low, high, direction, length, near, owner,
-    distance, met,
-):  # fmt: skip
+def cast_views(cameras, targets, wanted, nearest, people, boxes, rays):
     """Cast rays at people, and find those that may hit an object before their ends.
 
     Args:
-        centers: camera centres, (V, 3).
-        axes: directions of the optical axes, (V, 3).
+        cameras: camera centres and directions of the optical axes, (V, 3) each.
         targets: ends of the rays, (V, n, 3).
         wanted: which of them are cast, (V, n), r in all.
         nearest: depth at which the rays start, metres.
-        placed: capsules, see :func:`place_capsules`.
-        radii: their radii, metres.
-        first: first capsule of each person, and the end, (P + 1,).
-        around: bounding spheres of the people, (P, 4).
-        low: lowest coordinates of boxes around objects, (3, m).
-        high: highest coordinates, (3, m).
-        direction: output, unit vectors, (r, 3).
-        length: output, distance of the targets from the centres, metres, (r,).
-        near: output, distance from the centres at which the rays start, metres, (r,).
-        owner: output, person hit first; unchanged without one, (r,).
-        distance: output, distance of the hit from the centre, metres; unchanged without one, (r,).
-        met: output, which rays meet a box, (r,) bool.
+        people: capsules of the people.
+        boxes: lowest and highest coordinates of boxes around objects, (3, m) each.
+        rays: the rays, written; owner and distance of a ray that hits nobody stay.
 
     Returns:
         Number of the first ray of each view, and the end, (V + 1,).
     """
+    centers, axes = cameras
+    low, high = boxes
+    direction, length, near, owner, distance, met = rays
     starts, count = np.zeros(len(centers) + 1, np.int64), 0
     for v in range(len(centers)):
         start, axis = centers[v], axes[v]
@@ -251,7 +282,7 @@ def cast_views(
         a, starts[v + 1] = starts[v], count
         ways, ends = direction[a:count], length[a:count]
         meet_boxes(start, ways, ends, low, high, met[a:count])
-        hit_people(start, ways, near[a:count], ends, placed, radii, first, around, owner[a:count], distance[a:count])
+        hit_people(start, ways, near[a:count], ends, people, owner[a:count], distance[a:count])
     return starts
 
 
@@ -292,8 +323,19 @@ def _inverse(share):
 
 
 @njit(cache=True)
-def hit_people(start, direction, near, length, placed, radii, first, around, owner, distance):
-    """Write the first person hit by each ray between ``near`` and ``length``, and the distance; none: unchanged."""
+def hit_people(start, direction, near, length, people, owner, distance):
+    """Write the first person hit by each ray between ``near`` and ``length``, and the distance; none: unchanged.
+
+    Args:
+        start: start of all rays, (3,).
+        direction: unit vectors, (n, 3).
+        near: distance from which on hits count, metres, (n,).
+        length: distance up to which hits count, metres, (n,).
+        people: fields of :class:`PlacedCapsules`.
+        owner: output, (n,).
+        distance: output, metres, (n,).
+    """
+    placed, radii, first, around = people
     spheres = np.empty((len(placed), 4))
     for c in range(len(placed)):
         square = 0.0

@@ -49,7 +49,7 @@ class RayObserver:
         bodies = playback.scene.bodies
         self._caster = RayCaster(playback.scene)
         self._radii = np.reshape([body.joint_radii for body in bodies], (len(bodies), 17))
-        self._outlines = [Outline.of(body) for body in bodies]
+        self._outlines = [Outline.from_body(body) for body in bodies]
         self._lookalikes = Lookalikes.from_scene(playback.scene)
         self._cameras: CameraArrays | None = None  # those of the last observation
         self._allowed = np.concatenate([np.zeros(len(bodies)), self._lookalikes.allowed])
@@ -57,7 +57,7 @@ class RayObserver:
     def observe(self, states: Sequence[PlaybackState], cameras: Sequence[Camera]) -> list[Observation]:
         """Return the observations: see :class:`simharness.capture.filming.Observer`."""
         people = len(self._radii)
-        self._cameras = views = CameraArrays.of(cameras, self._cameras)
+        self._cameras = views = CameraArrays.of_cameras(cameras, self._cameras)
         bands = np.stack([state.joints for state in states])
         bands = np.concatenate([bands, self._lookalikes.joints(bands)], axis=1)  # lookalikes after the people
         if len(bands) > 1:
@@ -141,7 +141,7 @@ class CameraArrays:
     table: Floats
 
     @classmethod
-    def of(cls, cameras: Sequence[Camera], last: CameraArrays | None = None) -> CameraArrays:
+    def of_cameras(cls, cameras: Sequence[Camera], last: CameraArrays | None = None) -> CameraArrays:
         """Return the parameters of cameras, or ``last`` if it holds these same objects: a rig that stands still."""
         if last is not None and len(cameras) == len(last.cameras) and all(map(operator.is_, cameras, last.cameras)):
             return last

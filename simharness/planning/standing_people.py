@@ -129,7 +129,7 @@ def _pose_pool(activities: tuple[str, ...]) -> PosePool:
     )
     scene = build(scenario, build_rig(scenario.cameras, seed=0, room=None))
     ways = even_directions(_EXTREMES).T
-    caster, outlines = RayCaster(scene), [Outline.of(body) for body in scene.bodies]
+    caster, outlines = RayCaster(scene), [Outline.from_body(body) for body in scene.bodies]
     landmarks, capsules, radii, depths, bodies, skins = [], [], [], [], [], []
     for state in Playback(scene).over(np.linspace(_FIRST, _LAST, _POSES)):
         caster.place(state)

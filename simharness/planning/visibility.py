@@ -115,9 +115,8 @@ def _cast(center, forward, inside, direction, length, capsules, radii, objects, 
                 near[n], hit[n], distance[n] = NEAR / along, -1, np.inf
                 n += 1
         placed = capsules[s].copy().reshape(people * count, 2, 3)
-        hit_people(
-            center, way[:n], near[:n], reach[:n], placed, radii[s].copy().ravel(), first, around, hit[:n], distance[:n]
-        )
+        bodies = placed, radii[s].copy().ravel(), first, around
+        hit_people(center, way[:n], near[:n], reach[:n], bodies, hit[:n], distance[:n])
         for i in range(n):
             for b in range(len(objects)):
                 entry = _enter_box(center, way[i], objects[b])

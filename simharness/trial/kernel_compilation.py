@@ -1,30 +1,30 @@
 """Compilation of kernels in a second process while this one builds and films.
 
 Compilation takes most of the first run after an installation. The second process compiles those kernels that pictures
-need last, because this process needs them first, and then those of the method in the order of its stages. When this
-process has nothing else to do, it begins with the last stage, reconstruction, which takes as long as the others. All
-are written to the cache on disk, from which the processes that film and estimate load them (:mod:`mvpose.kernels`). A
-process that needs a kernel that another one compiles waits for it.
+need last, because this process needs the others first, and then those of the method in the order of its stages. When
+this process has nothing else to do, it begins with the last stage, reconstruction, which takes as long as the others.
+All are written to the cache on disk, from which the processes that film and estimate load them (:mod:`mvpose.kernels`).
+A process that needs a kernel that another one compiles waits for it.
 """
 
 from __future__ import annotations
 
-import contextlib
 import multiprocessing
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from importlib import import_module, resources
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numba.core.errors import NumbaError
-from numba.core.sigutils import normalize_signature
 
 from mvpose import COCO17, Camera, Detections, Pipeline, Rig, preset
 from mvpose.estimate import Matching
 from mvpose.estimators import SequenceEstimator
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS
 from mvpose.rays import ordered_rays
+from simharness.types.finish import Finish
+from simharness.types.light_sources import AreaLight, LightSources
+from simharness.types.lighting import Lighting
+from simharness.types.mesh import Mesh
 
 _PICTURES = "pictures"  # stands for the kernels of pictures among the names of variants
 
@@ -59,24 +59,36 @@ class Compilation:
 
 def _compile(names: set[str]) -> None:
     if _PICTURES in names:
-        for kernel, types in picture_kernels():
-            with contextlib.suppress(NumbaError):  # the list is old: the kernel is compiled when it is used
-                kernel.compile(types)
+        compile_pictures()
     compile_kernels(names - {_PICTURES})
 
 
-def picture_kernels() -> Iterator[tuple[Any, tuple[Any, ...]]]:
-    """Yield kernels that pictures need last, and numba's types of their arguments.
+def compile_pictures() -> None:
+    """Compile the kernels that light and shade pictures, or load them from the cache.
 
-    The list is written by ``python -m tools.picture_kernels``. Kernels that are no more are left out.
+    A lamp lights a floor and a body, of which no pixel is seen: what draws pixels is left out.
     """
-    text = resources.files("simharness.trial").joinpath("data/picture_kernels.txt").read_text(encoding="utf-8")
-    for line in text.splitlines():
-        place, _, signature = line.partition(" ")
-        module, _, name = place.rpartition(".")
-        with contextlib.suppress(ImportError, AttributeError):
-            kernel = getattr(import_module(module), name)
-            yield kernel, normalize_signature(signature)[0]
+    from simharness.capture.rendering.backgrounds import Background
+    from simharness.capture.rendering.lit_scene import LitScene
+    from simharness.capture.rendering.scene_geometry import SceneGeometry
+    from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
+    from simharness.capture.sensor import develop
+    from simharness.scenario.sections.cameras_section import SensorSection
+
+    triangle = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]], np.float32)
+    faces, colors, zeros = np.array([[0, 1, 2]], np.int32), np.ones((1, 3), np.float32), np.zeros(3, np.float32)
+    skin = Finish(np.ones(1, np.int8), np.zeros(3, np.int32), zeros, zeros, zeros)
+    meshes = [Mesh(triangle, faces, colors, still=True), Mesh(triangle + zeros, faces, colors, finish=skin)]
+    lamp = AreaLight((0.0, 0.0, 3.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    geometry = SceneGeometry.from_meshes(meshes)
+    scene = LitScene.in_light(geometry, Lighting(sources=LightSources((lamp,))))
+    assert scene is not None  # it has sources and a floor
+    shown, inverse_depth = np.full((2, 2), -1, np.int32), np.zeros((2, 2), np.float32)
+    drawn, view = DrawnPixels(shown, inverse_depth, np.zeros((6, 3))), PixelRays(np.zeros(3), np.eye(3))
+    labels, ids = geometry.topology.mesh, np.full((2, 2), -1, np.int16)
+    empty = Background(view.to_rays, inverse_depth, shown, drawn.corners, inverse_depth, labels, ids)
+    rgb = scene.draw(scene.background(empty, view), np.zeros((0, 3), np.int32), drawn, view)
+    develop(rgb, SensorSection(shot_noise=0.01), seed=0, view=0, frame=0)
 
 
 def compile_kernels(variants: Iterable[str]) -> None:

@@ -37,7 +37,7 @@ class LitBackground:
         shadow_place: place of each pixel in the shadow maps, (h, w) uint16: see
             :func:`~simharness.capture.rendering.shadow_maps.shadow_places`; empty with sources.
         shadow_depth: inverse depth of each pixel from the light, (h, w) float32; empty with sources.
-        runs: runs of pixels over the blocks of :class:`~simharness.capture.rendering.lit_scene.Grid`, (n, 5): see
+        runs: runs of pixels over the blocks of :class:`~simharness.capture.rendering.lit_scene.ShadowGrid`, (n, 5): see
             :func:`~simharness.capture.rendering.moving_shadows.runs_below`; empty without sources.
     """
 

@@ -1,4 +1,4 @@
-"""Compiled rays against still triangles, with a tree of bounding boxes: private, on plain arrays, single-threaded.
+"""Compiled rays against still triangles, with a tree of bounding boxes.
 
 A node of the tree has a box and either two children or up to ``_LEAF`` triangles. Triangles are met by the test of
 Möller and Trumbore ("Fast, minimum storage ray/triangle intersection", 1997), from both sides.
@@ -6,7 +6,10 @@ Möller and Trumbore ("Fast, minimum storage ray/triangle intersection", 1997), 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.kernels import njit
 
@@ -15,14 +18,25 @@ _BINS = 12
 DEEPEST = 64
 
 
+class BoxTree(NamedTuple):
+    """Tree of k triangles.
+
+    Attributes:
+        boxes: lowest, then highest coordinates of the nodes, (m, 6).
+        links: the first of two children, that follow each other, and 0; or the first triangle and their number, (m, 2).
+        triangles: a corner and the edges to the other two, (k, 9).
+    """
+
+    boxes: NDArray[np.float32]
+    links: NDArray[np.int32]
+    triangles: NDArray[np.float32]
+
+
 @njit(cache=True, error_model="numpy")
 def build_tree(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the tree of triangles (k, 3, 3): boxes (m, 6), links (m, 2), triangles as drawn (k, 9), their order (k,).
+    """Return the fields of the :class:`BoxTree` of triangles (k, 3, 3), and the index of each among them, (k,).
 
-    A box is lowest, then highest coordinates. A link is the first of two children, that follow each other, and 0; or
-    the first triangle and their number. A triangle is a corner and the edges to the other two; ``order`` is its index
-    among the ``corners``. Nodes
-    are split where boxes times triangles have the least surface, by bins (Wald, 2007).
+    Nodes are split where boxes times triangles have the least surface, by bins (Wald, 2007).
     """
     count = len(corners)
     middles, order = np.empty((count, 3), np.float32), np.arange(count)
@@ -111,9 +125,7 @@ def _extent(spans: np.ndarray, axis: int) -> float:
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def trace(
-    boxes: np.ndarray,
-    links: np.ndarray,
-    triangles: np.ndarray,
+    tree: BoxTree,
     stack: np.ndarray,
     start: tuple[float, float, float],
     way: tuple[float, float, float],
@@ -123,15 +135,14 @@ def trace(
     """Return the first triangle on a ray in tree order, or -1; its distance; weights of its second and third corner.
 
     Args:
-        boxes: see :func:`build_tree`.
-        links: see :func:`build_tree`.
-        triangles: see :func:`build_tree`.
+        tree: tree of the triangles.
         stack: memory, (``DEEPEST``,) int32.
         start: start of the ray.
         way: its direction; distances are in its length.
         reach: largest distance.
         any_hit: whether any triangle will do, not only the nearest.
     """
+    boxes, links, triangles = tree
     sx, sy, sz = np.float32(start[0]), np.float32(start[1]), np.float32(start[2])
     wx, wy, wz = np.float32(way[0]), np.float32(way[1]), np.float32(way[2])
     tiny, one, zero = np.float32(1e-12), np.float32(1.0), np.float32(0.0)

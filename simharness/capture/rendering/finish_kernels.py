@@ -1,4 +1,4 @@
-"""Compiled shading of skin, hair, cloth and leather: private, on plain arrays, single-threaded.
+"""Compiled shading of skin, hair, cloth and leather.
 
 A picture shows the light that a surface receives times its albedo. These kernels add what that leaves out, for some
 pixels together: they multiply the received light, and write the share of it that the surface reflects like a mirror.
@@ -20,8 +20,10 @@ The light around a figure is taken as one direction and an even rest: a row of :
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.kernels import njit
 from simharness.capture.rendering.surface_kernels import NORMAL_X, NORMAL_Y, NORMAL_Z, PIXELS, SECOND, THIRD
@@ -84,48 +86,55 @@ _TABLE, _SLOPES = _surface_table(), _fold_table()
 _LOCKS, _STRANDS = _strand_tables()
 
 
+class FinishArrays(NamedTuple):
+    """Finishes of moving meshes in a pose and light, for one camera; of m faces and v vertices.
+
+    Attributes:
+        material: material of the faces, (m,) int8; empty where all surfaces are matte.
+        figure: mesh of the faces, (m,) int16.
+        lights: light around the meshes, see :func:`.finishes.figure_light`, (meshes, 7).
+        pixel: size of a pixel at each mesh, metres, (meshes,) float32.
+        grain: see :func:`.finishes.grain_of`, (v, 4).
+        place: see :class:`simharness.types.finish.Finish`, (v,).
+        around: period of the place of hair, metres.
+    """
+
+    material: NDArray[np.int8]
+    figure: NDArray[np.int16]
+    lights: NDArray[np.float32]
+    pixel: NDArray[np.float32]
+    grain: NDArray[np.float32]
+    place: NDArray[np.float32]
+    around: float
+
+
 @njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def finish(
-    labels: np.ndarray,
-    columns: np.ndarray,
-    rows: np.ndarray,
-    first_face: int,
+    pixels: tuple[np.ndarray, ...],
+    first: tuple[int, int],
     faces: np.ndarray,
-    first_vertex: int,
     rays: np.ndarray,
     narrow: np.ndarray,
-    material: np.ndarray,
-    figure: np.ndarray,
-    lights: np.ndarray,
-    pixel: np.ndarray,
-    grain: np.ndarray,
-    place: np.ndarray,
-    around: float,
+    finishes: FinishArrays,
     work: np.ndarray,
     received: np.ndarray,
 ) -> None:
     """Finish some pixels: multiply the received light, and write the share of it that is reflected without colour.
 
     Args:
-        labels: visible faces, (n,) int32, n at most ``PIXELS``; none is before ``first_face``.
-        columns: columns of the pixels, (n,) int32.
-        rows: rows of the pixels, (n,) int32.
-        first_face: first face of the moving meshes.
+        pixels: see :func:`.surface_kernels.gather`; no face is before the first moving one.
+        first: first face and first vertex of the moving meshes.
         faces: vertex indices of all faces, (k, 3).
-        first_vertex: first vertex of the moving meshes.
-        rays: see :func:`.shading_kernels.shade`.
+        rays: matrix that turns pixels into rays, (3, 3).
         narrow: surfaces of the pixels, see :func:`.surface_kernels.gather`.
-        material: material of the moving faces, (m,) int8.
-        figure: mesh of the moving faces, (m,) int16.
-        lights: light around the meshes, see :func:`.finishes.figure_light`, (meshes, 7).
-        pixel: size of a pixel at each mesh, metres, (meshes,) float32.
-        grain: see :func:`.finishes.grain_of`; of the moving vertices, (v, 4).
-        place: see :class:`simharness.types.finish.Finish`, (v,).
-        around: period of the place of hair, metres.
+        finishes: finishes of the moving meshes.
         work: memory, (``FINISHING``,) float32; the row from ``GLOSS`` on is the share that is reflected without colour.
         received: light on the pixels in rows of ``PIXELS``: red, green, blue; changed.
     """
-    _look(columns, rows, rays, work)
+    labels, columns, rows = pixels
+    first_face, first_vertex = first
+    material, figure, lights, pixel, grain, place, around = finishes
+    _face_camera(columns, rows, rays, work)
     per_turn, end, last = np.float32(around), 0, len(labels)
     while end < last:
         start, f = end, np.uint32(labels[end] - first_face)
@@ -190,13 +199,11 @@ def finish(
 
 
 @njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _look(columns: np.ndarray, rows: np.ndarray, rays: np.ndarray, work: np.ndarray) -> None:
+def _face_camera(columns: np.ndarray, rows: np.ndarray, rays: np.ndarray, work: np.ndarray) -> None:
     """Write the unit directions from pixels to the camera, (n,) each."""
-    x_of, y_of, z_of = (
-        work[_VIEW_X : _VIEW_X + PIXELS],
-        work[_VIEW_Y : _VIEW_Y + PIXELS],
-        work[_VIEW_Z : _VIEW_Z + PIXELS],
-    )
+    x_of = work[_VIEW_X : _VIEW_X + PIXELS]
+    y_of = work[_VIEW_Y : _VIEW_Y + PIXELS]
+    z_of = work[_VIEW_Z : _VIEW_Z + PIXELS]
     ax, bx, cx = np.float32(-rays[0, 0]), np.float32(-rays[0, 1]), np.float32(-rays[0, 2])
     ay, by, cy = np.float32(-rays[1, 0]), np.float32(-rays[1, 1]), np.float32(-rays[1, 2])
     az, bz, cz = np.float32(-rays[2, 0]), np.float32(-rays[2, 1]), np.float32(-rays[2, 2])
@@ -211,14 +218,12 @@ def _look(columns: np.ndarray, rows: np.ndarray, rays: np.ndarray, work: np.ndar
 def _lobe(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray, surface: np.ndarray) -> None:
     """Write the gloss of pixels of one material; ``light`` is a row of lights."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
-    normal_x, normal_y, normal_z = (
-        narrow[NORMAL_X + first : NORMAL_X + last], narrow[NORMAL_Y + first : NORMAL_Y + last],
-        narrow[NORMAL_Z + first : NORMAL_Z + last],
-    )  # fmt: skip
-    view_x, view_y, view_z = (
-        work[_VIEW_X + first : _VIEW_X + last], work[_VIEW_Y + first : _VIEW_Y + last],
-        work[_VIEW_Z + first : _VIEW_Z + last],
-    )  # fmt: skip
+    normal_x = narrow[NORMAL_X + first : NORMAL_X + last]
+    normal_y = narrow[NORMAL_Y + first : NORMAL_Y + last]
+    normal_z = narrow[NORMAL_Z + first : NORMAL_Z + last]
+    view_x = work[_VIEW_X + first : _VIEW_X + last]
+    view_y = work[_VIEW_Y + first : _VIEW_Y + last]
+    view_z = work[_VIEW_Z + first : _VIEW_Z + last]
     gloss = work[GLOSS + first : GLOSS + last]
     reflectance, rough = surface[0], surface[1]
     alpha = rough * rough + light[6] * _HALF
@@ -243,10 +248,9 @@ def _lobe(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np
 def _tint(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray, wrap: np.float32) -> None:
     """Write to ``_TONE`` by which share there is more red light on skin: it reaches farther through than over it."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
-    normal_x, normal_y, normal_z = (
-        narrow[NORMAL_X + first : NORMAL_X + last], narrow[NORMAL_Y + first : NORMAL_Y + last],
-        narrow[NORMAL_Z + first : NORMAL_Z + last],
-    )  # fmt: skip
+    normal_x = narrow[NORMAL_X + first : NORMAL_X + last]
+    normal_y = narrow[NORMAL_Y + first : NORMAL_Y + last]
+    normal_z = narrow[NORMAL_Z + first : NORMAL_Z + last]
     more, scale = work[_TONE + first : _TONE + last], _UNIT / (_UNIT + wrap)
     for n in range(len(more)):
         nz = normal_z[n]
@@ -259,14 +263,12 @@ def _tint(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np
 def _fold(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light: np.ndarray) -> None:
     """Write to ``_TONE`` how the light changes on normals that are tilted by slopes along the grain."""
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
-    normal_x, normal_y, normal_z = (
-        narrow[NORMAL_X + first : NORMAL_X + last], narrow[NORMAL_Y + first : NORMAL_Y + last],
-        narrow[NORMAL_Z + first : NORMAL_Z + last],
-    )  # fmt: skip
-    grain_x, grain_y, grain_z = (
-        work[_GRAIN_X + first : _GRAIN_X + last], work[_GRAIN_Y + first : _GRAIN_Y + last],
-        work[_GRAIN_Z + first : _GRAIN_Z + last],
-    )  # fmt: skip
+    normal_x = narrow[NORMAL_X + first : NORMAL_X + last]
+    normal_y = narrow[NORMAL_Y + first : NORMAL_Y + last]
+    normal_z = narrow[NORMAL_Z + first : NORMAL_Z + last]
+    grain_x = work[_GRAIN_X + first : _GRAIN_X + last]
+    grain_y = work[_GRAIN_Y + first : _GRAIN_Y + last]
+    grain_z = work[_GRAIN_Z + first : _GRAIN_Z + last]
     tilt, tone = work[_TILT + first : _TILT + last], work[_TONE + first : _TONE + last]
     for n in range(len(tone)):
         nx, ny, nz, gx, gy, gz = normal_x[n], normal_y[n], normal_z[n], grain_x[n], grain_y[n], grain_z[n]
@@ -292,18 +294,15 @@ def _strands(narrow: np.ndarray, work: np.ndarray, first: int, last: int, light:
     highlight of their surface, as a share of the light so changed.
     """
     light_x, light_y, light_z, key, rest, rise = light[0], light[1], light[2], light[3], light[4], light[5]
-    normal_x, normal_y, normal_z = (
-        narrow[NORMAL_X + first : NORMAL_X + last], narrow[NORMAL_Y + first : NORMAL_Y + last],
-        narrow[NORMAL_Z + first : NORMAL_Z + last],
-    )  # fmt: skip
-    view_x, view_y, view_z = (
-        work[_VIEW_X + first : _VIEW_X + last], work[_VIEW_Y + first : _VIEW_Y + last],
-        work[_VIEW_Z + first : _VIEW_Z + last],
-    )  # fmt: skip
-    grain_x, grain_y, grain_z = (
-        work[_GRAIN_X + first : _GRAIN_X + last], work[_GRAIN_Y + first : _GRAIN_Y + last],
-        work[_GRAIN_Z + first : _GRAIN_Z + last],
-    )  # fmt: skip
+    normal_x = narrow[NORMAL_X + first : NORMAL_X + last]
+    normal_y = narrow[NORMAL_Y + first : NORMAL_Y + last]
+    normal_z = narrow[NORMAL_Z + first : NORMAL_Z + last]
+    view_x = work[_VIEW_X + first : _VIEW_X + last]
+    view_y = work[_VIEW_Y + first : _VIEW_Y + last]
+    view_z = work[_VIEW_Z + first : _VIEW_Z + last]
+    grain_x = work[_GRAIN_X + first : _GRAIN_X + last]
+    grain_y = work[_GRAIN_Y + first : _GRAIN_Y + last]
+    grain_z = work[_GRAIN_Z + first : _GRAIN_Z + last]
     tilt, tone = work[_TILT + first : _TILT + last], work[_TONE + first : _TONE + last]
     gloss = work[GLOSS + first : GLOSS + last]
     for n in range(len(gloss)):

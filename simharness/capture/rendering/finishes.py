@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.camera import Camera
 from mvpose.kernels import njit
-from simharness.capture.rendering.moving_light import light_at
+from simharness.capture.rendering.finish_kernels import FinishArrays
+from simharness.capture.rendering.moving_light import AirLight, light_at
 from simharness.capture.rendering.room_light import Probes
+from simharness.capture.rendering.surface_kernels import PixelRays
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.types.srgb import LUMINANCE
@@ -23,6 +23,12 @@ from simharness.types.srgb import LUMINANCE
 Floats = NDArray[np.float32]
 
 _AROUND = 0.6  # metres: see Finish.around
+_HEIGHT = 0.75  # share of a figure's height at which its light is taken
+_SLACK = 0.02  # share of its length by which cloth shortens without a fold
+_DEPTH, _DEEPEST = 1.3, 0.65  # slope of folds for each unit of shortening beyond it, and at most
+_EVER = 0.07  # slope of folds of loose cloth at rest
+_ZERO, _UNIT, _TINY = np.float32(0.0), np.float32(1.0), np.float32(1e-6)
+_RED, _GREEN, _BLUE = LUMINANCE
 
 
 @dataclass(frozen=True)
@@ -47,7 +53,7 @@ class Finishes:
     around: float = _AROUND
 
     @classmethod
-    def of(cls, meshes: tuple[Mesh, ...]) -> Finishes | None:
+    def from_meshes(cls, meshes: tuple[Mesh, ...]) -> Finishes | None:
         """Return the finishes of meshes in the order of their faces and vertices; None if all are matte."""
         if all(mesh.finish is None for mesh in meshes):
             return None
@@ -81,7 +87,7 @@ class PosedFinishes:
 
     Attributes:
         finishes: what does not change.
-        lights: light around the meshes, see :func:`.finishes.figure_light`, (meshes, 7).
+        lights: light around the meshes, see :func:`figure_light`, (meshes, 7).
         grain: direction of the grain and slope of folds at the vertices, (v, 4).
         middles: middles of the meshes, (meshes, 3).
     """
@@ -92,12 +98,11 @@ class PosedFinishes:
     middles: Floats
 
     @classmethod
-    def of(
+    def in_pose(
         cls, finishes: Finishes, vertices: Floats, before_mirror: Floats, lighting: Lighting, probes: Probes
     ) -> PosedFinishes:
         """Return the finishes at vertices (v, 3); in a mirror their light is that of the vertices before it."""
-        every = probes.every.reshape(*probes.every.shape[:3], 18)
-        lights = figure_light(before_mirror, finishes.spans, probes.origin, probes.step, every, probes.straight)
+        lights = figure_light(before_mirror, finishes.spans, probes.air)
         if lighting.mirror is not None:
             normal = np.array(lighting.mirror.normal, np.float32)
             lights[:, :3] -= 2 * (lights[:, :3] @ normal)[:, None] * normal
@@ -105,15 +110,15 @@ class PosedFinishes:
         grain = grain_of(vertices, finishes.toward, finishes.rest, finishes.looseness)
         return cls(finishes, lights, grain, middles)
 
-    def arguments(self, camera: Camera, rays: NDArray[np.float64]) -> tuple[Any, ...]:
-        """Return what :func:`.finish_kernels.finish` takes from ``material`` to ``around``."""
-        away = np.linalg.norm(self.middles - camera.center, axis=1)
-        pixel = (away * np.linalg.norm(rays[:, 0])).astype(np.float32)
+    def arrays(self, view: PixelRays) -> FinishArrays:
+        """Return the finishes as the kernels take them, in the pictures of a camera."""
+        away = np.linalg.norm(self.middles - view.center, axis=1)
+        pixel = (away * np.linalg.norm(view.to_rays[:, 0])).astype(np.float32)
         kept = self.finishes
-        return kept.material, kept.figure, self.lights, pixel, self.grain, kept.place, kept.around
+        return FinishArrays(kept.material, kept.figure, self.lights, pixel, self.grain, kept.place, kept.around)
 
 
-MATTE = (
+MATTE = FinishArrays(
     np.zeros(0, np.int8),
     np.zeros(0, np.int16),
     np.zeros((0, 7), np.float32),
@@ -122,15 +127,7 @@ MATTE = (
     np.zeros(0, np.float32),
     _AROUND,
 )
-"""The same without a finish: all surfaces are matte."""
-
-
-_HEIGHT = 0.75  # share of a figure's height at which its light is taken
-_SLACK = 0.02  # share of its length by which cloth shortens without a fold
-_DEPTH, _DEEPEST = 1.3, 0.65  # slope of folds for each unit of shortening beyond it, and at most
-_EVER = 0.07  # slope of folds of loose cloth at rest
-_ZERO, _UNIT, _TINY = np.float32(0.0), np.float32(1.0), np.float32(1e-6)
-_RED, _GREEN, _BLUE = LUMINANCE
+"""No finish: all surfaces are matte."""
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
@@ -159,10 +156,7 @@ def grain_of(vertices: np.ndarray, toward: np.ndarray, rest: np.ndarray, loosene
 
 
 @njit(cache=True, error_model="numpy")
-def figure_light(
-    vertices: np.ndarray, spans: np.ndarray, origin: np.ndarray, step: np.ndarray, every: np.ndarray,
-    straight: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+def figure_light(vertices: np.ndarray, spans: np.ndarray, air: AirLight) -> np.ndarray:
     """Return the light around figures, (meshes, 7) float32.
 
     A row is the unit direction to the direct light, the luminance of its irradiance, that of the rest, the change of
@@ -171,11 +165,9 @@ def figure_light(
     Args:
         vertices: vertices of the moving meshes, (v, 3).
         spans: first and end of the vertices of each mesh, (meshes, 2).
-        origin: origin of the probes, (3,).
-        step: distances of the probes, (3,).
-        every: light of all sources at the probes by the six directions, (nx, ny, nz, 18).
-        straight: luminance of what comes straight from area lights and sun, (nx, ny, nz, 6).
+        air: light of the room.
     """
+    origin, step, every, straight = air
     result = np.zeros((len(spans), 7), np.float32)
     column, direct, rest = np.empty(18), np.empty(6), np.empty(6)
     for mesh in range(len(spans)):

@@ -129,7 +129,7 @@ class GlRenderer:
 
     def _stage(self, meshes: Sequence[Mesh]) -> None:
         """Upload the meshes; those that are already uploaded (the same objects) are kept."""
-        geometry = SceneGeometry.of(meshes, self._geometry)
+        geometry = SceneGeometry.from_meshes(meshes, self._geometry)
         if geometry is self._geometry:
             return
         scene = self._pyrender.Scene()

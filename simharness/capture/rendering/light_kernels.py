@@ -1,4 +1,4 @@
-"""Compiled kernels of the light that reaches still surfaces and places in the air: private, on plain arrays.
+"""Compiled kernels of the light that reaches still surfaces and places in the air.
 
 Irradiance is in the unit of :mod:`simharness.types.light_sources`: under a hemisphere of radiance L it is L.
 """
@@ -6,36 +6,64 @@ Irradiance is in the unit of :mod:`simharness.types.light_sources`: under a hemi
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.box_tree_kernels import DEEPEST, trace
+from simharness.capture.rendering.box_tree_kernels import DEEPEST, BoxTree, trace
 
 _SIDE = 4  # points on an area light along each side, of which shadow rays are cast
 _OFF = 2e-3  # metres from a surface to the start of its rays
 SKY, DARK = -1, -2  # what a ray meets: nothing; the back of a surface
 
 
+class SourceArrays(NamedTuple):
+    """Sources of light as the kernels take them.
+
+    Attributes:
+        areas: area lights: centre, right, up, radiance, focus, (m, 13).
+        windows: which of them are windows, (m,) bool.
+        sun: unit direction to the sun and its irradiance, (6,).
+    """
+
+    areas: NDArray[np.float64]
+    windows: NDArray[np.bool_]
+    sun: NDArray[np.float64]
+
+
+class SampledFaces(NamedTuple):
+    """Faces that rays may meet, and their light samples.
+
+    Attributes:
+        order: index of the face of each triangle of the tree.
+        face_normals: unit normals of the faces, (k, 3).
+        corner_samples: see :class:`.light_samples.LightSamples`.
+        divisions: see :class:`.light_samples.LightSamples`.
+    """
+
+    order: NDArray[np.int64]
+    face_normals: NDArray[np.float32]
+    corner_samples: NDArray[np.int32]
+    divisions: NDArray[np.int32]
+
+
 @njit(cache=True, error_model="numpy")
 def from_area(
-    x: float, y: float, z: float, area: np.ndarray, boxes: np.ndarray, links: np.ndarray, triangles: np.ndarray,
-    stack: np.ndarray, received: np.ndarray,
-) -> float:  # fmt: skip
+    place: tuple[float, float, float], area: np.ndarray, tree: BoxTree, stack: np.ndarray, received: np.ndarray
+) -> float:
     """Write the light of an area light at a place by direction, and return the share of the light that is not blocked.
 
     Args:
-        x: place, as ``y`` and ``z``.
-        y: see ``x``.
-        z: see ``x``.
-        area: centre, right, up, radiance (the last is not used here), focus, (13,).
-        boxes: see :func:`.box_tree_kernels.build_tree`, as ``links`` and ``triangles``.
-        links: see ``boxes``.
-        triangles: see ``boxes``.
+        place: the place.
+        area: row of :attr:`SourceArrays.areas`.
+        tree: what blocks light.
         stack: memory.
         received: for every point of the light the unit direction to it, and the irradiance of a surface that faces it,
             for a radiance of 1, written, (``_SIDE ** 2``, 4); 0 where something blocks it.
     """
+    x, y, z = place
     ax, ay, az, bx, by, bz = area[3], area[4], area[5], area[6], area[7], area[8]
     nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     size = math.sqrt(nx * nx + ny * ny + nz * nz)
@@ -63,55 +91,39 @@ def from_area(
     # The outer points first: if they agree, so do mostly those between them.
     seen = 0
     for n in (0, _SIDE - 1, _SIDE * (_SIDE - 1), _SIDE * _SIDE - 1):
-        seen += _open_to(x, y, z, area, n, boxes, links, triangles, stack)
+        seen += _open_to(place, area, n, tree, stack)
     if seen == 4:
         return 1.0
     left = 0.0
     for n in range(_SIDE * _SIDE):
-        if seen == 0 or not _open_to(x, y, z, area, n, boxes, links, triangles, stack):
+        if seen == 0 or not _open_to(place, area, n, tree, stack):
             received[n, 3] = 0.0
         left += received[n, 3]
     return left / total
 
 
 @njit(cache=True, error_model="numpy")
-def _open_to(
-    x: float,
-    y: float,
-    z: float,
-    area: np.ndarray,
-    n: int,
-    boxes: np.ndarray,
-    links: np.ndarray,
-    triangles: np.ndarray,
-    stack: np.ndarray,
-) -> bool:
+def _open_to(place: tuple[float, float, float], area: np.ndarray, n: int, tree: BoxTree, stack: np.ndarray) -> bool:
+    x, y, z = place
     across, up = (2.0 * (n // _SIDE) + 1.0) / _SIDE - 1.0, (2.0 * (n % _SIDE) + 1.0) / _SIDE - 1.0
     dx = area[0] + across * area[3] + up * area[6] - x
     dy = area[1] + across * area[4] + up * area[7] - y
     dz = area[2] + across * area[5] + up * area[8] - z
-    return trace(boxes, links, triangles, stack, (x, y, z), (dx, dy, dz), 0.995, True)[0] < 0
+    return trace(tree, stack, place, (dx, dy, dz), 0.995, True)[0] < 0
 
 
 @njit(cache=True, error_model="numpy")
-def sunlit(
-    x: float, y: float, z: float, sun: np.ndarray, areas: np.ndarray, windows: np.ndarray, boxes: np.ndarray,
-    links: np.ndarray, triangles: np.ndarray, stack: np.ndarray,
-) -> bool:  # fmt: skip
+def sunlit(place: tuple[float, float, float], sources: SourceArrays, tree: BoxTree, stack: np.ndarray) -> bool:
     """Return whether the sun shines at a place: through a window if there are any, else where nothing is in the way.
 
     Args:
-        x: place, as ``y`` and ``z``.
-        y: see ``x``.
-        z: see ``x``.
-        sun: unit direction to the sun, (3,).
-        areas: area lights, see :func:`from_area`, (n, 13).
-        windows: which of them are windows, (n,) bool.
-        boxes: see :func:`.box_tree_kernels.build_tree`, as ``links`` and ``triangles``.
-        links: see ``boxes``.
-        triangles: see ``boxes``.
+        place: the place.
+        sources: sources of light.
+        tree: what blocks light.
         stack: memory.
     """
+    x, y, z = place
+    areas, windows, sun = sources
     for k in range(len(areas)):
         if not windows[k]:
             continue
@@ -128,24 +140,16 @@ def sunlit(
         right, up = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz
         if abs(hx * ax + hy * ay + hz * az) > right or abs(hx * bx + hy * by + hz * bz) > up:
             continue
-        if trace(boxes, links, triangles, stack, (x, y, z), (sun[0], sun[1], sun[2]), far - 0.02, True)[0] < 0:
+        if trace(tree, stack, place, (sun[0], sun[1], sun[2]), far - 0.02, True)[0] < 0:
             return True
     if windows.any():
         return False
-    return trace(boxes, links, triangles, stack, (x, y, z), (sun[0], sun[1], sun[2]), 1e4, True)[0] < 0
+    return trace(tree, stack, place, (sun[0], sun[1], sun[2]), 1e4, True)[0] < 0
 
 
 @njit(cache=True, error_model="numpy")
 def direct_light(
-    places: np.ndarray,
-    normals: np.ndarray,
-    reach_of: np.ndarray,
-    areas: np.ndarray,
-    windows: np.ndarray,
-    sun: np.ndarray,
-    boxes: np.ndarray,
-    links: np.ndarray,
-    triangles: np.ndarray,
+    places: np.ndarray, normals: np.ndarray, reach_of: np.ndarray, sources: SourceArrays, tree: BoxTree
 ) -> np.ndarray:
     """Return the irradiance (n, 3) of surfaces by area lights and the sun, with soft shadows.
 
@@ -153,13 +157,10 @@ def direct_light(
         places: points on surfaces, (n, 3).
         normals: their unit normals, (n, 3).
         reach_of: side of the square that each stands for, metres, (n,).
-        areas: area lights, see :func:`from_area`, (m, 13).
-        windows: which of them are windows, (m,) bool.
-        sun: unit direction to the sun and its irradiance, (6,); zeros without sun.
-        boxes: see :func:`.box_tree_kernels.build_tree`, as ``links`` and ``triangles``.
-        links: see ``boxes``.
-        triangles: see ``boxes``.
+        sources: sources of light.
+        tree: what blocks light.
     """
+    areas, _, sun = sources
     light = np.zeros((len(places), 3), np.float32)
     received, stack = np.empty((_SIDE * _SIDE, 4)), np.empty(DEEPEST, np.int32)
     for s in range(len(places)):
@@ -171,7 +172,7 @@ def direct_light(
                 reach += abs(areas[k, 3 + c]) + abs(areas[k, 6 + c])
             if nx * (areas[k, 0] - x) + ny * (areas[k, 1] - y) + nz * (areas[k, 2] - z) < -reach:
                 continue  # the light is behind the surface
-            if from_area(x, y, z, areas[k], boxes, links, triangles, stack, received) <= 0:
+            if from_area((x, y, z), areas[k], tree, stack, received) <= 0:
                 continue
             value = 0.0
             for n in range(_SIDE * _SIDE):
@@ -188,42 +189,24 @@ def direct_light(
         for n in range(_SIDE * _SIDE):
             u = reach_of[s] * ((n // _SIDE + 0.5) / _SIDE - 0.5)
             v = reach_of[s] * ((n % _SIDE + 0.5) / _SIDE - 0.5)
-            hits += sunlit(
-                x + u * ux + v * vx, y + u * uy + v * vy, z + u * uz + v * vz, sun, areas, windows, boxes, links,
-                triangles, stack,
-            )  # fmt: skip
+            hits += sunlit((x + u * ux + v * vx, y + u * uy + v * vy, z + u * uz + v * vz), sources, tree, stack)
         for c in range(3):
             light[s, c] += np.float32(cosine * sun[3 + c] * hits / (_SIDE * _SIDE))
     return light
 
 
 @njit(cache=True, error_model="numpy")
-def met(
-    places: np.ndarray,
-    normals: np.ndarray,
-    ways: np.ndarray,
-    boxes: np.ndarray,
-    links: np.ndarray,
-    triangles: np.ndarray,
-    order: np.ndarray,
-    face_normals: np.ndarray,
-    corner_samples: np.ndarray,
-    divisions: np.ndarray,
-) -> np.ndarray:
+def met(places: np.ndarray, normals: np.ndarray, ways: np.ndarray, tree: BoxTree, faces: SampledFaces) -> np.ndarray:
     """Return the light sample that every ray meets, or ``SKY`` or ``DARK``, (n, rays) int32.
 
     Args:
-        places: starts, (n, 3).
+        places: starts, (n, 3) float64.
         normals: unit normals there, about which the directions are turned, (n, 3); zeros: they are not turned.
         ways: unit directions of the rays, for a normal along z, (rays, 3).
-        boxes: see :func:`.box_tree_kernels.build_tree`, as ``links``, ``triangles`` and ``order``.
-        links: see ``boxes``.
-        triangles: see ``boxes``.
-        order: see ``boxes``; here the index of the face.
-        face_normals: unit normals of the faces, (k, 3).
-        corner_samples: see :class:`.light_samples.LightSamples`.
-        divisions: see :class:`.light_samples.LightSamples`.
+        tree: the triangles.
+        faces: their faces.
     """
+    order, face_normals, corner_samples, divisions = faces
     found, stack = np.full((len(places), len(ways)), SKY, np.int32), np.empty(DEEPEST, np.int32)
     for s in range(len(places)):
         nx, ny, nz = np.float64(normals[s, 0]), np.float64(normals[s, 1]), np.float64(normals[s, 2])
@@ -236,7 +219,7 @@ def met(
                 dx, dy, dz = u * ux + v * vx + w * nx, u * uy + v * vy + w * ny, u * uz + v * vz + w * nz
             else:
                 dx, dy, dz = u, v, w
-            t, _, second, third = trace(boxes, links, triangles, stack, (x, y, z), (dx, dy, dz), 1e4, False)
+            t, _, second, third = trace(tree, stack, (x, y, z), (dx, dy, dz), 1e4, False)
             if t < 0:
                 continue
             f = order[t]
@@ -298,12 +281,8 @@ def probe_light(
     ways: np.ndarray,
     radiance: np.ndarray,
     sky: np.ndarray,
-    areas: np.ndarray,
-    windows: np.ndarray,
-    sun: np.ndarray,
-    boxes: np.ndarray,
-    links: np.ndarray,
-    triangles: np.ndarray,
+    sources: SourceArrays,
+    tree: BoxTree,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the light at places in the air.
 
@@ -313,17 +292,14 @@ def probe_light(
         ways: unit directions of the rays, all around, (rays, 3).
         radiance: radiance of the light samples, (m, 3).
         sky: radiance of the sky, (3,).
-        areas: see :func:`direct_light`, as ``windows`` and ``sun``.
-        windows: see ``areas``.
-        sun: see ``areas``.
-        boxes: see :func:`.box_tree_kernels.build_tree`, as ``links`` and ``triangles``.
-        links: see ``boxes``.
-        triangles: see ``boxes``.
+        sources: sources of light.
+        tree: what blocks light.
 
     Returns:
         Irradiance of surfaces that face +x, -x, +y, -y, +z, -z, with all light (n, 6, 3), and by area lights and the
         sun alone (n, 6, 3); share of each area light, and last of the sun, that nothing blocks (n, areas + 1).
     """
+    areas, _, sun = sources
     every, straight = np.zeros((len(places), 6, 3), np.float32), np.zeros((len(places), 6, 3), np.float32)
     shares = np.zeros((len(places), len(areas) + 1), np.float32)
     received, stack = np.empty((_SIDE * _SIDE, 4)), np.empty(DEEPEST, np.int32)
@@ -334,7 +310,7 @@ def probe_light(
     for s in range(len(places)):
         x, y, z = np.float64(places[s, 0]), np.float64(places[s, 1]), np.float64(places[s, 2])
         for k in range(len(areas)):
-            shares[s, k] = from_area(x, y, z, areas[k], boxes, links, triangles, stack, received)
+            shares[s, k] = from_area((x, y, z), areas[k], tree, stack, received)
             if shares[s, k] <= 0:
                 continue
             for axis in range(6):
@@ -343,7 +319,7 @@ def probe_light(
                     value += received[n, 3] * max(sign * received[n, axis // 2], 0.0)
                 for c in range(3):
                     straight[s, axis, c] += np.float32(value * areas[k, 9 + c])
-        if sun[3] + sun[4] + sun[5] > 0 and sunlit(x, y, z, sun, areas, windows, boxes, links, triangles, stack):
+        if sun[3] + sun[4] + sun[5] > 0 and sunlit((x, y, z), sources, tree, stack):
             shares[s, len(areas)] = 1.0
             for axis in range(6):
                 cosine = max(sun[axis // 2] * (1.0 - 2.0 * (axis % 2)), 0.0)

@@ -1,4 +1,4 @@
-"""Compiled shading of scenes with light sources: private, on plain arrays, single-threaded.
+"""Compiled shading of scenes with light sources.
 
 The light on a surface is interpolated between its samples (:mod:`simharness.capture.rendering.light_samples`), and a
 picture shows it times the linear albedo through a tone curve.
@@ -7,12 +7,26 @@ picture shows it times the linear albedo through a tone curve.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.finish_kernels import FINISHING, GLOSS, finish
-from simharness.capture.rendering.surface_kernels import BLUE, GREEN, PIXELS, RED, SECOND, THIRD, gather, memory
+from simharness.capture.rendering.finish_kernels import FINISHING, GLOSS, FinishArrays, finish
+from simharness.capture.rendering.surface_kernels import (
+    BLUE,
+    GREEN,
+    PIXELS,
+    RED,
+    SECOND,
+    THIRD,
+    DrawnPixels,
+    FaceArrays,
+    gather,
+    memory,
+)
+from simharness.capture.rendering.tone import BRIGHTEST
 
 _ZERO, _UNIT = np.float32(0.0), np.float32(1.0)
 _TO_SECOND, _TO_THIRD, _SHARES, _RECEIVED = (PIXELS * row for row in (3, 6, 9, 11))  # rows of light on pixels
@@ -20,80 +34,58 @@ _TO_SECOND, _TO_THIRD, _SHARES, _RECEIVED = (PIXELS * row for row in (3, 6, 9, 1
 _CUBE, _SQUARE, _PLAIN = np.float32(0.305306011), np.float32(0.682171111), np.float32(0.012522878)
 
 
+class FaceLight(NamedTuple):
+    """Light that some faces of a scene get and give.
+
+    Attributes:
+        emission: radiance of the faces, times which the albedo is shown, (m, 3).
+        exposure: factor on it, (3,) float32.
+        light: irradiance at the light samples, (n, 3) float32.
+        corner_samples: samples of the faces, (m, 3); see :class:`.light_samples.LightSamples`.
+        divisions: divisions of the faces, (m,).
+    """
+
+    emission: NDArray[np.float32]
+    exposure: NDArray[np.float32]
+    light: NDArray[np.float32]
+    corner_samples: NDArray[np.int32]
+    divisions: NDArray[np.int32]
+
+
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def shade_lit(
     spans: np.ndarray,
-    triangle: np.ndarray,
-    q: np.ndarray,
-    faces: np.ndarray,
-    colors: np.ndarray,
-    smooth: np.ndarray,
-    face_normals: np.ndarray,
-    vertex_normals: np.ndarray,
-    texture: np.ndarray,
-    uv: np.ndarray,
-    texels: np.ndarray,
-    pyramids: np.ndarray,
+    drawn: DrawnPixels,
+    faces: FaceArrays,
     rays: np.ndarray,
-    emission: np.ndarray,
-    exposure: np.ndarray,
-    light: np.ndarray,
-    corner_samples: np.ndarray,
-    divisions: np.ndarray,
-    first_face: int,
-    first_vertex: int,
-    material: np.ndarray,
-    figure: np.ndarray,
-    lights: np.ndarray,
-    pixel: np.ndarray,
-    grain: np.ndarray,
-    place: np.ndarray,
-    around: float,
+    light: FaceLight,
+    first: tuple[int, int],
+    finishes: FinishArrays,
     curve: np.ndarray,
-    brightest: float,
     rgb: np.ndarray,
 ) -> None:
-    """Colour the pixels that show faces from ``first_face`` on, in place.
+    """Colour the pixels that show some faces, in place.
 
     Args:
         spans: spans of pixels that may show them, see :func:`.vertex_kernels.covering_spans`.
-        triangle: see :func:`.shading_kernels.shade`, as all arguments up to ``rays``.
-        q: homogeneous pixel coordinates of the vertices.
-        faces: vertex indices.
-        colors: sRGB albedo.
-        smooth: whether to interpolate vertex normals.
-        face_normals: unit normals of the faces.
-        vertex_normals: unit normals of the vertices.
-        texture: index of each face's texture.
-        uv: texture coordinates of the corners.
-        texels: texels of all textures.
-        pyramids: levels of all textures.
-        rays: rays of the pixels.
-        emission: radiance of the faces from ``first_face`` on, times which the albedo is shown, (m, 3).
-        exposure: factor on it, (3,) float32.
-        light: irradiance at the light samples, (n, 3) float32.
-        corner_samples: samples of the faces from ``first_face`` on, (m, 3); see :class:`.light_samples.LightSamples`.
-        divisions: divisions of these faces, (m,).
-        first_face: first face to colour.
-        first_vertex: first vertex of the faces to colour.
-        material: see :func:`.finish_kernels.finish`, as all arguments up to ``around``; empty: all is matte.
-        figure: mesh of these faces.
-        lights: light around the meshes.
-        pixel: size of a pixel at each mesh.
-        grain: grain of the vertices.
-        place: place in the pattern of the grain.
-        around: period of the pattern of hair.
+        drawn: what the pixels show.
+        faces: all faces.
+        rays: matrix that turns pixels into rays, (3, 3).
+        light: light of the faces to colour.
+        first: first face to colour, all that follow are coloured, and first vertex of these faces.
+        finishes: finishes of these faces.
         curve: tone curve, see :func:`.tone.table`.
-        brightest: light of its last entry.
         rgb: picture to change, (h, w, 3) uint8, sRGB.
     """
-    narrow, wide, exact, level = memory()
+    triangle, first_face = drawn.triangle, first[0]
+    surfaces = memory()
+    narrow = surfaces[0]
     received, index = np.zeros(_RECEIVED, np.float32), np.zeros(3 * PIXELS, np.uint32)
     work = np.zeros(FINISHING, np.float32)
     most = PIXELS + triangle.shape[1]
     labels, columns, lines = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.int32)
     top = np.float32(len(curve) - 1)
-    scale, count = np.float32(top * top / brightest), 0
+    scale, count = np.float32(top * top / BRIGHTEST), 0
     for span in range(len(spans)):
         begin, y = count, spans[span, 0]
         for x in range(spans[span, 1], spans[span, 2]):
@@ -105,16 +97,11 @@ def shade_lit(
         while done + PIXELS <= count or (span == len(spans) - 1 and done < count):
             size = min(count - done, PIXELS)
             chunk = slice(done, done + size)
-            gather(
-                labels[chunk], columns[chunk], lines[chunk], q, faces, colors, smooth, face_normals, vertex_normals,
-                texture, uv, texels, pyramids, narrow, wide, exact, level,
-            )  # fmt: skip
-            _receive(labels[chunk], narrow, emission, exposure, light, corner_samples, divisions, first_face, received)
-            if len(material):
-                finish(
-                    labels[chunk], columns[chunk], lines[chunk], first_face, faces, first_vertex, rays, narrow,
-                    material, figure, lights, pixel, grain, place, around, work, received,
-                )  # fmt: skip
+            pixels = labels[chunk], columns[chunk], lines[chunk]
+            gather(pixels, drawn.corners, faces, surfaces)
+            _receive(labels[chunk], narrow, light, first_face, received)
+            if len(finishes.material):
+                finish(pixels, first, faces.faces, rays, narrow, finishes, work, received)
             for row in range(0, 3 * PIXELS, PIXELS):
                 for n in range(PIXELS):
                     dye = narrow[RED + row + n]
@@ -133,23 +120,14 @@ def shade_lit(
 
 
 @njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _receive(
-    labels: np.ndarray,
-    narrow: np.ndarray,
-    emission: np.ndarray,
-    exposure: np.ndarray,
-    light: np.ndarray,
-    corner_samples: np.ndarray,
-    divisions: np.ndarray,
-    first_face: int,
-    received: np.ndarray,
-) -> None:
-    """Write the light on pixels to the first three rows of ``received``; arguments as :func:`shade_lit`.
+def _receive(labels: np.ndarray, narrow: np.ndarray, faces: FaceLight, first_face: int, received: np.ndarray) -> None:
+    """Write the light on pixels to the first three rows of ``received``; ``faces`` as in :func:`shade_lit`.
 
     ``labels`` are the visible faces, (n,), and ``narrow`` has the weights of their corners, see
     :func:`.surface_kernels.gather`. The light is interpolated between three samples: those of the corners, or of a
     small triangle of the lattice of samples.
     """
+    emission, exposure, light, corner_samples, divisions = faces
     for n in range(len(labels)):
         f = np.uint32(labels[n] - first_face)
         i, j, k, divided = corner_samples[f, 0], corner_samples[f, 1], corner_samples[f, 2], divisions[f]

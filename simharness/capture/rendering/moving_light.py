@@ -11,8 +11,10 @@ and "Capsule ambient occlusion", 2006 and 2013).
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.kernels import njit
 from simharness.types.srgb import LUMINANCE
@@ -20,6 +22,8 @@ from simharness.types.srgb import LUMINANCE
 _CHUNK = 512  # samples processed together
 _LEVELS = 6  # heights at which the light of the room is taken for a body
 _RED, _GREEN, _BLUE = LUMINANCE
+_LARGEST = 0.6  # metres: a part with a larger radius is no body
+_NONE, _ONE, _TWO, _THREE, _TINY = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(3.0), np.float32(1e-6)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
@@ -42,20 +46,43 @@ def light_at(
             out[c] += weight * values[i + di, j + dj, k + dk, c]
 
 
+class MovingMeshes(NamedTuple):
+    """Moving meshes of a scene at a time.
+
+    Attributes:
+        vertices: vertices, (v, 3).
+        face_normals: unit normals of the faces, (k, 3).
+        vertex_normals: unit normals of the vertices, (v, 3).
+    """
+
+    vertices: NDArray[np.float32]
+    face_normals: NDArray[np.float32]
+    vertex_normals: NDArray[np.float32]
+
+
+class AirLight(NamedTuple):
+    """Light at the nodes of a grid in the air.
+
+    Attributes:
+        origin: position of the first node, (3,).
+        step: distances between nodes, (3,).
+        every: light of all sources by the six directions, (nx, ny, nz, 18).
+        straight: luminance of what comes straight from area lights and sun, (nx, ny, nz, 6).
+    """
+
+    origin: NDArray[np.float64]
+    step: NDArray[np.float64]
+    every: NDArray[np.float32]
+    straight: NDArray[np.float32]
+
+
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def moving_light(
-    vertices: np.ndarray,
-    face_normals: np.ndarray,
-    vertex_normals: np.ndarray,
-    of_vertex: np.ndarray,
-    of_face: np.ndarray,
-    spans: np.ndarray,
+    meshes: MovingMeshes,
+    samples: tuple[np.ndarray, np.ndarray, np.ndarray],
     bodies: np.ndarray,
     ranges: np.ndarray,
-    origin: np.ndarray,
-    step: np.ndarray,
-    every: np.ndarray,
-    straight: np.ndarray,
+    air: AirLight,
 ) -> np.ndarray:
     """Return the irradiance (n, 3) at the light samples of moving meshes.
 
@@ -63,19 +90,16 @@ def moving_light(
     others nearby keep from it, at every sample.
 
     Args:
-        vertices: vertices of the moving meshes, (v, 3).
-        face_normals: unit normals of their faces, (k, 3).
-        vertex_normals: unit normals of the vertices, (v, 3).
-        of_vertex: vertex of each sample, (n,).
-        of_face: face whose normal a sample has, or -1 for that of its vertex, (n,).
-        spans: first and end of the samples of each mesh, (meshes, 2).
-        bodies: capsules, (c, 7).
+        meshes: the meshes.
+        samples: vertex of each sample, (n,); face whose normal a sample has, or -1 for that of its vertex, (n,); first
+            and end of the samples of each mesh, (meshes, 2).
+        bodies: capsules, see :func:`capsules`, (c, 7).
         ranges: first and end of the capsules of each mesh, (meshes, 2).
-        origin: origin of the probes, (3,).
-        step: distances of the probes, (3,).
-        every: light of all sources at the probes by the six directions, (nx, ny, nz, 18).
-        straight: luminance of what comes straight from area lights and sun, (nx, ny, nz, 6).
+        air: light of the room.
     """
+    vertices, face_normals, vertex_normals = meshes
+    of_vertex, of_face, spans = samples
+    origin, step, every, straight = air
     light = np.zeros((len(of_vertex), 3), np.float32)
     column, direct = np.empty((_LEVELS, 18)), np.empty((_LEVELS, 6))
     ways = np.empty((_LEVELS, 4))
@@ -160,10 +184,6 @@ def moving_light(
                 for c in range(3):
                     light[start + s, c] *= factor
     return light
-
-
-_LARGEST = 0.6  # metres: a part with a larger radius is no body
-_NONE, _ONE, _TWO, _THREE, _TINY = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(3.0), np.float32(1e-6)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})

@@ -12,11 +12,14 @@ kept as runs along the rows, and pictures look at those over blocks in which any
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.kernels import njit
 from simharness.capture.rendering.moving_light import enclose, hide, light_at
+from simharness.capture.rendering.surface_kernels import PixelRays
 
 BLOCK = 8  # cells along each side of a block: whole blocks without shadow are skipped
 
@@ -27,47 +30,65 @@ _FAINT = 0.06  # share of the light: a lamp that brings less casts no shadow
 _STRONGEST = 4  # lamps that cast shadows of one body
 _LEAST_AROUND = 0.5  # share of the light that comes from the surroundings at least: other lamps are part of them
 _SEEN = 0.985  # share of the light: what is less dark cannot be seen
+_ZERO, _UNIT, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+_FLOOR = np.float32(0.02)  # metres: what is lower is the floor
+_PIXELS = 128  # processed together
+# Rows of memory, which the compiler knows to be apart.
+_U, _V, _Z, _LEFT, _ONE, _TWO, _THREE, _FOUR, _MEMORY = (_PIXELS * row for row in range(9))
 
 
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def cast(
-    left: np.ndarray,
-    z: float,
-    cell: float,
-    corner: np.ndarray,
-    bodies: np.ndarray,
-    ranges: np.ndarray,
-    areas: np.ndarray,
-    sun: np.ndarray,
-    origin: np.ndarray,
-    step: np.ndarray,
-    every: np.ndarray,
-    shares: np.ndarray,
-    around_only: bool,
-) -> None:
-    """Multiply a map at height z by the share of the light that bodies leave to surfaces that face up, in place.
+class ShadowLayer(NamedTuple):
+    """Map at one height of the share of the light that bodies leave to surfaces that face up.
 
-    Args:
-        left: map, (rows, columns) float32.
-        z: height of the map, metres.
-        cell: side of a cell, metres.
+    Attributes:
+        left: the share, (rows, columns) float32.
         corner: x and y of the corner of the map, (2,).
-        bodies: capsules, see :func:`.moving_light.capsules`, (n, 7).
-        ranges: first and end of the capsules of each body, (bodies, 2).
+        cell: side of a cell, metres.
+        z: height, metres.
+    """
+
+    left: NDArray[np.float32]
+    corner: NDArray[np.float64]
+    cell: float
+    z: float
+
+
+class UpwardLight(NamedTuple):
+    """Light of a room on surfaces that face up.
+
+    Attributes:
         areas: area lights with the luminance of their radiance: centre, right, up, luminance, focus, (m, 11).
         sun: unit direction to the sun and luminance of its irradiance, (4,).
         origin: origin of the probes, (3,).
         step: distances of the probes, (3,).
-        every: luminance of the light of surfaces that face up at the probes, (nx, ny, nz, 1).
+        every: luminance of all light at the probes, (nx, ny, nz, 1).
         shares: share of area lights and sun that still meshes leave, (nx, ny, nz, areas + 1).
+    """
+
+    areas: NDArray[np.float64]
+    sun: NDArray[np.float64]
+    origin: NDArray[np.float64]
+    step: NDArray[np.float64]
+    every: NDArray[np.float32]
+    shares: NDArray[np.float32]
+
+
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+def cast(layer: ShadowLayer, bodies: np.ndarray, ranges: np.ndarray, room: UpwardLight, around_only: bool) -> None:
+    """Multiply a map by the share of the light that bodies leave, in place.
+
+    Args:
+        layer: the map.
+        bodies: capsules, see :func:`.moving_light.capsules`, (n, 7).
+        ranges: first and end of the capsules of each body, (bodies, 2).
+        room: light without the bodies.
         around_only: whether of the light that comes from the surroundings, else of that of area lights and sun.
     """
+    left, corner, cell, z = layer
+    areas, sun, origin, step, every, shares = room
     rows, columns = left.shape
-    place, way, up = (
-        np.zeros((3, columns), np.float32),
-        np.zeros((3, columns), np.float32),
-        np.zeros((3, columns), np.float32),
-    )
+    place, way = np.zeros((3, columns), np.float32), np.zeros((3, columns), np.float32)
+    up = np.zeros((3, columns), np.float32)
     wide, far, open_ = np.zeros(columns, np.float32), np.zeros(columns, np.float32), np.zeros(columns, np.float32)
     up[2] = 1.0
     lamps = len(areas) + 1
@@ -221,24 +242,45 @@ def touched_blocks(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:
     return touched
 
 
-_ZERO, _UNIT, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
-_FLOOR = np.float32(0.02)  # metres: what is lower is the floor
-_PIXELS = 128  # processed together
-# Rows of memory, which the compiler knows to be apart.
-_U, _V, _Z, _LEFT, _ONE, _TWO, _THREE, _FOUR, _MEMORY = (_PIXELS * row for row in range(9))
+class BlockGrid(NamedTuple):
+    """Blocks of a map of the floor.
+
+    Attributes:
+        corner: x and y of the corner of the map, (2,).
+        side: side of a block, metres.
+        rows: number of blocks along y.
+        columns: number of blocks along x.
+    """
+
+    corner: NDArray[np.float64]
+    side: float
+    rows: int
+    columns: int
+
+
+class ShadowLayers(NamedTuple):
+    """Share of the light that moving bodies leave to still surfaces that face up.
+
+    Attributes:
+        corner: x and y of the corner of the maps, (2,).
+        cell: size of a cell of ``fine``; a cell of ``coarse`` is twice as large.
+        fine: share on the floor, (rows, columns) float32.
+        coarse: share at several heights, (heights, rows / 2, columns / 2) float32.
+        heights: these heights, (heights,) float32.
+        touched: blocks in which anything is dark, (blocks + 1,).
+    """
+
+    corner: NDArray[np.float64]
+    cell: float
+    fine: NDArray[np.float32]
+    coarse: NDArray[np.float32]
+    heights: NDArray[np.float32]
+    touched: NDArray[np.bool_]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def runs_below(
-    triangle: np.ndarray,
-    inverse_depth: np.ndarray,
-    center: np.ndarray,
-    rays: np.ndarray,
-    origin: np.ndarray,
-    block: float,
-    rows: int,
-    columns: int,
-    highest: float,
+    triangle: np.ndarray, inverse_depth: np.ndarray, view: PixelRays, grid: BlockGrid, highest: float
 ) -> np.ndarray:
     """Return runs of pixels over the same block of a map of the floor, (n, 5) int32.
 
@@ -247,14 +289,12 @@ def runs_below(
     Args:
         triangle: visible face or -1, (h, w) int32.
         inverse_depth: inverse depth, 1/m, (h, w) float32.
-        center: camera centre in the world, (3,).
-        rays: see :func:`.shading_kernels.shade`.
-        origin: x and y of the corner of the map, (2,).
-        block: side of a block, metres.
-        rows: number of blocks along y.
-        columns: number of blocks along x.
+        view: rays of the pixels.
+        grid: blocks of the map.
         highest: height above which nothing is shaded, metres.
     """
+    center, rays = view
+    origin, block, rows, columns = grid
     height, width = triangle.shape
     runs, count = np.empty((max(height * width // 8, 1), 5), np.int32), 0
     rise_z, from_z = np.float32(rays[2, 0]), np.float32(center[2])
@@ -290,14 +330,8 @@ def runs_below(
 def dim(
     inverse_depth: np.ndarray,
     runs: np.ndarray,
-    center: np.ndarray,
-    rays: np.ndarray,
-    origin: np.ndarray,
-    cell: float,
-    fine: np.ndarray,
-    coarse: np.ndarray,
-    heights: np.ndarray,
-    touched: np.ndarray,
+    view: PixelRays,
+    layers: ShadowLayers,
     dimming: np.ndarray,
     rgb: np.ndarray,
 ) -> None:
@@ -306,17 +340,13 @@ def dim(
     Args:
         inverse_depth: inverse depth of still meshes, 1/m, (h, w) float32.
         runs: runs of pixels over the blocks of the map, see :func:`runs_below`.
-        center: camera centre in the world, (3,).
-        rays: see :func:`.shading_kernels.shade`.
-        origin: x and y of the corner of the map, (2,).
-        cell: size of a cell of ``fine``; a cell of ``coarse`` is twice as large.
-        fine: share of the light that is left on the floor, (rows, columns) float32.
-        coarse: the same at several heights, (heights, rows / 2, columns / 2) float32.
-        heights: these heights, (heights,) float32.
-        touched: blocks in which anything is dark, (blocks + 1,).
+        view: rays of the pixels.
+        layers: the shadows.
         dimming: see :func:`.tone.dimming`.
         rgb: picture to change, (h, w, 3) uint8.
     """
+    center, rays = view
+    origin, cell, fine, coarse, heights, touched = layers
     steps = np.float32(len(dimming) - 1)
     per_cell, levels = np.float32(1.0 / cell), len(heights)
     rise_x, rise_y, rise_z = np.float32(rays[0, 0]), np.float32(rays[1, 0]), np.float32(rays[2, 0])

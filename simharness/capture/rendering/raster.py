@@ -19,18 +19,19 @@ from mvpose.camera import Camera
 from simharness.capture.rendering.backgrounds import Background, Backgrounds, LitBackground, fill_empty
 from simharness.capture.rendering.lens import through_lens
 from simharness.capture.rendering.lit_scene import LitScene
-from simharness.capture.rendering.raster_kernels import LONGEST_SIDE, NOTHING_DRAWN, draw_projected, rasterise
+from simharness.capture.rendering.raster_kernels import LONGEST_SIDE, draw_projected, rasterise
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry
-from simharness.capture.rendering.shading_kernels import shade
-from simharness.capture.rendering.shadow_maps import NO_SHADOW, SHADOW_SIZE, ShadowMap, shadow_places
+from simharness.capture.rendering.shading_kernels import DistantLight, shade
+from simharness.capture.rendering.shadow_maps import NO_SHADOW, SHADOW_SIZE, LightView, shadow_places
+from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
 from simharness.capture.rendering.vertex_kernels import (
+    copied_pixels,
     covering_spans,
-    lifted,
+    picture_spans,
     project_vertices,
-    put_back,
     resolve,
-    whole,
+    restore_pixels,
 )
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
@@ -46,6 +47,7 @@ class _Scene:
 
     geometry: SceneGeometry
     backgrounds: Backgrounds = field(default_factory=Backgrounds)
+    lit: LitScene | None = None
 
 
 class RasterRenderer:
@@ -85,9 +87,9 @@ class RasterRenderer:
         """Return the scene of these meshes: the last one with the same still meshes, moved on."""
         for scene in self._scenes:
             if scene.geometry.still.holds(meshes):
-                scene.geometry = SceneGeometry.of(meshes, scene.geometry)
+                scene.geometry = SceneGeometry.from_meshes(meshes, scene.geometry)
                 return scene
-        scene = _Scene(SceneGeometry.of(meshes))
+        scene = _Scene(SceneGeometry.from_meshes(meshes))
         self._scenes = [scene, *self._scenes][:_KEPT_SCENES]
         return scene
 
@@ -97,32 +99,33 @@ def _picture(scene: _Scene, camera: Camera, color: bool, lighting: Lighting, par
     geometry, background = scene.geometry, _background(scene, camera)
     topology, (width, height) = geometry.topology, camera.size
     inverse_depth, triangle, first = background.inverse_depth, background.triangle, topology.still[0]
-    corners, seen, codes = project_vertices(
-        geometry.vertices, projection_matrix(camera), NEAR, background.corners, width, height
-    )
-    rays = background.to_rays
-    sources = LitScene.of(geometry, lighting) if color else None
+    projected = project_vertices(geometry.vertices, projection_matrix(camera), NEAR, background.corners, width, height)
+    view, drawn = PixelRays(camera.center, background.to_rays), DrawnPixels(triangle, inverse_depth, projected[0])
+    sources = None
+    if color:
+        scene.lit = sources = LitScene.in_light(geometry, lighting, scene.lit)
     if sources is not None:
-        lit = sources.background(background, camera, rays)
+        lit = sources.background(background, view)
     elif color:
-        lit = _lit(background, geometry, camera, lighting)
+        lit = _lit(background, geometry, view, lighting)
     else:
         rgb = np.zeros((height, width, 3), np.uint8)
     depth, ids = background.depth.copy(), _ids(background, topology.mesh).copy()
-    spans = covering_spans(codes, topology.moving_starts, height, width)
-    hidden = lifted(spans, inverse_depth, triangle)
+    spans = covering_spans(projected[2], topology.moving_starts, height, width)
+    hidden = copied_pixels(spans, inverse_depth, triangle)
     try:
-        draw_projected(topology.faces, corners, seen, codes, NEAR, inverse_depth, triangle, first)
+        draw_projected(topology.faces, projected, NEAR, inverse_depth, triangle, first)
         resolve(spans, inverse_depth, triangle, topology.mesh, depth, ids)
         labels = topology.parts[triangle] if parts else None
         if sources is not None:
-            rgb = sources.draw(lit, (spans, triangle, inverse_depth, corners), camera, rays)
+            rgb = sources.draw(lit, spans, drawn, view)
         elif color:
-            rgb, moving = lit.rgb.copy(), geometry.shadows(lighting).moving
-            drawn = triangle, inverse_depth, corners
-            _shade(geometry, camera, rays, lighting, *drawn, moving, lit.shadow_place, lit.shadow_depth, first, rgb)
+            rgb, maps = lit.rgb.copy(), geometry.shadows(lighting)
+            if len(topology.faces):
+                light, places = _distant(lighting, maps.light), (lit.shadow_place, lit.shadow_depth)
+                shade(drawn, geometry.faces, view, light, (maps.still, maps.moving), places, first, rgb)
     finally:
-        put_back(spans, *hidden, inverse_depth, triangle)
+        restore_pixels(spans, *hidden, inverse_depth, triangle)
     return Image(rgb=rgb, depth=depth, ids=ids, parts=labels)
 
 
@@ -134,9 +137,9 @@ def _background(scene: _Scene, camera: Camera) -> Background:
         still = scene.geometry.still
         inverse_depth, triangle = np.zeros(shape, np.float32), np.full(shape, -1, np.int32)
         faces = still.topology.faces
-        corners = rasterise(still.vertices, faces, projection, NEAR, inverse_depth, triangle, NOTHING_DRAWN, 0)
+        corners = rasterise(still.vertices, faces, projection, NEAR, inverse_depth, triangle)
         depth, labels, ids = np.empty(shape, np.float32), scene.geometry.topology.mesh, np.empty(shape, np.int16)
-        resolve(whole(*shape), inverse_depth, triangle, labels, depth, ids)
+        resolve(picture_spans(*shape), inverse_depth, triangle, labels, depth, ids)
         rays = np.ascontiguousarray(np.linalg.inv(projection[:, :3]))
         found = Background(rays, inverse_depth, triangle, corners, depth, labels, ids)
         scene.backgrounds.keep(projection, camera.size, found)
@@ -150,62 +153,27 @@ def _ids(background: Background, labels: NDArray[np.int16]) -> NDArray[np.int16]
     return background.ids
 
 
-def _lit(background: Background, geometry: SceneGeometry, camera: Camera, lighting: Lighting) -> LitBackground:
+def _lit(background: Background, geometry: SceneGeometry, view: PixelRays, lighting: Lighting) -> LitBackground:
     """Return the background in a light; the last one is kept."""
-    shadows, seen = geometry.shadows(lighting), (background.triangle, background.inverse_depth)
-    if background.lit is None or background.lit.lighting != lighting or background.lit.light != shadows.light:
-        rgb = np.empty((*background.triangle.shape, 3), np.uint8)
-        fill_empty(rgb, background.triangle < 0, lighting, background.to_rays)
-        place, depth = shadow_places(*seen, camera.center, background.to_rays, shadows.light.P, SHADOW_SIZE)
-        _shade(
-            geometry, camera, background.to_rays, lighting, *seen, background.corners, NO_SHADOW, place, depth, 0, rgb
-        )
-        background.lit = LitBackground(lighting, shadows.light, rgb, place, depth, np.zeros((0, 5), np.int32))
+    maps = geometry.shadows(lighting)
+    if background.lit is None or background.lit.lighting != lighting or background.lit.light != maps.light:
+        drawn = DrawnPixels(background.triangle, background.inverse_depth, background.corners)
+        rgb = np.empty((*drawn.triangle.shape, 3), np.uint8)
+        fill_empty(rgb, drawn.triangle < 0, lighting, view.to_rays)
+        places = shadow_places(drawn.triangle, drawn.inverse_depth, view, maps.light.P, SHADOW_SIZE)
+        if len(geometry.topology.faces):
+            light = _distant(lighting, maps.light)
+            shade(drawn, geometry.faces, view, light, (maps.still, NO_SHADOW), places, 0, rgb)
+        background.lit = LitBackground(lighting, maps.light, rgb, *places, np.zeros((0, 5), np.int32))
     return background.lit
 
 
-def _shade(
-    geometry: SceneGeometry,
-    camera: Camera,
-    rays: NDArray[np.float64],
-    lighting: Lighting,
-    triangle: NDArray[np.int32],
-    inverse_depth: NDArray[np.float32],
-    corners: NDArray[np.float64],
-    moving: ShadowMap,
-    shadow_place: NDArray[np.uint16],
-    shadow_depth: NDArray[np.float32],
-    first_face: int,
-    rgb: NDArray[np.uint8],
-) -> None:
-    """Colour a picture in place; see :func:`~simharness.capture.rendering.shading_kernels.shade`."""
-    topology, shadows = geometry.topology, geometry.shadows(lighting)
-    if not len(topology.faces):
-        return
-    shade(
-        triangle,
-        inverse_depth,
-        corners,
-        topology.faces,
-        topology.colors,
-        topology.smooth,
-        *geometry.normals,
-        topology.texture,
-        topology.uv,
-        *topology.pyramids,
-        camera.center,
-        rays,
+def _distant(lighting: Lighting, seen: LightView) -> DistantLight:
+    """Return lighting in closed form as the kernels take it."""
+    return DistantLight(
         np.array(lighting.direction),
         np.array([lighting.key, lighting.sky, lighting.fill]),
         255 * np.sqrt(lighting.tint),  # sRGB is about the square root of linear light
-        shadows.light.P,
-        shadows.light.bias,
-        shadows.still.nearest,
-        shadows.still.blocks,
-        moving.nearest,
-        moving.blocks,
-        shadow_place,
-        shadow_depth,
-        first_face,
-        rgb,
+        seen.P,
+        seen.bias,
     )

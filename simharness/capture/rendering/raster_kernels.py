@@ -25,7 +25,6 @@ from simharness.capture.rendering.vertex_kernels import SLACK, drawable, project
 # The kernels are typed by the arrays of the first call. Indices are unsigned or count from 0: an index that may be
 # negative would be checked at every use, and prevents vectorisation of loops.
 
-NOTHING_DRAWN = np.zeros((0, 3))  # pixel coordinates of no vertices
 LONGEST_SIDE = 0x7FFE  # pixels: codes of vertices have 15 bits for a column or row
 
 _TILE = 4  # pixels
@@ -36,56 +35,54 @@ _LOWEST = np.array([0, 1, 2, 5, 3, 9, 6, 11, 15, 4, 8, 10, 14, 7, 13, 12])  # lo
 _DE_BRUIJN = 0x09AF
 
 
-@njit(cache=True, error_model="numpy")
 def rasterise(
-    vertices: np.ndarray,
-    faces: np.ndarray,
-    P: np.ndarray,
-    near: float,
-    inverse_depth: np.ndarray,
-    triangle: np.ndarray,
-    drawn: np.ndarray,
-    first: int,
+    vertices: np.ndarray, faces: np.ndarray, P: np.ndarray, near: float, inverse_depth: np.ndarray, triangle: np.ndarray
 ) -> np.ndarray:
     """Write the nearest triangle at every pixel centre into ``inverse_depth`` and ``triangle``, in place.
-
-    A call may add triangles to what an earlier call has written: those that come first in ``faces``, with their own
-    vertices, which come first in ``vertices``. At equal depth the earlier ones stay.
-
-    Both sides of triangles are drawn, but those seen from behind last: most of them, the far sides of bodies and half
-    of all triangles, are then known to be hidden and skipped.
 
     Args:
         vertices: positions in the world, (n, 3) float32.
         faces: vertex indices, (k, 3) uint32.
         P: projection matrix ``K [R | t]``, (3, 4), with a last row of unit length.
         near: depth below which nothing is drawn.
-        inverse_depth: (h, w) float32, zeros before the first call; sides of at most ``LONGEST_SIDE``.
-        triangle: index of the visible face, (h, w) int32; -1 before the first call.
-        drawn: homogeneous pixel coordinates of the first vertices, (m, 3), as an earlier call returned them.
-        first: number of triangles that an earlier call has drawn; those that follow have none of the first m vertices.
+        inverse_depth: (h, w) float32, zeros before; sides of at most ``LONGEST_SIDE``.
+        triangle: index of the visible face, (h, w) int32; -1 before.
 
     Returns:
         Homogeneous pixel coordinates of the vertices, (n, 3).
     """
     height, width = triangle.shape
-    q, seen, codes = project_vertices(vertices, P, near, drawn, width, height)
-    draw_projected(faces, q, seen, codes, near, inverse_depth, triangle, first)
-    return q
+    projected = project_vertices(vertices, P, near, np.zeros((0, 3)), width, height)
+    draw_projected(faces, projected, near, inverse_depth, triangle, 0)
+    return projected[0]
 
 
 @njit(cache=True, error_model="numpy")
 def draw_projected(
     faces: np.ndarray,
-    q: np.ndarray,
-    seen: np.ndarray,
-    codes: np.ndarray,
+    projected: tuple[np.ndarray, np.ndarray, np.ndarray],
     near: float,
     inverse_depth: np.ndarray,
     triangle: np.ndarray,
     first: int,
 ) -> None:
-    """Do the same with vertices that are projected already, see :func:`.vertex_kernels.project_vertices`."""
+    """Write the nearest triangle at every pixel centre, as :func:`rasterise`, with vertices that are projected already.
+
+    A call may add triangles to what an earlier call has written: those that come first in ``faces``, with their own
+    vertices, which come first in ``projected``. At equal depth the earlier ones stay.
+
+    Both sides of triangles are drawn, but those seen from behind last: most of them, the far sides of bodies and half
+    of all triangles, are then known to be hidden and skipped.
+
+    Args:
+        faces: vertex indices, (k, 3) uint32.
+        projected: see :func:`.vertex_kernels.project_vertices`.
+        near: depth below which nothing is drawn.
+        inverse_depth: (h, w) float32; sides of at most ``LONGEST_SIDE``.
+        triangle: index of the visible face, (h, w) int32.
+        first: number of triangles that an earlier call has drawn; those that follow have none of their vertices.
+    """
+    q, seen, codes = projected
     tiles = (_SMALL // _TILE) ** 2
     hits, planes = np.empty((_CHUNK * tiles + 1, 4), np.int32), np.empty((_CHUNK * tiles + 1, 5))
     kept, work = np.empty(_CHUNK + 1, np.uint32), np.empty(_ROWS_OF_WORK * _CHUNK)

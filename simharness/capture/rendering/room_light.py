@@ -13,9 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from simharness.capture.rendering.box_tree_kernels import build_tree
-from simharness.capture.rendering.light_kernels import DARK, direct_light, gathered, met, probe_light
+from simharness.capture.rendering.box_tree_kernels import BoxTree, build_tree
+from simharness.capture.rendering.light_kernels import (
+    DARK,
+    SampledFaces,
+    SourceArrays,
+    direct_light,
+    gathered,
+    met,
+    probe_light,
+)
 from simharness.capture.rendering.light_samples import Floats, LightSamples, light_samples
+from simharness.capture.rendering.moving_light import AirLight
 from simharness.capture.rendering.scene_topology import SceneTopology, same_meshes
 from simharness.types.light_sources import LightSources
 from simharness.types.mesh import Mesh
@@ -58,6 +67,11 @@ class Probes:
     every: Floats
     straight: Floats
     shares: Floats
+
+    @property
+    def air(self) -> AirLight:
+        """Light in the air as the kernels take it."""
+        return AirLight(self.origin, self.step, self.every.reshape(*self.every.shape[:3], 18), self.straight)
 
 
 @dataclass(frozen=True)
@@ -113,15 +127,14 @@ def _computed(
     blocking = np.flatnonzero(~topology.emission.any(axis=1))
     corners = vertices[topology.faces[blocking].astype(np.int64)].reshape(-1, 3, 3)
     boxes, links, triangles, order = build_tree(np.ascontiguousarray(corners))
-    tree, order = (boxes, links, triangles), blocking[order]
-    lights = _arrays(sources)
+    tree, lights = BoxTree(boxes, links, triangles), _arrays(sources)
     sky = np.array(sources.sky, np.float32)
 
     chosen, stands_for = _few(samples)
     places, facing = samples.places[chosen], samples.normals[chosen]
-    direct = direct_light(places, facing, samples.apart[chosen], *lights, *tree)
-    surface = (order, normals[0], samples.corner_samples, samples.divisions)
-    found = met(places, facing, _hemisphere(_SURFACE_RAYS), *tree, *surface)
+    direct = direct_light(places, facing, samples.apart[chosen], lights, tree)
+    faces = SampledFaces(blocking[order], normals[0], samples.corner_samples, samples.divisions)
+    found = met(places.astype(float), facing.astype(float), _hemisphere(_SURFACE_RAYS), tree, faces)
     sites = np.concatenate([places, _TURN * facing], axis=1)
     inside = (found == DARK).mean(axis=1) > _INSIDE
     if inside.any() and not inside.all():
@@ -141,7 +154,7 @@ def _computed(
     scale = weight.sum(axis=1)
     light, direct = ((weight * part[nearest]).sum(axis=1) / scale for part in (light, direct))
     light = direct + _smoothed(samples, light - direct)
-    return _exposed(sources, samples, light, _probes(sources, samples, light, vertices, lights, sky, tree, surface))
+    return _exposed(sources, samples, light, _probes(sources, samples, light, vertices, lights, sky, tree, faces))
 
 
 def _reflected(samples: LightSamples, light: Floats) -> Floats:
@@ -195,14 +208,14 @@ def _exposed(sources: LightSources, samples: LightSamples, light: Floats, probes
     return RoomLight(samples, light * exposure, exposed, exposure)
 
 
-def _arrays(sources: LightSources) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
-    """Return area lights (m, 13), which of them are windows (m,), and the sun (6,) as the kernels take them."""
+def _arrays(sources: LightSources) -> SourceArrays:
+    """Return sources as the kernels take them."""
     areas = np.zeros((len(sources.areas), 13))
     for row, area in zip(areas, sources.areas, strict=True):
         row[:] = *area.center, *area.right, *area.up, *area.radiance, area.focus
     windows = np.array([area.kind == "window" for area in sources.areas], bool)
     sun = np.zeros(6) if sources.sun is None else np.array([*sources.sun.direction, *sources.sun.irradiance])
-    return areas, windows, sun
+    return SourceArrays(areas, windows, sun)
 
 
 def _hemisphere(count: int) -> NDArray[np.float64]:
@@ -226,10 +239,10 @@ def _probes(
     samples: LightSamples,
     light: Floats,
     vertices: Floats,
-    lights: tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]],
+    lights: SourceArrays,
     sky: Floats,
-    tree: tuple[Floats, NDArray[np.int32], Floats],
-    surface: tuple[NDArray[np.int64], Floats, NDArray[np.int32], NDArray[np.int32]],
+    tree: BoxTree,
+    faces: SampledFaces,
 ) -> Probes:
     low, high = vertices.min(axis=0).astype(float), vertices.max(axis=0).astype(float)
     middle = (low + high) / 2
@@ -242,8 +255,8 @@ def _probes(
     grid = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1)
     places = (low + grid * step).reshape(-1, 3)
     ways = _sphere(_AIR_RAYS)
-    found = met(places, np.zeros_like(places), ways, *tree, *surface)
-    every, straight, shares = probe_light(places, found, ways, _reflected(samples, light), sky, *lights, *tree)
+    found = met(places, np.zeros_like(places), ways, tree, faces)
+    every, straight, shares = probe_light(places, found, ways, _reflected(samples, light), sky, lights, tree)
     inside = (found == DARK).mean(axis=1) > _INSIDE
     shape = tuple(counts)
     filled = [

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -19,19 +19,23 @@ from numpy.typing import NDArray
 from mvpose.kernels import njit
 from simharness.capture.rendering.scene_topology import SceneTopology, same_meshes
 from simharness.capture.rendering.shadow_maps import LightView, ShadowMap, Shadows, shadow_map
+from simharness.capture.rendering.surface_kernels import FaceArrays
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 
 Floats = NDArray[np.float32]
+ShadowCasters = tuple[NDArray[np.uint32], Floats, Floats]
 
 _CUT = 0.2  # metres beyond a whole metre that need no other one: feet sink in; shadow maps have room at their borders
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class StillGeometry:
     """Triangles of the meshes that stay where they are; computed once for a scene."""
 
     meshes: tuple[Mesh, ...]
+    _casters: tuple[tuple[float, float, float], ShadowCasters] | None = field(default=None, init=False, repr=False)
+    _shadow: tuple[LightView, ShadowMap] | None = field(default=None, init=False, repr=False)
 
     def holds(self, meshes: Sequence[Mesh]) -> bool:
         """Return whether the still ones among ``meshes`` are these, in this order."""
@@ -59,25 +63,26 @@ class StillGeometry:
             return np.array([[np.inf] * 3, [-np.inf] * 3])
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)], float)
 
-    def casters(self, direction: tuple[float, float, float]) -> tuple[NDArray[np.uint32], Floats, Floats]:
+    @cached_property
+    def faces(self) -> FaceArrays:
+        """Faces as the shading kernels take them."""
+        return self.topology.face_arrays(*self.normals)
+
+    def casters(self, direction: tuple[float, float, float]) -> ShadowCasters:
         """Return the faces that cast shadows, (m, 3), and the box of their vertices; the last ones are cached."""
-        kept = self.__dict__.get("_casters")
-        if kept is None or kept[0] != direction:
+        if self._casters is None or self._casters[0] != direction:
             faces = self.topology.faces
-            kept = direction, casters(self.vertices, faces, self.normals[0], np.array(direction), self.box)
-            self.__dict__["_casters"] = kept
-        return kept[1]
+            self._casters = direction, casters(self.vertices, faces, self.normals[0], np.array(direction), self.box)
+        return self._casters[1]
 
     def shadow(self, light: LightView) -> ShadowMap:
         """Return the shadow map of these meshes; the last one is cached."""
-        kept: tuple[LightView, ShadowMap] | None = self.__dict__.get("_shadow")
-        if kept is None or kept[0] != light:
-            kept = light, shadow_map(light, self.vertices, self.casters(light.direction)[0])
-            self.__dict__["_shadow"] = kept
-        return kept[1]
+        if self._shadow is None or self._shadow[0] != light:
+            self._shadow = light, shadow_map(light, self.vertices, self.casters(light.direction)[0])
+        return self._shadow[1]
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class SceneGeometry:
     """Triangles of a scene at their positions; what only shading needs is computed on first use.
 
@@ -90,9 +95,10 @@ class SceneGeometry:
     topology: SceneTopology
     meshes: tuple[Mesh, ...]
     still: StillGeometry
+    _shadows: Shadows | None = field(default=None, init=False, repr=False)
 
     @classmethod
-    def of(cls, meshes: Sequence[Mesh], last: SceneGeometry | None = None) -> SceneGeometry:
+    def from_meshes(cls, meshes: Sequence[Mesh], last: SceneGeometry | None = None) -> SceneGeometry:
         """Return the geometry of a scene; reuses the ``last`` one as far as it is unchanged."""
         order = sorted(range(len(meshes)), key=lambda k: not meshes[k].still)
         ordered = tuple(meshes[k] for k in order)
@@ -127,17 +133,20 @@ class SceneGeometry:
         )
 
     @cached_property
+    def faces(self) -> FaceArrays:
+        """Faces of all meshes as the shading kernels take them."""
+        return self.topology.face_arrays(*self.normals)
+
+    @cached_property
     def _moving_normals(self) -> tuple[Floats, Floats]:
         smooth = self.topology.smooth[self.topology.still[0] :]
         return normals(self.moving_vertices, self.topology.moving_faces, smooth)
 
     def shadows(self, lighting: Lighting) -> Shadows:
         """Return the shadow maps for a lighting; the last ones are cached."""
-        kept: Shadows | None = self.__dict__.get("_shadows")
-        if kept is None or kept.light.direction != lighting.direction:
-            kept = self._cast(lighting.direction)
-            self.__dict__["_shadows"] = kept
-        return kept
+        if self._shadows is None or self._shadows.light.direction != lighting.direction:
+            self._shadows = self._cast(lighting.direction)
+        return self._shadows
 
     def _cast(self, direction: tuple[float, float, float]) -> Shadows:
         """Render the shadow maps of the scene from the light.
@@ -155,7 +164,7 @@ class SceneGeometry:
             _, still_low, still_high = still.casters(direction)
             low, high = np.floor(low + _CUT), np.ceil(high - _CUT)
             low, high = np.minimum(low, still_low), np.maximum(high, still_high)
-        light = LightView.of(direction, low, high)
+        light = LightView.on_box(direction, low, high)
         return Shadows(light, still.shadow(light), shadow_map(light, vertices, faces))
 
 

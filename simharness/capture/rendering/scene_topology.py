@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from simharness.capture.rendering.surface_kernels import packed
+from simharness.capture.rendering.surface_kernels import FaceArrays, packed
 from simharness.types.mesh import Mesh
 
 Floats = NDArray[np.float32]
@@ -126,6 +126,19 @@ class SceneTopology:
                 texels.append(np.pad(picture, ((1, 1), (1, 1), (0, 0)), mode="wrap").reshape(-1, 3))
                 first += len(texels[-1])
         return packed(np.concatenate(texels)), table
+
+    def face_arrays(self, face_normals: Floats, vertex_normals: Floats) -> FaceArrays:
+        """Return the faces as the shading kernels take them, with normals (k, 3) and (n, 3)."""
+        return FaceArrays(
+            self.faces,
+            self.colors,
+            self.smooth,
+            face_normals,
+            vertex_normals,
+            self.texture,
+            self.uv,
+            *self.pyramids,
+        )
 
     @cached_property
     def _textures(self) -> list[NDArray[np.uint8]]:

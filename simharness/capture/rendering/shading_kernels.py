@@ -12,11 +12,13 @@ may do): a loop runs in vectors where its arrays are apart in memory, else not, 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.shadow_maps import darken
+from simharness.capture.rendering.shadow_maps import ShadowMap, darken
 from simharness.capture.rendering.surface_kernels import (
     BLUE,
     GREEN,
@@ -25,6 +27,9 @@ from simharness.capture.rendering.surface_kernels import (
     NORMAL_Z,
     PIXELS,
     RED,
+    DrawnPixels,
+    FaceArrays,
+    PixelRays,
     gather,
     memory,
 )
@@ -34,71 +39,52 @@ _BRIGHTEST = 4.0
 _ZERO, _UNIT = np.float32(0.0), np.float32(1.0)
 
 
+class DistantLight(NamedTuple):
+    """Lighting in closed form as the kernels take it.
+
+    Attributes:
+        direction: unit direction to the key light, (3,).
+        strengths: strengths of key, sky and fill light, (3,).
+        gains: 255 times the factor of the light colour on the albedo, sRGB, (3,).
+        P: projection into the shadow maps, (3, 4).
+        bias: least lead in inverse depth of what shades a surface that faces the light.
+    """
+
+    direction: NDArray[np.float64]
+    strengths: NDArray[np.float64]
+    gains: NDArray[np.float64]
+    P: NDArray[np.float64]
+    bias: float
+
+
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def shade(
-    triangle: np.ndarray,
-    inverse_depth: np.ndarray,
-    q: np.ndarray,
-    faces: np.ndarray,
-    colors: np.ndarray,
-    smooth: np.ndarray,
-    face_normals: np.ndarray,
-    vertex_normals: np.ndarray,
-    texture: np.ndarray,
-    uv: np.ndarray,
-    texels: np.ndarray,
-    pyramids: np.ndarray,
-    center: np.ndarray,
-    rays: np.ndarray,
-    light: np.ndarray,
-    strengths: np.ndarray,
-    gains: np.ndarray,
-    light_P: np.ndarray,
-    bias: float,
-    still_shadow: np.ndarray,
-    still_blocks: np.ndarray,
-    shadow: np.ndarray,
-    blocks: np.ndarray,
-    shadow_place: np.ndarray,
-    shadow_depth: np.ndarray,
+    drawn: DrawnPixels,
+    faces: FaceArrays,
+    view: PixelRays,
+    light: DistantLight,
+    maps: tuple[ShadowMap, ShadowMap],
+    places: tuple[np.ndarray, np.ndarray],
     first_face: int,
     rgb: np.ndarray,
 ) -> None:
     """Colour pixels in place, by the rule of :class:`simharness.types.lighting.Lighting` in closed form.
 
     Args:
-        triangle: visible face or -1, (h, w) int32.
-        inverse_depth: inverse depth, 1/m, (h, w) float32.
-        q: homogeneous pixel coordinates of the vertices, (n, 3).
-        faces: vertex indices, (k, 3) int32.
-        colors: sRGB albedo, (k, 3) float32.
-        smooth: whether to interpolate vertex normals, (k,) bool.
-        face_normals: unit normals of the faces, (k, 3) float32.
-        vertex_normals: unit normals of the vertices, (n, 3) float32.
-        texture: index of each face's texture, -1 for none, (k,) int16.
-        uv: texture coordinates of the corners, (k, 3, 2) float32; ignored if no face has a texture.
-        texels: texels of all textures at all mipmap levels, (m,) uint64, see :func:`.surface_kernels.packed`.
-        pyramids: first texel, height and width of every level of every texture, (textures, levels, 3); each level has
-            a border of one texel, copied from the opposite side.
-        center: camera centre in the world, (3,).
-        rays: matrix, (3, 3), such that ``center + depth * rays @ (x, y, 1)`` is the point at a pixel.
-        light: unit direction to the key light, (3,).
-        strengths: strengths of key, sky and fill light, (3,).
-        gains: 255 times the factor of the light colour on the albedo, sRGB, (3,).
-        light_P: projection into the shadow maps, (3, 4).
-        bias: ``BIAS`` as inverse depth, for a surface that faces the light.
-        still_shadow: shadow map of still meshes: inverse depth from the light, (s, s) float32, 0 if nothing blocks the
-            light.
-        still_blocks: highest inverse depth in every block of it, see :func:`.shadow_maps.nearest_blocks`.
-        shadow: shadow map of the other meshes, (s, s) float32.
-        blocks: highest inverse depth in every block of it.
-        shadow_place: place in the shadow maps of what each pixel shows of still meshes, see
-            :func:`.shadow_maps.shadow_places`.
-        shadow_depth: its inverse depth from the light.
+        drawn: what the pixels show.
+        faces: all faces.
+        view: rays of the pixels.
+        light: the lighting.
+        maps: shadow maps of still meshes, and of the others.
+        places: place in the shadow maps of what each pixel shows of still meshes, and its inverse depth from the light,
+            see :func:`.shadow_maps.shadow_places`.
         first_face: first face of the meshes that are not still. Only pixels that show them are coloured, and those of
             still meshes on which their shadows may fall.
         rgb: picture to change, (h, w, 3) uint8, sRGB.
     """
+    triangle, inverse_depth, corners = drawn
+    center, rays = view
+    light_P, gains, (shadow_place, shadow_depth) = light.P, light.gains, places
     height, width = triangle.shape
     # Shadow map position of a pixel times its inverse depth: away * inverse depth + seen @ (x, y, 1), homogeneous.
     seen, away = np.zeros((3, 3)), np.zeros(3)
@@ -107,11 +93,13 @@ def shade(
         for j in range(3):
             for k in range(3):
                 seen[i, j] += light_P[i, k] * rays[k, j]
-    shaded_from = np.append(blocks.ravel(), np.float32(0.0))
-    narrow, wide, whole, level = memory()
+    shaded_from = np.append(maps[1].blocks.ravel(), np.float32(0.0))
+    surfaces = memory()
+    narrow = surfaces[0]
     # For every pixel: light with and without the key light; position in the shadow map and inverse depth there.
     key_light, other_light = np.empty(PIXELS, np.float32), np.empty(PIXELS, np.float32)
     map_x, map_y, near = np.empty(PIXELS, np.float32), np.empty(PIXELS, np.float32), np.empty(PIXELS, np.float32)
+    lit = key_light, other_light, map_x, map_y, near
     gain_red, gain_green, gain_blue = np.float32(gains[0]), np.float32(gains[1]), np.float32(gains[2])
     most = PIXELS + width
     labels, columns, lines = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.int32)
@@ -128,15 +116,10 @@ def shade(
         while done + PIXELS <= count or (y == height and done < count):
             size = min(count - done, PIXELS)
             chunk = slice(done, done + size)
-            gather(
-                labels[chunk], columns[chunk], lines[chunk], q, faces, colors, smooth, face_normals, vertex_normals,
-                texture, uv, texels, pyramids, narrow, wide, whole, level,
-            )  # fmt: skip
-            _light(columns[chunk], lines[chunk], depths[chunk], narrow, rays, light, strengths, bias, seen, away,
-                   key_light, other_light, map_x, map_y, near)  # fmt: skip
-            darken(
-                key_light[:size], map_x[:size], map_y[:size], near[:size], still_shadow, still_blocks, shadow, blocks
-            )
+            pixels = labels[chunk], columns[chunk], lines[chunk]
+            gather(pixels, corners, faces, surfaces)
+            _light(pixels, depths[chunk], narrow, rays, light, (seen, away), lit)
+            darken(key_light[:size], map_x[:size], map_y[:size], near[:size], maps[0], maps[1])
             for n in range(PIXELS):
                 bright = np.float32(math.sqrt(min(other_light[n] + key_light[n], np.float32(_BRIGHTEST))))
                 for k, gain in ((RED, gain_red), (GREEN, gain_green), (BLUE, gain_blue)):
@@ -155,45 +138,35 @@ def shade(
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _light(
-    columns: np.ndarray,
-    rows: np.ndarray,
+    pixels: tuple[np.ndarray, ...],
     inverse_depth: np.ndarray,
     narrow: np.ndarray,
     rays: np.ndarray,
-    light: np.ndarray,
-    strengths: np.ndarray,
-    bias: float,
-    seen: np.ndarray,
-    away: np.ndarray,
-    key_light: np.ndarray,
-    other_light: np.ndarray,
-    map_x: np.ndarray,
-    map_y: np.ndarray,
-    near: np.ndarray,
+    light: DistantLight,
+    to_map: tuple[np.ndarray, np.ndarray],
+    lit: tuple[np.ndarray, ...],
 ) -> None:
     """Compute the light on pixels, without shadows, and their place in the shadow maps.
 
     Args:
-        columns: columns of the pixels, (n,).
-        rows: rows of the pixels, (n,).
+        pixels: see :func:`.surface_kernels.gather`.
         inverse_depth: inverse depth of the pixels, (n,).
         narrow: surfaces of the pixels, see :func:`.surface_kernels.gather`.
-        rays: see :func:`shade`.
-        light: see :func:`shade`.
-        strengths: see :func:`shade`.
-        bias: see :func:`shade`.
-        seen: matrix, (3, 3), and
-        away: vector, (3,), such that ``away * inverse depth + seen @ (x, y, 1)`` is the place in the shadow map.
-        key_light: key light, written, (``PIXELS``,).
-        other_light: sky and fill light, written.
-        map_x: place in the shadow maps, written.
-        map_y: the same downwards.
-        near: inverse depth from the light less the bias, written.
+        rays: matrix that turns pixels into rays, (3, 3).
+        light: the lighting.
+        to_map: matrix ``seen``, (3, 3), and vector ``away``, (3,), such that ``away * inverse depth + seen @ (x, y,
+            1)`` is the place in the shadow map.
+        lit: written, (``PIXELS``,) each: key light; sky and fill light; column and row in the shadow maps; inverse
+            depth from the light less the bias.
     """
+    columns, rows = pixels[1], pixels[2]
+    key_light, other_light, map_x, map_y, near = lit
+    seen, away = to_map
+    direction, strengths = light.direction, light.strengths
     key, fill = np.float32(strengths[0]), np.float32(strengths[2])
     sky_all, sky_up = np.float32(0.65 * strengths[1]), np.float32(0.35 * strengths[1])
-    light_x, light_y, light_z = np.float32(light[0]), np.float32(light[1]), np.float32(light[2])
-    slope_bias, least_cosine = np.float32(bias), np.float32(LEAST_COSINE)
+    light_x, light_y, light_z = np.float32(direction[0]), np.float32(direction[1]), np.float32(direction[2])
+    slope_bias, least_cosine = np.float32(light.bias), np.float32(LEAST_COSINE)
     rise_x, rise_y, rise_z = np.float32(rays[0, 0]), np.float32(rays[1, 0]), np.float32(rays[2, 0])
     seen_x, seen_y, seen_w = np.float32(seen[0, 0]), np.float32(seen[1, 0]), np.float32(seen[2, 0])
     away_x, away_y, away_w = np.float32(away[0]), np.float32(away[1]), np.float32(away[2])

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.raster_kernels import NOTHING_DRAWN, rasterise
+from simharness.capture.rendering.raster_kernels import rasterise
+from simharness.capture.rendering.surface_kernels import PixelRays
 from simharness.types.lighting import facing
 
 Floats = NDArray[np.float32]
@@ -37,7 +39,7 @@ class LightView:
     radius: float
 
     @classmethod
-    def of(cls, direction: tuple[float, float, float], low: Floats, high: Floats) -> LightView:
+    def on_box(cls, direction: tuple[float, float, float], low: Floats, high: Floats) -> LightView:
         """Return the view on the box from ``low`` to ``high``, (3,) each; any view where the box is empty."""
         if not np.isfinite(low).all():
             low = high = np.zeros(3, np.float32)
@@ -59,8 +61,7 @@ class LightView:
         return BIAS * (2 * self.radius / SHADOW_SIZE) / (_LIGHT_DISTANCE * self.radius) ** 2  # nearly constant here
 
 
-@dataclass(frozen=True)
-class ShadowMap:
+class ShadowMap(NamedTuple):
     """Shadow map of a distant light.
 
     Attributes:
@@ -104,7 +105,7 @@ def shadow_map(light: LightView, vertices: Floats, faces: NDArray[np.uint32]) ->
     if not len(faces):
         return NO_SHADOW
     unused = np.empty(nearest.shape, np.int32)  # which face it is
-    corners = rasterise(vertices, faces, light.P, light.radius, nearest, unused, NOTHING_DRAWN, 0)
+    corners = rasterise(vertices, faces, light.P, light.radius, nearest, unused)
     rows = corners[:, 1] / corners[:, 2]
     return ShadowMap(nearest, nearest_blocks(nearest, max(int(rows.min()) - 1, 0), int(rows.max()) + 2))
 
@@ -117,25 +118,20 @@ _FILTER = 4  # side of the filter that softens shadow edges, pixels of the shado
 
 @njit(cache=True, error_model="numpy")
 def shadow_places(
-    triangle: np.ndarray,
-    inverse_depth: np.ndarray,
-    center: np.ndarray,
-    rays: np.ndarray,
-    light_P: np.ndarray,
-    side: int,
+    triangle: np.ndarray, inverse_depth: np.ndarray, view: PixelRays, light_P: np.ndarray, side: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return where each pixel lies in a shadow map: index of the block (h, w) uint16, and inverse depth (h, w) float32.
 
     Args:
         triangle: visible face or -1, (h, w) int32.
         inverse_depth: inverse depth, 1/m, (h, w) float32.
-        center: camera centre in the world, (3,).
-        rays: matrix, (3, 3), such that ``center + depth * rays @ (x, y, 1)`` is the point at a pixel.
+        view: rays of the pixels.
         light_P: projection into the shadow map, (3, 4).
         side: side of the map in pixels. The index after the last block stands for a pixel without a surface, and for a
             place outside of the map.
     """
     height, width = triangle.shape
+    center, rays = view
     count, end = (side + _BLOCK - 1) // _BLOCK, side - _FILTER + 1
     place, depth = np.full((height, width), count * count, np.uint16), np.ones((height, width), np.float32)
     for y in range(height):
@@ -157,16 +153,11 @@ def shadow_places(
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def darken(
-    key_light: np.ndarray,
-    map_x: np.ndarray,
-    map_y: np.ndarray,
-    near: np.ndarray,
-    still_shadow: np.ndarray,
-    still_blocks: np.ndarray,
-    shadow: np.ndarray,
-    blocks: np.ndarray,
+    key_light: np.ndarray, map_x: np.ndarray, map_y: np.ndarray, near: np.ndarray, still: ShadowMap, moving: ShadowMap
 ) -> None:
     """Remove the key light, in place, from the shaded pixels of a row, with soft edges; the two maps are one."""
+    still_shadow, still_blocks = still
+    shadow, blocks = moving
     end = np.float32(len(shadow) - _FILTER + 1)
     for x in range(len(key_light)):
         if key_light[x] <= 0:

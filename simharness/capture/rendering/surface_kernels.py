@@ -1,4 +1,4 @@
-"""Compiled surfaces of pixels: what they are like (albedo, normal), before any light. Private, single-threaded.
+"""Compiled surfaces of pixels: what they are like (albedo, normal), before any light.
 
 Pixels are taken from the whole picture, ``PIXELS`` at a time: most triangles of a body are about as large as a pixel,
 so a loop over the pixels of one triangle, or of one row of a limb, would be too short for vectors. For each pixel the
@@ -15,8 +15,10 @@ same length. Of fewer pixels the others are those of an earlier call; nothing is
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.kernels import njit
 
@@ -47,6 +49,59 @@ _TWO_LANES = np.uint64(40)
 _MASK = np.uint64((1 << 20) - 1)
 
 
+class FaceArrays(NamedTuple):
+    """Faces of a scene as the shading kernels take them: k faces with n vertices.
+
+    Attributes:
+        faces: vertex indices, (k, 3) uint32.
+        colors: sRGB albedo, (k, 3) float32.
+        smooth: whether to interpolate vertex normals, (k,) bool.
+        face_normals: unit normals of the faces, (k, 3) float32.
+        vertex_normals: unit normals of the vertices, (n, 3) float32.
+        texture: index of each face's texture, -1 for none, (k,) int16.
+        uv: texture coordinates of the corners, (k, 3, 2) float32; ignored if no face has a texture.
+        texels: texels of all textures at all mipmap levels, (m,) uint64, see :func:`packed`.
+        pyramids: first texel, height and width of every level of every texture, (textures, levels, 3); each level has
+            a border of one texel, copied from the opposite side.
+    """
+
+    faces: NDArray[np.uint32]
+    colors: NDArray[np.float32]
+    smooth: NDArray[np.bool_]
+    face_normals: NDArray[np.float32]
+    vertex_normals: NDArray[np.float32]
+    texture: NDArray[np.int16]
+    uv: NDArray[np.float32]
+    texels: NDArray[np.uint64]
+    pyramids: NDArray[np.int64]
+
+
+class DrawnPixels(NamedTuple):
+    """What pixels show.
+
+    Attributes:
+        triangle: visible face or -1, (h, w) int32.
+        inverse_depth: inverse depth, 1/m, (h, w) float32; 0 without a face.
+        corners: homogeneous pixel coordinates of the vertices, (n, 3).
+    """
+
+    triangle: NDArray[np.int32]
+    inverse_depth: NDArray[np.float32]
+    corners: NDArray[np.float64]
+
+
+class PixelRays(NamedTuple):
+    """Rays of a camera: ``center + depth * to_rays @ (x, y, 1)`` is the point at a pixel.
+
+    Attributes:
+        center: camera centre in the world, (3,).
+        to_rays: matrix, (3, 3).
+    """
+
+    center: NDArray[np.float64]
+    to_rays: NDArray[np.float64]
+
+
 @njit(cache=True)
 def memory() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return memory of :func:`gather`: rows of float32, float64, uint64, and the texture level of the last pixel."""
@@ -55,47 +110,20 @@ def memory() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 
 @njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def gather(
-    labels: np.ndarray,
-    columns: np.ndarray,
-    rows: np.ndarray,
-    q: np.ndarray,
-    faces: np.ndarray,
-    colors: np.ndarray,
-    smooth: np.ndarray,
-    face_normals: np.ndarray,
-    vertex_normals: np.ndarray,
-    texture: np.ndarray,
-    uv: np.ndarray,
-    texels: np.ndarray,
-    pyramids: np.ndarray,
-    narrow: np.ndarray,
-    wide: np.ndarray,
-    whole: np.ndarray,
-    level: np.ndarray,
+    pixels: tuple[np.ndarray, ...], corners: np.ndarray, faces: FaceArrays, rows: tuple[np.ndarray, ...]
 ) -> None:
-    """Write what the surfaces at some pixels are like, to the rows from ``RED`` to ``THIRD`` of ``narrow``.
+    """Write what the surfaces at some pixels are like, to the rows from ``RED`` to ``THIRD`` of the first memory.
 
     Args:
-        labels: visible faces, (n,) int32, n at most ``PIXELS``; none is -1.
-        columns: columns of the pixels, (n,) int32, in the order of the picture.
-        rows: rows of the pixels, (n,) int32.
-        q: see :func:`.shading_kernels.shade`, as all arguments up to ``pyramids``.
-        faces: vertex indices.
-        colors: sRGB albedo.
-        smooth: whether to interpolate vertex normals.
-        face_normals: unit normals of the faces.
-        vertex_normals: unit normals of the vertices.
-        texture: index of each face's texture.
-        uv: texture coordinates of the corners.
-        texels: texels of all textures.
-        pyramids: levels of all textures.
-        narrow: memory, float32, see :func:`memory`.
-        wide: memory, float64.
-        whole: memory, uint64.
-        level: texture level of the last pixel.
+        pixels: visible faces, (n,) int32, n at most ``PIXELS``, none is -1; columns and rows, (n,) int32 each, in the
+            order of the picture.
+        corners: homogeneous pixel coordinates of the vertices, (n, 3).
+        faces: all faces.
+        rows: see :func:`memory`.
     """
-    _load(labels, columns, rows, q, faces, colors, smooth, face_normals, vertex_normals, texture, uv, pyramids,
-          narrow, wide, whole, level)  # fmt: skip
+    labels, texels = pixels[0], faces.texels
+    narrow, wide, whole, _ = rows
+    _load(pixels, corners, faces, rows)
     _weigh(narrow, wide, whole)
     for n in range(len(labels)):
         i, j = whole[_STEPS_X + n], whole[_STEPS_Y + n]
@@ -116,24 +144,12 @@ def gather(
 
 @njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _load(
-    labels: np.ndarray,
-    columns: np.ndarray,
-    rows: np.ndarray,
-    q: np.ndarray,
-    faces: np.ndarray,
-    colors: np.ndarray,
-    smooth: np.ndarray,
-    face_normals: np.ndarray,
-    vertex_normals: np.ndarray,
-    texture: np.ndarray,
-    uv: np.ndarray,
-    pyramids: np.ndarray,
-    narrow: np.ndarray,
-    wide: np.ndarray,
-    whole: np.ndarray,
-    level: np.ndarray,
+    pixels: tuple[np.ndarray, ...], corners: np.ndarray, surfaces: FaceArrays, memory: tuple[np.ndarray, ...]
 ) -> None:
     """Copy the corners of the triangles at pixels to memory; arguments as :func:`gather`."""
+    labels, columns, rows = pixels
+    narrow, wide, whole, level = memory
+    faces, colors, smooth, face_normals, vertex_normals, texture, uv, _, pyramids = surfaces
     for n in range(len(labels)):
         t = np.uint32(labels[n])
         textured, x, y = texture[t], columns[n], rows[n]
@@ -141,7 +157,7 @@ def _load(
         for k in range(3):
             at, first = faces[t, k], 3 * k * PIXELS + n
             for i in range(3):
-                wide[_CORNERS + first + i * PIXELS] = q[at, i]
+                wide[_CORNERS + first + i * PIXELS] = corners[at, i]
             if smooth[t]:
                 for i in range(3):
                     narrow[_NORMALS + first + i * PIXELS] = vertex_normals[at, i]
@@ -179,9 +195,8 @@ def _level(n: int, narrow: np.ndarray, wide: np.ndarray, pyramid: np.ndarray) ->
     one_x = two_x = three_x = one_y = two_y = three_y = 0.0  # and their slopes
     for k in range(3):
         b, c = _CORNERS + (k + 1) % 3 * 3 * PIXELS + n, _CORNERS + (k + 2) % 3 * 3 * PIXELS + n
-        bx, by, bz, cx, cy, cz = (
-            wide[b], wide[b + PIXELS], wide[b + 2 * PIXELS], wide[c], wide[c + PIXELS], wide[c + 2 * PIXELS],
-        )  # fmt: skip
+        bx, by, bz = wide[b], wide[b + PIXELS], wide[b + 2 * PIXELS]
+        cx, cy, cz = wide[c], wide[c + PIXELS], wide[c + 2 * PIXELS]
         ex, ey, ez = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
         u, v = np.float64(narrow[_UV + 2 * k * PIXELS + n]), np.float64(narrow[_UV + (2 * k + 1) * PIXELS + n])
         e = ex * x + (ey * y + ez)

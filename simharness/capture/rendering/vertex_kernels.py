@@ -142,7 +142,7 @@ def covering_spans(codes: np.ndarray, starts: np.ndarray, height: int, width: in
 
 
 @njit(cache=True, error_model="numpy")
-def lifted(spans: np.ndarray, inverse_depth: np.ndarray, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def copied_pixels(spans: np.ndarray, inverse_depth: np.ndarray, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return copies of inverse depth and visible face at the pixels of spans, one after the other."""
     count = 0
     for n in range(len(spans)):
@@ -158,10 +158,10 @@ def lifted(spans: np.ndarray, inverse_depth: np.ndarray, triangle: np.ndarray) -
 
 
 @njit(cache=True, error_model="numpy")
-def put_back(
+def restore_pixels(
     spans: np.ndarray, depths: np.ndarray, labels: np.ndarray, inverse_depth: np.ndarray, triangle: np.ndarray
 ) -> None:
-    """Write what :func:`lifted` has copied."""
+    """Write what :func:`copied_pixels` has copied."""
     at = 0
     for n in range(len(spans)):
         y, first, end = spans[n, 0], spans[n, 1], spans[n, 2]
@@ -192,6 +192,6 @@ def resolve(
             marks[x] = labels[min(np.uint32(shown[x]), last)]  # as unsigned, -1 is the largest index
 
 
-def whole(height: int, width: int) -> np.ndarray:
+def picture_spans(height: int, width: int) -> np.ndarray:
     """Return the spans of a whole picture."""
     return np.column_stack([np.arange(height), np.zeros(height), np.full(height, width)]).astype(np.int32)

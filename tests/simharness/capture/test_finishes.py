@@ -9,7 +9,7 @@ import pytest
 from mesh_shapes import ball, sheet
 from test_renderers import camera_at
 
-from simharness.capture.rendering.finish_kernels import FINISHING, GLOSS, finish
+from simharness.capture.rendering.finish_kernels import FINISHING, GLOSS, FinishArrays, finish
 from simharness.capture.rendering.finishes import Finishes, grain_of
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.rendering.surface_kernels import NORMAL_X, NORMAL_Y, NORMAL_Z, PIXELS, memory
@@ -73,11 +73,17 @@ def finished(normal, *, light, material=Material.SKIN, slope=0.0, view=(0.0, 0.0
     rays = np.array([[1e-9, 0, -x], [0, 1e-9, -y], [0, 0, -z]])
     received, grain = np.ones(3 * PIXELS, np.float32), np.tile(np.array([1, 0, 0, slope], np.float32), (3, 1))
     work = np.zeros(FINISHING, np.float32)
-    finish(
-        pixel, pixel, pixel, 0, np.array([[0, 1, 2]], np.uint32), 0, rays, narrow, np.array([material], np.int8),
-        np.zeros(1, np.int16), np.array([light], np.float32), np.zeros(1, np.float32), grain, np.zeros(3, np.float32),
-        0.6, work, received,
-    )  # fmt: skip
+    finishes = FinishArrays(
+        np.array([material], np.int8),
+        np.zeros(1, np.int16),
+        np.array([light], np.float32),
+        np.zeros(1, np.float32),
+        grain,
+        np.zeros(3, np.float32),
+        0.6,
+    )
+    faces = np.array([[0, 1, 2]], np.uint32)
+    finish((pixel, pixel, pixel), (0, 0), faces, rays, narrow, finishes, work, received)
     return received[::PIXELS], work[GLOSS]
 
 
@@ -127,12 +133,12 @@ def test_cloth_folds_where_it_is_shorter_than_at_rest():
 
 def test_finishes_of_meshes_are_joined():
     one, other = ball((0, 0, 1), 0.3, (0.5,) * 3), ball((1, 0, 1), 0.3, (0.5,) * 3)
-    joined = Finishes.of((one, replace(other, finish=finish_of(other, Material.HAIR))))
+    joined = Finishes.from_meshes((one, replace(other, finish=finish_of(other, Material.HAIR))))
     first = len(one.vertices)
     np.testing.assert_array_equal(joined.toward[:first], np.arange(first))
     np.testing.assert_array_equal(joined.toward[first:] - first, finish_of(other, Material.HAIR).toward)
     np.testing.assert_array_equal(np.bincount(joined.figure), [len(one.faces), len(other.faces)])
-    assert Finishes.of((one, other)) is None
+    assert Finishes.from_meshes((one, other)) is None
 
 
 def test_a_finish_of_another_body_is_refused():

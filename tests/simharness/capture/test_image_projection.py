@@ -49,14 +49,14 @@ def test_cameras_together_image_the_same_bits_as_one_by_one():
     eyes = [camera(), camera((-0.4, 0.0, 0.0, 0.0, 0.0)), replace(camera(), name="other", size=(200, 100))]
     points = stream(1, "points").uniform([-6, -6, 0], [6, 6, 2], (1, 4, 50, 3))
     points[0, 0, 0] = np.nan
-    arrays = CameraArrays.of(eyes)
+    arrays = CameraArrays.of_cameras(eyes)
     pixels, inside = arrays.pixels_of(points)
     for eye, seen, within in zip(eyes, pixels, inside, strict=True):
         expected = project_to_image(eye, points[0])
         np.testing.assert_array_equal(seen, expected)
         np.testing.assert_array_equal(within, eye.inside(expected))
-    assert CameraArrays.of(eyes, arrays) is arrays
-    assert CameraArrays.of(eyes[::-1], arrays) is not arrays
+    assert CameraArrays.of_cameras(eyes, arrays) is arrays
+    assert CameraArrays.of_cameras(eyes[::-1], arrays) is not arrays
 
 
 def test_shapes_are_kept():

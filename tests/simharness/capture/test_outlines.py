@@ -39,7 +39,7 @@ def poses(body, count, seed):
 
 def framed_by_outline(body, transforms, camera, rows=(0.0, 1.0)):
     """Return left, top, right, bottom, (4,)."""
-    outline, out = Outline.of(body), np.empty((1, 4))
+    outline, out = Outline.from_body(body), np.empty((1, 4))
     bounding_box(outline.at(transforms), outline.edges, packed(camera)[None], *rows, out)
     return out[0]
 
@@ -132,7 +132,7 @@ def test_boxes_of_bands_join_to_the_whole():
 
 def test_an_outline_is_a_few_hundred_points_of_the_skin():
     body = somebody(1)
-    outline = Outline.of(body)
+    outline = Outline.from_body(body)
     assert 200 < len(outline.vertices) < 900
     transforms = poses(body, 1, 1)[0]
     skin = body.skin(transforms)

@@ -10,8 +10,8 @@ from mesh_shapes import ball, box, room, sheet
 from test_renderers import camera_at
 
 from simharness.capture.rendering import tone
-from simharness.capture.rendering.box_tree_kernels import build_tree, trace
-from simharness.capture.rendering.light_kernels import direct_light
+from simharness.capture.rendering.box_tree_kernels import BoxTree, build_tree, trace
+from simharness.capture.rendering.light_kernels import SourceArrays, direct_light
 from simharness.capture.rendering.light_samples import LightSamples
 from simharness.capture.rendering.moving_light import capsules
 from simharness.capture.rendering.raster import RasterRenderer
@@ -48,10 +48,11 @@ def rectangle(place, normal, light):
 @pytest.mark.parametrize("place", [(0.3, -0.2, 0.0), (1.5, 1.0, 0.0), (-2.5, 2.0, 0.4), (0.5, 0.0, 1.3)])
 @pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8)])
 def test_a_lamp_gives_the_light_of_its_form_factor(place, normal):
-    tree = build_tree(np.full((1, 3, 3), 50.0, np.float32) + np.eye(3, dtype=np.float32))
+    tree = BoxTree(*build_tree(np.full((1, 3, 3), 50.0, np.float32) + np.eye(3, dtype=np.float32))[:3])
     area = np.array([[*PANEL.center, *PANEL.right, *PANEL.up, *PANEL.radiance, 0.0]])
     places, normals = (np.array([v], np.float32) for v in (place, normal))
-    found = direct_light(places, normals, np.zeros(1, np.float32), area, np.zeros(1, bool), np.zeros(6), *tree[:3])
+    sources = SourceArrays(area, np.zeros(1, bool), np.zeros(6))
+    found = direct_light(places, normals, np.zeros(1, np.float32), sources, tree)
     np.testing.assert_allclose(found[0], 2.0 * rectangle(np.array(place), np.array(normal), PANEL), rtol=0.03)
 
 
@@ -85,13 +86,14 @@ def test_penumbrae_widen_with_the_distance_of_what_casts_them():
     places = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)]).astype(np.float32)
     normals = np.tile(np.float32([0, 0, 1]), (len(x), 1))
     area = np.array([[*lamp.center, *lamp.right, *lamp.up, *lamp.radiance, 0.0]])
-    fixed = (np.zeros(len(x), np.float32), area, np.zeros(1, bool), np.zeros(6))
-    bare = direct_light(places, normals, *fixed, *build_tree(np.full((1, 3, 3), 50.0, np.float32))[:3])[:, 0]
+    fixed = np.zeros(len(x), np.float32), SourceArrays(area, np.zeros(1, bool), np.zeros(6))
+    far = BoxTree(*build_tree(np.full((1, 3, 3), 50.0, np.float32))[:3])
+    bare = direct_light(places, normals, *fixed, far)[:, 0]
     widths = []
     for height in (0.3, 1.0, 1.5):
         board = sheet([(-9, -9, height), (0, -9, height), (0, 9, height), (-9, 9, height)], (1.0, 1.0, 1.0))
-        tree = build_tree(np.ascontiguousarray(board.vertices[board.faces]))
-        share = direct_light(places, normals, *fixed, *tree[:3])[:, 0] / bare
+        tree = BoxTree(*build_tree(np.ascontiguousarray(board.vertices[board.faces]))[:3])
+        share = direct_light(places, normals, *fixed, tree)[:, 0] / bare
         # Across the penumbra of a uniform lamp the light rises linearly: its slope is spread as a box of that width.
         rise, middle = np.diff(share), (x[1:] + x[:-1]) / 2
         spread = (rise * middle**2).sum() - (rise * middle).sum() ** 2
@@ -115,7 +117,8 @@ def test_sunlight_comes_through_windows_alone():
 def test_rays_meet_the_nearest_triangle():
     rng = np.random.default_rng(3)
     corners = (rng.uniform(-1, 1, (200, 1, 3)) + 0.3 * rng.normal(size=(200, 3, 3))).astype(np.float32)
-    boxes, links, triangles, order = build_tree(corners)
+    *built, order = build_tree(corners)
+    tree = BoxTree(*built)
     stack = np.empty(64, np.int32)
     hits = 0
     for start, way in zip(rng.uniform(-2, 2, (150, 3)), rng.normal(size=(150, 3)), strict=True):
@@ -124,13 +127,13 @@ def test_rays_meet_the_nearest_triangle():
         u, v, far = np.linalg.solve(system, (start - corners[:, 0])[..., None])[..., 0].T
         met = (u >= 0) & (v >= 0) & (u + v <= 1) & (far > 0)
         wanted = np.where(met, far, np.inf)
-        t, distance, *_ = trace(boxes, links, triangles, stack, tuple(start), tuple(way), 1e4, False)
+        t, distance, *_ = trace(tree, stack, tuple(start), tuple(way), 1e4, False)
         assert (t >= 0) == met.any()
         if t >= 0:
             hits += 1
             assert order[t] == wanted.argmin()
             assert distance == pytest.approx(wanted.min(), rel=1e-3)
-        assert (trace(boxes, links, triangles, stack, tuple(start), tuple(way), 1e4, True)[0] >= 0) == met.any()
+        assert (trace(tree, stack, tuple(start), tuple(way), 1e4, True)[0] >= 0) == met.any()
     assert hits > 20
 
 

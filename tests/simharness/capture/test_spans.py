@@ -5,9 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simharness.capture.rendering.moving_shadows import dim, runs_below
+from simharness.capture.rendering.moving_shadows import BlockGrid, ShadowLayers, dim, runs_below
+from simharness.capture.rendering.surface_kernels import PixelRays
 from simharness.capture.rendering.tone import dimming
-from simharness.capture.rendering.vertex_kernels import covering_spans, lifted, project_vertices, put_back
+from simharness.capture.rendering.vertex_kernels import (
+    copied_pixels,
+    covering_spans,
+    project_vertices,
+    restore_pixels,
+)
 
 HEIGHT, WIDTH = 60, 80
 P = np.array([[70.0, 0.0, 39.5, 0.0], [0.0, 70.0, 29.5, 0.0], [0.0, 0.0, 1.0, 0.0]])
@@ -47,15 +53,15 @@ def test_a_mesh_behind_the_camera_has_no_pixels_and_one_across_the_near_plane_ma
     assert (mask_of(spans_around(across, [0, 2])[0]) == 1).all()
 
 
-def test_what_is_lifted_is_put_back():
+def test_copied_pixels_are_restored():
     rng = np.random.default_rng(3)
     depth, face = rng.random((HEIGHT, WIDTH)).astype(np.float32), rng.integers(0, 99, (HEIGHT, WIDTH), np.int32)
     spans = np.array([[3, 5, 70], [4, 0, 80], [4, 79, 80], [59, 10, 11]], np.int32)
-    kept = lifted(spans, depth, face)
+    kept = copied_pixels(spans, depth, face)
     before = depth.copy(), face.copy()
     for y, first, end in spans:
         depth[y, first:end], face[y, first:end] = -1, -1
-    put_back(spans, *kept, depth, face)
+    restore_pixels(spans, *kept, depth, face)
     np.testing.assert_array_equal(depth, before[0])
     np.testing.assert_array_equal(face, before[1])
 
@@ -70,12 +76,11 @@ def test_pixels_are_darkened_by_what_the_map_leaves_where_they_lie(height):
     fine[:, 24:] = 0.5
     coarse = np.broadcast_to(fine[::2, ::2], (4, 24, 24)).copy()
     touched = np.append(np.repeat([False, True], 3)[None].repeat(blocks, 0).ravel(), False)
-    runs = runs_below(
-        np.zeros((HEIGHT, WIDTH), np.int32), inverse_depth, center, rays, origin, 8 * cell, blocks, blocks, 1.9
-    )
+    view, grid = PixelRays(center, rays), BlockGrid(origin, 8 * cell, blocks, blocks)
+    runs = runs_below(np.zeros((HEIGHT, WIDTH), np.int32), inverse_depth, view, grid, 1.9)
     rgb = np.full((HEIGHT, WIDTH, 3), 200, np.uint8)
     heights = np.array([0.0, 0.5, 1.1, 1.9], np.float32)
-    dim(inverse_depth, runs, center, rays, origin, cell, fine, coarse, heights, touched, dimming(), rgb)
+    dim(inverse_depth, runs, view, ShadowLayers(origin, cell, fine, coarse, heights, touched), dimming(), rgb)
     x = center[0] + (3.0 - height) * (np.arange(WIDTH) - 39.5) / 70.0
     dark, edge = dimming()[64, 200], 2 * cell
     assert (rgb[:, x < -edge] == 200).all()

@@ -1,12 +1,10 @@
 """Compilation of kernels in a second process."""
 
 import importlib
-import inspect
 import pkgutil
 import subprocess
 import sys
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 
 import numba
@@ -16,9 +14,7 @@ import pytest
 import mvpose
 from mvpose import Camera, Detections, Rig, preset
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS
-from simharness.scenario.load import load
-from simharness.trial.kernel_compilation import Compilation, compile_kernels, picture_kernels
-from simharness.trial.run_trial import run_trial
+from simharness.trial.kernel_compilation import Compilation, compile_kernels
 
 
 def signatures():
@@ -78,16 +74,29 @@ def test_a_failed_compilation_does_not_end_the_run():
         compile_kernels(["no such preset"])
 
 
-def test_kernels_of_pictures_are_compiled_for_their_arguments():
-    kernels = list(picture_kernels())
-    listed = resources.files("simharness.trial").joinpath("data/picture_kernels.txt").read_text().splitlines()
-    assert len(kernels) == len(listed) > 5, "run python -m tools.picture_kernels"
-    for kernel, types in kernels:
-        assert len(types) == len(inspect.signature(kernel.py_func).parameters), kernel.py_func.__qualname__
+PICTURES = """
+from numba.core.dispatcher import Dispatcher
+from simharness.capture import raw
+from simharness.capture.rendering import finishes, light_kernels, lit_kernels, moving_light, moving_shadows
+from simharness.scenario.load import load
+from simharness.trial.kernel_compilation import compile_pictures
+from simharness.trial.run_trial import run_trial
+
+def of_pictures():
+    modules = raw, finishes, light_kernels, lit_kernels, moving_light, moving_shadows
+    kernels = [each for module in modules for each in vars(module).values() if isinstance(each, Dispatcher)]
+    return {each.py_func.__qualname__: list(each.signatures) for each in kernels}
+
+compile_pictures()
+compiled = of_pictures()
+for kernel in ("shade_lit", "finish", "cast", "dim", "runs_below", "moving_light", "probe_light", "expose"):
+    assert compiled[kernel], kernel
+run_trial(load("quickstart", overrides=["duration=0.1"]), until="detect", previews=[0])
+assert compiled == of_pictures(), "pictures need other kernels, or for other arguments"
+"""
 
 
 @pytest.mark.slow
-def test_a_picture_needs_the_kernels_of_the_list():
-    run_trial(load("quickstart", overrides=["duration=0.1"]), until="detect", previews=[0])
-    for kernel, types in picture_kernels():
-        assert types in kernel.overloads, f"{kernel.py_func.__qualname__}: run python -m tools.picture_kernels"
+def test_pictures_are_compiled_for_what_a_scene_gives_them():
+    """In a process of its own, in which nothing is compiled yet."""
+    subprocess.run([sys.executable, "-c", PICTURES], check=True, cwd=Path(__file__).parent)
