@@ -214,8 +214,9 @@ class KernelCache:
             return None
         versions = (code_digest(self._kernel), numba.__version__, np.__version__, sys.version, sys.platform)
         processor = self._kernel.targetctx.codegen().magic_tuple()
-        name = f"{self._prefix()}{_short(versions)}-{_short(tuple(map(str, arguments)), processor)}.nbk"
-        return (versions, arguments, processor), Path(self.cache_path, name)
+        fields = tuple(map(_fields, arguments))
+        name = f"{self._prefix()}{_short(versions)}-{_short(tuple(map(str, arguments)), fields, processor)}.nbk"
+        return (versions, arguments, fields, processor), Path(self.cache_path, name)
 
     def _prefix(self) -> str:
         """Return how the names of all entries of the kernel start, for the version of Python."""
@@ -251,6 +252,12 @@ def _plain(kind: Any) -> bool:
     if isinstance(kind, types.BaseTuple):
         return all(_plain(each) for each in kind)
     return isinstance(kind, _PLAIN)
+
+
+def _fields(kind: Any) -> tuple[Any, ...]:
+    """Return the names of the fields of named tuples in a numba type: types are equal that differ in their order."""
+    within = tuple(map(_fields, kind)) if isinstance(kind, types.BaseTuple) else ()
+    return (kind.fields, within) if isinstance(kind, types.BaseNamedTuple) else within
 
 
 def _short(*parts: object) -> str:

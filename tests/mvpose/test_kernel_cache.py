@@ -187,6 +187,26 @@ def test_a_kernel_does_not_inherit_the_options_of_who_compiles_it(toy, caller_fi
     assert " fast " not in code
 
 
+def test_fields_of_a_named_tuple_that_change_places_are_seen(toy):
+    pairs = toy.folder / "pairs.py"
+    for fields, difference in (("first: float\n    second: float", -3.0), ("second: float\n    first: float", 3.0)):
+        pairs.write_text(
+            f"from typing import NamedTuple\nfrom mvpose.kernels import njit\nclass Pair(NamedTuple):\n    {fields}\n"
+            "@njit(cache=True)\ndef difference(pair, pairs):\n    return pair.first - pair.second + 0.0 * pairs[0].first\n",
+            encoding="utf-8",
+        )
+        toy.start()
+        module = importlib.import_module("toy.pairs")
+        pair = module.Pair(2.0, 5.0)
+        assert module.difference(pair, (pair, pair)) == difference
+        assert compiled(module.difference)
+        toy.start()
+        again = importlib.import_module("toy.pairs")
+        pair = again.Pair(2.0, 5.0)
+        assert again.difference(pair, (pair, pair)) == difference
+        assert not compiled(again.difference)
+
+
 def test_what_a_kernel_calls_is_part_of_it(toy):
     module = toy.start()
     assert module.outer(5.0) == VALUE
