@@ -192,7 +192,7 @@ def test_fields_of_a_named_tuple_that_change_places_are_seen(toy):
     for fields, difference in (("first: float\n    second: float", -3.0), ("second: float\n    first: float", 3.0)):
         pairs.write_text(
             f"from typing import NamedTuple\nfrom mvpose.kernels import njit\nclass Pair(NamedTuple):\n    {fields}\n"
-            "@njit(cache=True)\ndef difference(pair, pairs):\n    return pair.first - pair.second + 0.0 * pairs[0].first\n",
+            "@njit(cache=True)\ndef difference(pair, pairs):\n    return pairs[0].first - pair.second\n",
             encoding="utf-8",
         )
         toy.start()
