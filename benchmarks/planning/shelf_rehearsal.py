@@ -18,6 +18,7 @@ from mvpose import Rig
 from mvpose.commands.progress import reporter
 from simharness.planning import Volume
 from simharness.planning.rehearsal_scene import ACTIVITIES, SceneSettings
+from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.scene_results import Condition, interval_of
 from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
 from simharness.reality.recording_file import read_recording
@@ -41,9 +42,7 @@ def main() -> None:
     people = annotated_people(recording)
     settings = SceneSettings(
         Rig(people.cameras),
-        Volume(Volume.around(people.joints).outline),
-        _PEOPLE,
-        read_profile(arguments.detector),
+        RehearsalSetup(Volume.around(people.joints), read_profile(arguments.detector), _PEOPLE),
         activities=tuple(arguments.activity or ACTIVITIES),
         head=FILLED,
     )

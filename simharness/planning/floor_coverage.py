@@ -23,11 +23,6 @@ _SMALLEST = 1.0  # metres
 _ENOUGH = 3  # cameras: one of them may lose a person whom somebody hides
 
 
-def seen(rig: Rig, points: Floats) -> Bools:
-    """Return which cameras have points (..., 3) in the picture, (V, ...)."""
-    return np.stack([camera.inside(camera.project(points)) for camera in rig])
-
-
 def coverage(rig: Rig, places: Floats, heights: tuple[float, ...]) -> Integers:
     """Return the number of cameras that have a point over each place in the picture, by height.
 
@@ -88,6 +83,33 @@ def covered_volume(rig: Rig) -> tuple[Volume, int]:
     )
 
 
+def good_rectangle(places: Floats, good: Bools) -> tuple[Floats, Floats] | None:
+    """Return the corners (2,), metres, of the largest upright rectangle of good cells of a square grid; None: none.
+
+    Args:
+        places: centres of the cells, (P, 2), metres.
+        good: which are good, (P,).
+    """
+    if not good.any():
+        return None
+    spacing = grid_spacing(places)
+    low = places.min(axis=0)
+    cells = np.rint((places - low) / spacing).astype(int)
+    mask = np.zeros(cells.max(axis=0) + 1, bool)
+    mask[tuple(cells[good].T)] = True
+    found = largest_rectangle(mask, longest=max(mask.shape))
+    assert found is not None  # some cell is good
+    x0, x1, y0, y1 = found
+    return low + spacing * (np.array([x0, y0]) - 0.5), low + spacing * (np.array([x1, y1]) + 0.5)
+
+
+def grid_spacing(places: Floats) -> float:
+    """Return the distance of neighbouring places of a square grid, metres; 1 for a single place."""
+    steps = [np.diff(np.unique(np.round(places[:, axis], 6))) for axis in (0, 1)]
+    known = np.concatenate(steps)
+    return float(known.min()) if len(known) else 1.0
+
+
 def largest_rectangle(mask: Bools, *, longest: int) -> tuple[int, int, int, int] | None:
     """Return first and last row, first and last column of the largest rectangle of true cells; None without any.
 
@@ -107,6 +129,11 @@ def largest_rectangle(mask: Bools, *, longest: int) -> tuple[int, int, int, int]
             if (last - first + 1) * (stop - start) > area:
                 best, area = (first, last, start, stop - 1), (last - first + 1) * (stop - start)
     return best
+
+
+def seen(rig: Rig, points: Floats) -> Bools:
+    """Return which cameras have points (..., 3) in the picture, (V, ...)."""
+    return np.stack([camera.inside(camera.project(points)) for camera in rig])
 
 
 def _longest_run(row: Bools) -> tuple[int, int]:

@@ -157,100 +157,85 @@ class Rehearsal:
     def to_json(self) -> dict[str, Any]:
         """Return the rehearsal as JSON: see ``docs/guide/rehearse.md``. A value that does not apply is null."""
         prediction, setup = self.prediction, self.setup
-        return {
+        maps = {"places", "pcp", "recall", "error_mm", "views", "ellipse", "risk"}
+        content = {
             "name": self.name,
-            "sentences": list(self.sentences),
+            "sentences": self.sentences,
             "people": setup.people,
             "detector": setup.detector.name,
-            "target": {"pcp": setup.target.pcp, "mpjpe_mm": setup.target.error, "share": _plain(self.good_share)},
-            "volume": {"outline": _plain(setup.volume.outline), "height": setup.volume.height},
+            "target": {"pcp": setup.target.pcp, "mpjpe_mm": setup.target.error, "share": self.good_share},
+            "volume": {"outline": setup.volume.outline, "height": setup.volume.height},
             **_estimated(self.whole),
-            "mixed": _interval(self.mixed),
+            "mixed": self.mixed,
             "map": {
-                "places": _plain(prediction.places),
-                "pcp": _plain(prediction.pcp),
-                "recall": _plain(prediction.recall),
-                "error_mm": _plain(prediction.error_mm),
-                "views": _plain(prediction.views),
-                "ellipse": _plain(prediction.ellipse),
-                "risk": _plain(prediction.risk),
-                "good": self.good.tolist(),
-                "cameras_by_height": {
-                    f"{height:g}": row.tolist() for height, row in zip(HEIGHTS, self.coverage, strict=True)
-                },
+                **{key: value for key, value in vars(prediction).items() if key in maps},
+                "good": self.good,
+                "cameras_by_height": {f"{at:g}": row for at, row in zip(HEIGHTS, self.coverage, strict=True)},
             },
             "cameras": {name: _worth(each) for name, each in self.cameras.items()},
-            "subsets": [{"cameras": list(names)} | _estimated(each) for names, each in self.subsets.items()],
+            "subsets": [{"cameras": names} | _estimated(each) for names, each in self.subsets.items()],
             "extra": None if self.extra is None else _extra(self.extra),
-            "crowds": [
-                {
-                    "people": each.people,
-                    "pcp": None if each.pcp is None else _interval(each.pcp),
-                    "mixed": None if each.mixed is None else _interval(each.mixed),
-                    "layer": {
-                        "pcp": _plain(each.layer_pcp),
-                        "error_mm": _plain(each.layer_error_mm),
-                        "risk": _plain(each.layer_risk),
-                    },
-                }
-                for each in self.crowds
-            ],
+            "crowds": [_crowd(each) for each in self.crowds],
             "tolerance": {each.fault.key: _tolerance(each) for each in self.tolerances},
-            "layer_seconds": _plain(self.seconds.get("layer", float("nan"))),
+            "layer_seconds": self.seconds.get("layer"),
         }
+        return {key: _plain(value) for key, value in content.items()}
 
 
 def _estimated(each: Estimated) -> dict[str, Any]:
-    return {
-        "pcp": _interval(each.pcp),
-        "mpjpe_mm": _interval(each.mpjpe_mm),
-        "recall": _interval(each.recall),
-        "layer": {"pcp": _plain(each.layer_pcp), "error_mm": _plain(each.layer_error_mm)},
-    }
+    layer = {"pcp": each.layer_pcp, "error_mm": each.layer_error_mm}
+    return {"pcp": each.pcp, "mpjpe_mm": each.mpjpe_mm, "recall": each.recall, "layer": layer}
 
 
 def _worth(each: CameraWorth) -> dict[str, Any]:
     return {
-        "worth": _interval(each.worth),
-        "worth_mm": _interval(each.worth_mm),
-        "layer_worth": _plain(each.layer_worth),
-        "sees": _plain(each.sees),
+        "worth": each.worth,
+        "worth_mm": each.worth_mm,
+        "layer_worth": each.layer_worth,
+        "sees": each.sees,
         "redundant": each.redundant,
-        "position": _plain(each.camera.center),
+        "position": each.camera.center,
         "without": None if each.without is None else _estimated(each.without),
     }
 
 
 def _extra(extra: ExtraCamera) -> dict[str, Any]:
     return {
-        "position": _plain(extra.camera.center),
-        "direction": _plain(extra.camera.R[2]),
-        "gain": _interval(extra.gain),
-        "gain_mm": _interval(extra.gain_mm),
-        "layer_gain": _plain(extra.layer_gain),
+        "position": extra.camera.center,
+        "direction": extra.camera.R[2],
+        "gain": extra.gain,
+        "gain_mm": extra.gain_mm,
+        "layer_gain": extra.layer_gain,
         "places": extra.places,
         "rig": _estimated(extra.rig),
     }
 
 
+def _crowd(each: Crowd) -> dict[str, Any]:
+    layer = {"pcp": each.layer_pcp, "error_mm": each.layer_error_mm, "risk": each.layer_risk}
+    return {"people": each.people, "pcp": each.pcp, "mixed": each.mixed, "layer": layer}
+
+
 def _tolerance(each: FaultTolerance) -> dict[str, Any]:
+    levels = zip(each.fault.levels, each.pcp, each.mpjpe_mm, each.loss, strict=True)
     return {
         "unit": each.fault.unit,
-        "cliff": _plain(each.cliff) if each.cliff is not None else None,
+        "cliff": each.cliff,
         "cliff_points": CLIFF,
-        "levels": [
-            {"level": level, "pcp": _interval(pcp), "mpjpe_mm": _interval(error), "loss": _interval(loss)}
-            for level, pcp, error, loss in zip(each.fault.levels, each.pcp, each.mpjpe_mm, each.loss, strict=True)
-        ],
+        "levels": [dict(zip(("level", "pcp", "mpjpe_mm", "loss"), level, strict=True)) for level in levels],
     }
 
 
-def _interval(value: Interval) -> dict[str, Any]:
-    return {"mean": _plain(value.mean), "low": _plain(value.low), "high": _plain(value.high), "scenes": value.n}
-
-
 def _plain(value: Any) -> Any:
-    """Return numbers and arrays as JSON with four significant decimals; NaN becomes null."""
-    if isinstance(value, np.ndarray):
+    """Return values as JSON: numbers with four decimals, NaN as null, arrays as lists, intervals with their scenes."""
+    if isinstance(value, Interval):
+        return {"mean": _plain(value.mean), "low": _plain(value.low), "high": _plain(value.high), "scenes": value.n}
+    if isinstance(value, dict):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
         return [_plain(each) for each in value]
-    return round(float(value), 4) if np.isfinite(value) else None
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return round(float(value), 4) if np.isfinite(value) else None
+    return value

@@ -5,7 +5,7 @@ The simulator has people around the origin: the smallest rectangle around the vo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from mvpose import Rig
 from mvpose.arrays import Floats
-from simharness.scenario.sections.detector_section import DetectorSection
+from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.frame_scores import RULES, HeadRule
-from simharness.types.floor import Volume
 from simharness.world.humans.accessories import take_off
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.scene.build import Scene, build, compile_model
@@ -42,11 +41,8 @@ class SceneSettings:
 
     Attributes:
         rig: cameras in the world, floor at z = 0.
-        volume: where people are.
-        people: number of people in the volume.
-        detector: profile of the detector.
-        clutter: objects that the simulator places around the people, who then use the square around the volume.
-        obstacles: boxes at known places of the world.
+        setup: the volume, its people, what hides them, and the detector. With clutter, people use the square around
+            the volume.
         activities: activities of the people, in turn.
         frames: frames of a take; a scene has four takes, or one with clutter.
         rate: frames per second.
@@ -56,11 +52,7 @@ class SceneSettings:
     """
 
     rig: Rig
-    volume: Volume
-    people: int
-    detector: DetectorSection
-    clutter: ClutterSection = field(default_factory=ClutterSection)
-    obstacles: tuple[Box, ...] = ()
+    setup: RehearsalSetup
     activities: tuple[str, ...] = ACTIVITIES
     frames: int = 8
     rate: float = 2.0
@@ -129,7 +121,7 @@ def scenario_of(settings: SceneSettings, frame: SceneFrame, seed: int) -> Scenar
     """Return the scenario of a scene; its people fill a square as large as the rectangle of the volume."""
     half = float(np.sqrt(frame.half.prod()))
     reach = 2 * max(half, float(np.abs(frame.rig(settings.rig).centers[:, :2]).max())) + 2 * _MARGIN
-    roomy = half >= _LEAST_WALK and 4 * half**2 >= _ROOM_TO_WALK * settings.people
+    roomy = half >= _LEAST_WALK and 4 * half**2 >= _ROOM_TO_WALK * settings.setup.people
     activities = settings.activities if roomy else _STANDING
     content: dict[str, Any] = {
         "name": "rehearsal",
@@ -138,12 +130,12 @@ def scenario_of(settings: SceneSettings, frame: SceneFrame, seed: int) -> Scenar
         "rate": settings.rate,
         "room": {"size": (reach, reach, 3.0), "walls": False},
         "people": {
-            "count": settings.people,
+            "count": settings.setup.people,
             "area": half,
             "activities": activities,
             "spacing": _SPACINGS[0],
         },
-        "clutter": settings.clutter,
+        "clutter": settings.setup.clutter,
         "rendering": {"renderer": "rays"},
     }
     return Scenario.model_validate(content)
@@ -178,9 +170,9 @@ def spread_over_volume(scene: Scene, settings: SceneSettings, frame: SceneFrame,
     stretch = frame.half / np.sqrt(frame.half.prod())
     motions = tuple(replace(each, root=_moved(each.root, turn, stretch)) for each in scene.motions)
     scene = replace(scene, motions=motions)
-    if not settings.obstacles:
+    if not settings.setup.obstacles:
         return scene
-    obstacles = tuple(_solid(each, frame, number) for number, each in enumerate(settings.obstacles))
+    obstacles = tuple(_solid(each, frame, number) for number, each in enumerate(settings.setup.obstacles))
     solids = (*scene.solids, *obstacles)
     return replace(
         scene, solids=solids, model=compile_model([Kinematics(take_off(body)) for body in scene.bodies], solids)

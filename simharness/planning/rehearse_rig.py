@@ -251,16 +251,7 @@ class _Rehearsing:
         return by_number[people], by_number
 
     def _batch(self, rig: Rig, people: int, conditions: Sequence[Condition], count: int) -> SceneBatch:
-        setup = self.setup
-        settings = SceneSettings(
-            rig,
-            setup.volume,
-            people,
-            setup.detector,
-            clutter=setup.clutter,
-            obstacles=setup.obstacles,
-            whole=self.whole,
-        )
+        settings = SceneSettings(rig, replace(self.setup, people=people), whole=self.whole)
         return SceneBatch(settings, tuple(conditions), tuple(range(self.seed, self.seed + count)))
 
     def _estimated(self, scenes: Sequence[SceneResult], cameras: tuple[int, ...], prediction: Prediction) -> Estimated:

@@ -13,6 +13,7 @@ from mvpose.commands.progress import Reporter, Silence
 from simharness.planning.candidates import Candidate, candidate, places_in
 from simharness.planning.planned_room import Room
 from simharness.planning.rehearsal_scene import SceneSettings
+from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.scene_results import Condition, SceneResult
 from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
 from simharness.planning.value_fit import VARIANT
@@ -83,16 +84,8 @@ def simulate_rigs(
         first = len(union)
         union += [dataclasses.replace(camera, name=f"rig{n} {camera.name}") for camera in rig]
         conditions.append(Condition(tuple(range(first, len(union)))))
-    settings = SceneSettings(
-        Rig(union),
-        room.volume,
-        room.keys.people.count,
-        room.detector,
-        clutter=room.keys.clutter,
-        obstacles=room.blocking,
-        variant=VARIANT,
-        whole=conditions[0].cameras,
-    )
+    setup = RehearsalSetup.in_room(room)
+    settings = SceneSettings(Rig(union), setup, variant=VARIANT, whole=conditions[0].cameras)
     drawn = tuple(int(stream(seed, "plan", "scene", number).integers(2**31)) for number in seeds)
     with (reporter or Silence()).stage("simulate", len(drawn)) as advance:
         batch = SceneBatch(settings, tuple(conditions), drawn)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mvpose.arrays import Bools, Floats
-from simharness.planning.floor_coverage import largest_rectangle
+from simharness.planning.floor_coverage import good_rectangle
 from simharness.planning.rehearsal_result import Rehearsal
 from simharness.statistics.intervals import Interval
 
@@ -29,33 +28,6 @@ def sentences(rehearsal: Rehearsal) -> tuple[str, ...]:
             ),
         )
     )
-
-
-def good_rectangle(places: Floats, good: Bools) -> tuple[Floats, Floats] | None:
-    """Return the corners (2,), metres, of the largest upright rectangle of good cells of a square grid; None: none.
-
-    Args:
-        places: centres of the cells, (P, 2), metres.
-        good: which are good, (P,).
-    """
-    if not good.any():
-        return None
-    spacing = grid_spacing(places)
-    low = places.min(axis=0)
-    cells = np.rint((places - low) / spacing).astype(int)
-    mask = np.zeros(cells.max(axis=0) + 1, bool)
-    mask[tuple(cells[good].T)] = True
-    found = largest_rectangle(mask, longest=max(mask.shape))
-    assert found is not None  # some cell is good
-    x0, x1, y0, y1 = found
-    return low + spacing * (np.array([x0, y0]) - 0.5), low + spacing * (np.array([x1, y1]) + 0.5)
-
-
-def grid_spacing(places: Floats) -> float:
-    """Return the distance of neighbouring places of a square grid, metres; 1 for a single place."""
-    steps = [np.diff(np.unique(np.round(places[:, axis], 6))) for axis in (0, 1)]
-    known = np.concatenate(steps)
-    return float(known.min()) if len(known) else 1.0
 
 
 def _verdict(rehearsal: Rehearsal) -> str:

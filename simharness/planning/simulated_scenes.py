@@ -106,9 +106,9 @@ class _Scenes:
 
 def _run(settings: SceneSettings, conditions: Sequence[Condition], seed: int) -> SceneResult | str:
     """Simulate one scene and score it under all conditions; return the reason where it cannot be built."""
-    frame = SceneFrame.around(settings.volume.outline)
+    frame = SceneFrame.around(settings.setup.volume.outline)
     takes = _TAKES
-    if has_objects(settings.clutter):  # it stands where the people of the scene are not, so they cannot be moved
+    if has_objects(settings.setup.clutter):  # it stands where the people of the scene are not, so they cannot be moved
         takes, settings = 1, replace(settings, frames=_TAKES * settings.frames)
         frame = replace(frame, half=np.full(2, frame.half.max()))
     rig = frame.rig(settings.rig)
@@ -124,7 +124,7 @@ def _run(settings: SceneSettings, conditions: Sequence[Condition], seed: int) ->
         for take in range(takes)
     ]
     places = np.concatenate([each.places for each in parts])
-    inside = settings.volume.contains(places)
+    inside = settings.setup.volume.contains(places)
     scored = {each: _Scored.joined([part.scored[each] for part in parts]) for each in conditions}
     shown = scored[whole]
     return SceneResult(
@@ -177,7 +177,7 @@ def _take(
     settings: SceneSettings, frame: SceneFrame, scene: Scene, conditions: Sequence[Condition], seed: int
 ) -> _Take:
     """Capture and detect one take, and estimate it under all conditions."""
-    scenario = scenario_of(settings, frame, seed).model_copy(update={"detector": settings.detector})
+    scenario = scenario_of(settings, frame, seed).model_copy(update={"detector": settings.setup.detector})
     exposures = exposures_of(scenario, frame.rig(settings.rig), scene.time)
     draws = ConditionedTrial(Trial(scenario, scene, exposures, {}, None))
     truth = coco17_to_shelf14(draws.sequence.joints, head=settings.head.mapping)

@@ -13,6 +13,7 @@ from mvpose import Camera
 from mvpose.arrays import Floats
 from mvpose.report.rig_plots import MapLabel, cone_from_above, write_labels
 from mvpose.report.svg_plots import FAINT, INK, LINE, svg_plot
+from simharness.planning.floor_coverage import grid_spacing
 from simharness.planning.plan_result import RigPlan
 from simharness.planning.planned_room import Room
 
@@ -149,7 +150,7 @@ def place_map(name: str, plan: RigPlan, values: Floats, *, worst: float, best: f
     places = plan.prediction.places
     low, high = plan.room.space.bounds[0] - 0.3, plan.room.space.bounds[1] + 0.3
     tall = float((high - low)[1] / (high - low)[0])
-    side = _spacing(places)
+    side = grid_spacing(places)
     with svg_plot(name, size=(_SIZE[0], _SIZE[0] * tall)) as (axes, written):
         draw_room(axes, plan.room)
         for place, value in zip(places, values, strict=True):
@@ -241,14 +242,6 @@ def _label(axes: Axes, room: Room, cameras: Sequence[Camera]) -> None:
 def _rectangle(left: float, right: float, bottom: float, top: float, **style: object) -> Polygon:
     corners = np.array([[left, bottom], [right, bottom], [right, top], [left, top]])
     return Polygon(corners, closed=True, **style)
-
-
-def _spacing(places: Floats) -> float:
-    """Return the distance between neighbours of a square grid (P, 2), metres."""
-    if len(places) < 2:
-        return 0.5
-    away = np.linalg.norm(places[:, None] - places[None], axis=-1)
-    return float(away[away > 1e-6].min())
 
 
 def _lows(plan: RigPlan) -> list[float]:

@@ -18,8 +18,8 @@ from mvpose import Camera
 from mvpose.arrays import Bools, Floats
 from mvpose.report.rig_plots import camera_from_above, fit_view, name_cameras
 from mvpose.report.svg_plots import FAINT, INK, legend_above, svg_plot
+from simharness.planning.floor_coverage import grid_spacing
 from simharness.planning.rehearsal_result import Rehearsal
-from simharness.planning.sentences import grid_spacing
 from simharness.planning.tolerance import CLIFF, FaultTolerance
 from simharness.statistics.intervals import Interval
 

@@ -18,8 +18,8 @@ from mvpose.report.view_3d import (
     view_3d,
 )
 from simharness.outputs.planning.rehearsal_plots import EXTRA, GOOD, outline_of
+from simharness.planning.floor_coverage import grid_spacing
 from simharness.planning.rehearsal_result import Rehearsal
-from simharness.planning.sentences import grid_spacing
 
 _REACH = 1.4  # metres: length of the drawn frusta
 _FRUSTUM, _EXTRA = Style3D("--accent", 1.1), Style3D(EXTRA, 1.3)

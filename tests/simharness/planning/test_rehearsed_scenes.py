@@ -9,6 +9,7 @@ import pytest
 
 from mvpose import Rig
 from simharness.planning.rehearsal_scene import SceneSettings
+from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.rig_file import read_rig
 from simharness.planning.scene_results import Condition, loss_of
 from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
@@ -22,11 +23,9 @@ WORSE = Condition(WHOLE, "rotation", 2.0)
 LATE = Condition(WHOLE, "clock_offset", 0.5)
 
 
-def settings(**changes):
-    content = dict(
-        rig=read_rig("ring5"), volume=Volume.box(4.0, 2.0), people=2, detector=read_profile("typical"), frames=4
-    )
-    return SceneSettings(**content | changes)
+def settings(*, rig=None, **changes):
+    content = dict(volume=Volume.box(4.0, 2.0), people=2, detector=read_profile("typical"))
+    return SceneSettings(rig or read_rig("ring5"), RehearsalSetup(**content | changes), frames=4)
 
 
 def simulated(conditions, *, seed=3, **changes):
