@@ -22,9 +22,9 @@ from simharness.planning.rehearsal_result import (
     Rehearsal,
 )
 from simharness.planning.rehearsal_scene import SceneSettings
+from simharness.planning.rehearsal_sentences import sentences
 from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.scene_results import Condition, SceneResult, interval_of, loss_of
-from simharness.planning.sentences import sentences
 from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
 from simharness.planning.tolerance import fault_conditions, tolerances
 from simharness.reality.validation.subsets import camera_subsets
