@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from benchmarks.method.measure import exponent, interleaved
 from benchmarks.method.report import bar, caption, figure, table
-from benchmarks.method.scenes import frames
-from benchmarks.method.tasks import STAGES, estimating, prepare
+from benchmarks.method.scenes import STAGES, estimating, frames, prepare
 
 PRESETS = ("fast", "full")
 _BAR = 7  # columns

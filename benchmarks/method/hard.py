@@ -11,8 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.method.measure import interleaved
 from benchmarks.method.report import caption, figure, table
-from benchmarks.method.scenes import HARD, frames
-from benchmarks.method.tasks import Case, matching, prepare
+from benchmarks.method.scenes import HARD, Case, frames, matching, prepare
 from mvpose.estimate import Matching
 from mvpose.matching import Method, objective
 

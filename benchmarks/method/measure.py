@@ -1,21 +1,25 @@
-"""Measurement of wall times: interleaved calls, quantiles, and exponents of growth."""
+"""Measurement of wall times, interleaved and in fresh processes: quantiles, exponents of growth, peak memory."""
 
 from __future__ import annotations
 
 import gc
+import json
 import os
 import platform
+import subprocess
+import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from benchmarks.method.tasks import Case, Task
+from benchmarks.method.scenes import Case, Task
 from mvpose.arrays import Floats
 
 _LEAST_CALLS = 3
@@ -143,3 +147,43 @@ def exponent(sizes: ArrayLike, costs: ArrayLike) -> float:
     if not (x @ x) > 0:
         raise ValueError(f"an exponent needs two different sizes in the larger half of {sizes.tolist()}")
     return float(x @ (y - y.mean()) / (x @ x))
+
+
+def report(code: str, *, environment: Mapping[str, str] | None = None) -> Any:
+    """Run code in a fresh Python process and return its output, parsed as JSON.
+
+    The process writes byte code even if this one does not (``PYTHONDONTWRITEBYTECODE``), so that a second process
+    starts as quickly as it does for a user.
+
+    Raises:
+        RuntimeError: the code failed; the message has the end of its error output.
+    """
+    inherited = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+    root = str(Path(__file__).parents[2])  # folder of mvpose, also if it is not installed
+    inherited["PYTHONPATH"] = os.pathsep.join(filter(None, (root, inherited.get("PYTHONPATH"))))
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**inherited, **(environment or {})},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise RuntimeError(f"a process of the benchmark failed: {done.stderr.strip()[-2000:]}")
+    return json.loads(done.stdout)
+
+
+def peak_memory() -> float:
+    """Return the peak resident memory of this process, MB (10^6 bytes).
+
+    On Linux it is read from /proc, because ``getrusage`` there includes the memory of the parent at the start.
+    """
+    status = Path("/proc/self/status")
+    if status.exists():
+        for line in status.read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return float(line.split()[1]) * 1024 / 1e6
+    import resource  # not on Windows
+
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6

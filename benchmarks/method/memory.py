@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 
 import mvpose
-from benchmarks.method.processes import peak_memory, report
+from benchmarks.method.measure import peak_memory, report
 from benchmarks.method.report import against, caption, figure, table
 from benchmarks.method.scenes import frames
 

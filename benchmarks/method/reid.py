@@ -10,8 +10,7 @@ import numpy as np
 from benchmarks.method.measure import interleaved
 from benchmarks.method.published import SIZES
 from benchmarks.method.report import caption, figure, table
-from benchmarks.method.scenes import SIZE, frames
-from benchmarks.method.tasks import Task, prepare
+from benchmarks.method.scenes import SIZE, Task, frames, prepare
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Synthetic rigs and stick figures for the benchmark, made without the simulator.
+"""Scenes of the benchmark, rigs and stick figures made without the simulator, and the calls on them that are timed.
 
 People stand on a jittered grid in a room, and cameras on a ring around them see all of them. Detections have noise,
 misses and phantoms according to :class:`Conditions`. A seed gives the same scene on every machine.
@@ -6,14 +6,21 @@ misses and phantoms according to :class:`Conditions`. A seed gives the same scen
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+import mvpose
 from mvpose.arrays import Floats
 from mvpose.camera import Camera, Rig
 from mvpose.detections import Detections
+from mvpose.estimate import Estimate, Matching
+from mvpose.matching import Method, match
+from mvpose.pipeline import Pipeline
+from mvpose.rays import viewing_rays
 from mvpose.skeleton import COCO17
 
 SPACING = 1.0  # metres between neighbours on the grid
@@ -21,6 +28,9 @@ JITTER = 0.1  # metres; greatest distance from the grid point, so neighbours are
 CLEARANCE = 0.4  # metres; least distance of a phantom from every person
 FOCAL, SIZE = 800.0, (1280, 960)
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
+
+
+STAGES = ("affinity", "matching", "reconstruction")
 
 
 @dataclass(frozen=True)
@@ -177,3 +187,53 @@ def _limb_directions(ahead: Floats, aside: Floats) -> Floats:
         [np.sin(ahead) * np.cos(aside), np.sin(aside), -np.cos(ahead) * np.cos(aside)],
         axis=1,
     )
+
+
+@dataclass(frozen=True)
+class Case:
+    """Scene with its precomputed affinity, (m, m), of the preset ``full``."""
+
+    scene: Scene
+    affinity: NDArray[np.float64]
+
+
+def prepare(scenes: Iterable[Scene]) -> list[Case]:
+    """Compute the affinities of scenes."""
+    affinity = Pipeline().affinity
+    return [
+        Case(scene, affinity(scene.rig, scene.detections, viewing_rays(scene.rig, scene.detections)))
+        for scene in scenes
+    ]
+
+
+@dataclass(frozen=True)
+class Task:
+    """Function to time.
+
+    Attributes:
+        call: timed function of a case.
+        note: function that returns figures of the result to record with the time; not timed.
+    """
+
+    call: Callable[[Case], Any]
+    note: Callable[[Case, Any], Mapping[str, float]] = lambda case, result: {}
+
+
+def estimating(preset: str) -> Task:
+    """Create the task of a whole preset; it records the milliseconds of its stages."""
+    pipeline = mvpose.preset(preset)
+
+    def note(case: Case, estimate: Estimate) -> Mapping[str, float]:
+        return {stage: 1e3 * estimate.timings[stage] for stage in STAGES}
+
+    return Task(lambda case: pipeline.estimate(case.scene.rig, case.scene.detections), note)
+
+
+def matching(method: Method, note: Callable[[Case, Matching], Mapping[str, float]] = lambda case, result: {}) -> Task:
+    """Create the task of matching only."""
+    return Task(lambda case: match(case.affinity, case.scene.detections.view, method=method), note)
+
+
+def decomposing() -> Task:
+    """Create the task of one eigendecomposition of the size of the frame, the yardstick of matching by ADMM."""
+    return Task(lambda case: np.linalg.eigh(case.affinity))

@@ -10,8 +10,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.method.measure import Sample, interleaved
 from benchmarks.method.published import RELEASED, others_at
 from benchmarks.method.report import against, caption, figure, table
-from benchmarks.method.scenes import frames
-from benchmarks.method.tasks import STAGES, decomposing, estimating, matching, prepare
+from benchmarks.method.scenes import STAGES, decomposing, estimating, frames, matching, prepare
 
 SIZES = ((5, 4), (10, 10), (31, 10))
 

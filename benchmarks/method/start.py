@@ -8,7 +8,7 @@ import time
 from dataclasses import dataclass
 
 import mvpose
-from benchmarks.method.processes import report
+from benchmarks.method.measure import report
 from benchmarks.method.report import against, caption, figure, table
 from benchmarks.method.scenes import HARD, frames
 

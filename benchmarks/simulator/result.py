@@ -13,7 +13,7 @@ from benchmarks.method.curve import COSTS, PRESETS, Point, Sweep
 from benchmarks.method.measure import Machine
 from benchmarks.method.published import OTHERS, Comparison
 from benchmarks.method.reid import Crops
-from benchmarks.method.tasks import STAGES
+from benchmarks.method.scenes import STAGES
 
 SWEPT = ("views", "people")
 """Sweeps of ``curve`` that are plotted."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from benchmarks.method.curve import COSTS, PRESETS, Point
 from benchmarks.method.published import OTHERS, RELEASED, Comparison
 from benchmarks.method.report import figure
-from benchmarks.method.tasks import STAGES
+from benchmarks.method.scenes import STAGES
 from benchmarks.simulator.result import SWEPT, Result
 
 _TITLES = {

@@ -17,12 +17,10 @@ from scipy.stats import binomtest
 from benchmarks.method import curve, published, reid, stages
 from benchmarks.method.__main__ import main
 from benchmarks.method.hard import pairs, ratio
-from benchmarks.method.measure import exponent, interleaved
-from benchmarks.method.processes import report
+from benchmarks.method.measure import exponent, interleaved, report
 from benchmarks.method.published import OTHERS, SIZES, others_at
 from benchmarks.method.report import WIDTH, against, bar, encodable, figure, table
-from benchmarks.method.scenes import CLEARANCE, HARD, LIVE, Conditions, film, frames, ring
-from benchmarks.method.tasks import Task
+from benchmarks.method.scenes import CLEARANCE, HARD, LIVE, Conditions, Task, film, frames, ring
 from mvpose import COCO17
 
 EXACT = Conditions(noise=0.0, joints_missing=0.0, people_missed=0.0)
@@ -207,7 +205,7 @@ def test_a_terminal_without_symbols_gets_ascii():
 def test_peak_memory_is_that_of_the_process_only():
     """It excludes the memory of the parent process, which getrusage includes."""
     ballast = np.ones(40_000_000)  # 320 MB
-    code = "from benchmarks.method.processes import peak_memory; print(peak_memory())"
+    code = "from benchmarks.method.measure import peak_memory; print(peak_memory())"
     assert 10 < report(code) < 300 < ballast.nbytes / 1e6
 
 

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.tracking.losses import LOSSES, Loss, without
-from benchmarks.tracking.shelf import Figures, Shelf
+from benchmarks.tracking.shelf import LOSSES, Figures, Loss, Shelf, without
 from benchmarks.tracking.trajectories import link, second_differences, short_ghosts
 from mvpose import Camera, Detections, Estimate, Rig, preset
 from mvpose.skeleton import coco17_to_shelf14
