@@ -171,9 +171,9 @@ class ObjectBuilder:
         mesh: tuple[Floats, np.ndarray] | None = None,
     ) -> Self:
         """Add a part. Wood that is painted white shows no grain."""
-        color = np.clip(np.asarray(color, float), 0, 1)
-        material = "plain" if material == "wood" and color.min() > _PAINTED else material
-        self.parts.append(Part(kind, size, position, turn, color, material, mesh))
+        albedo: Floats = np.clip(np.asarray(color, float), 0, 1)
+        material = "plain" if material == "wood" and albedo.min() > _PAINTED else material
+        self.parts.append(Part(kind, size, position, turn, albedo, material, mesh))
         return self
 
     def mjcf(self, name: str) -> str:

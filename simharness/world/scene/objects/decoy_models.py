@@ -20,10 +20,9 @@ from simharness.types.mirror import Mirror
 from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.shape import Shape
 from simharness.world.scene.objects.artwork import draw_person
-from simharness.world.scene.objects.assembly import Assembly
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.laboratory import WOOD
-from simharness.world.scene.objects.shapes import box_mesh, joined, lathe, loft, shifted
+from simharness.world.scene.objects.shapes import Assembly, box_mesh, joined, lathe, loft, shifted
 from simharness.world.scene.objects.solids import ObjectModel
 
 _POSTER_RESOLUTION = 320  # pixels per metre

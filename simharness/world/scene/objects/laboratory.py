@@ -11,9 +11,8 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
-from simharness.world.scene.objects.assembly import Assembly
 from simharness.world.scene.objects.geoms import Box
-from simharness.world.scene.objects.shapes import TOP, hexahedron, lathe, shifted
+from simharness.world.scene.objects.shapes import TOP, Assembly, hexahedron, lathe, shifted
 from simharness.world.scene.objects.solids import ObjectModel
 
 _BOX_SIDE = (0.40, 0.75)  # metres

@@ -96,8 +96,8 @@ class ObjectFile:
             meshes.append(replace(part.mesh, vertices=vertices.astype(np.float32)))
             if sheet is not None:
                 name = part.texture or "plain"
-                local = None if part.uv is None else _within(part.uv)
-                uv.append(sheet.projected(part.mesh, name, number) if local is None else sheet.uv(name, local))
+                place = None if part.uv is None else _within(part.uv)
+                uv.append(sheet.projected(part.mesh, name, number) if place is None else sheet.uv(name, place))
         mesh = joined(*meshes)
         return mesh if sheet is None else replace(mesh, texture=sheet.texture, uv=np.concatenate(uv))
 
@@ -278,12 +278,12 @@ def _mesh(model: mujoco.MjModel, mesh: int, color: Floats) -> tuple[Mesh, NDArra
 def _creased(vertices: Floats, faces: NDArray[np.int32]) -> tuple[Floats, NDArray[np.int64]]:
     """Return vertices and faces of a mesh whose vertices are separate where two faces meet at a sharp edge."""
     vertices, welded = np.unique(vertices.round(6), axis=0, return_inverse=True)
-    faces = welded.ravel()[faces]
-    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    corners = welded.ravel()[faces]
+    a, b, c = np.moveaxis(vertices[corners], 1, 0)
     normals = np.cross(b - a, c - a)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     corner = np.arange(3 * len(faces)).reshape(-1, 3)
-    starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    starts, ends = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
     edge = np.minimum(starts, ends).astype(np.int64) * len(vertices) + np.maximum(starts, ends)
     order = np.argsort(edge, kind="stable")
     one, two = order[:-1], order[1:]
@@ -296,7 +296,7 @@ def _creased(vertices: Floats, faces: NDArray[np.int32]) -> tuple[Floats, NDArra
     graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(corner.size, corner.size))
     count, which = connected_components(graph, directed=False)
     points = np.empty((count, 3))
-    points[which] = vertices[faces.ravel()]
+    points[which] = vertices[corners.ravel()]
     return points, which.reshape(-1, 3)
 
 
@@ -327,7 +327,7 @@ def _add_geom(spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, g
     )
 
 
-def _within(uv: NDArray[np.float32]) -> NDArray[np.float32]:
+def _within(uv: NDArray[np.float32]) -> Floats:
     """Return texture coordinates with each face moved by whole periods into 0..1, as far as it fits there."""
     periods = np.floor(uv.min(axis=1, keepdims=True) + 1e-4)
-    return np.clip(uv - periods, 0.0, 1.0)
+    return np.clip(uv - periods, 0.0, 1.0).astype(float)

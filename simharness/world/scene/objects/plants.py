@@ -6,8 +6,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
-from simharness.world.scene.objects.assembly import Assembly
-from simharness.world.scene.objects.shapes import joined, lathe, quad_mesh
+from simharness.world.scene.objects.shapes import Assembly, joined, lathe, quad_mesh
 from simharness.world.scene.objects.solids import ObjectModel
 
 _POTS = np.array([[0.72, 0.42, 0.30], [0.90, 0.89, 0.86], [0.28, 0.30, 0.33], [0.52, 0.60, 0.62], [0.80, 0.70, 0.56]])

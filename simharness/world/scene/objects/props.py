@@ -9,9 +9,8 @@ import numpy as np
 
 from simharness.types.random_streams import stream
 from simharness.world.motion.motion import Prop
-from simharness.world.scene.objects.assembly import Assembly
 from simharness.world.scene.objects.laboratory import BOX_COLORS, chair, table, taped
-from simharness.world.scene.objects.shapes import lathe
+from simharness.world.scene.objects.shapes import Assembly, lathe
 from simharness.world.scene.objects.solids import ObjectModel, Solid
 
 Size = tuple[float, float, float]

@@ -1,4 +1,4 @@
-"""Meshes of simple shapes: quadrilaterals, boxes, bars, bodies of revolution, lofted skins.
+"""Meshes of simple shapes (quadrilaterals, boxes, bars, bodies of revolution, lofted skins), and objects made of them.
 
 Faces are counter-clockwise as seen from outside. Creases have separate vertices on both sides, so a smooth mesh may
 have flat sides and sharp edges.
@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
-from simharness.world.scene.objects.geoms import Box, Cylinder, Surface
+from simharness.types.mirror import Mirror
+from simharness.world.scene.objects.geoms import Box, Cylinder, Geom, Surface
+from simharness.world.scene.objects.solids import ObjectModel
 
 # Corners of each side of a Box in the order of its corners, counter-clockwise from outside: -x, +x, -y, +y, -z, +z.
 _QUADS = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
@@ -135,3 +138,46 @@ def joined(*meshes: Mesh) -> Mesh:
 def surface(mesh: Mesh) -> Surface:
     """Return the geom with exactly the triangles of a mesh."""
     return Surface(mesh.vertices.astype(float), mesh.faces)
+
+
+class Assembly:
+    """Builder of an object model, which stands on z = 0 around the origin with its front towards +x."""
+
+    def __init__(self) -> None:
+        self._meshes: list[Mesh] = []
+        self._geoms: list[Geom] = []
+
+    def box(self, center: Sequence[float], size: Sequence[float], color: ArrayLike, *, yaw: float = 0.0) -> Self:
+        """Add a box of ``size`` x, y, z in metres; ``color`` (3,) of the box or (6, 3) of its six sides."""
+        x, y, z = (float(v) for v in center)
+        dx, dy, dz = (float(v) / 2 for v in size)
+        return self.boxes([Box((x, y, z), (dx, dy, dz), yaw)], np.asarray([color], float))
+
+    def boxes(self, boxes: Sequence[Box], colors: ArrayLike) -> Self:
+        """Add boxes; ``colors`` as for :func:`simharness.world.scene.objects.shapes.box_mesh`."""
+        self._meshes.append(box_mesh(boxes, colors))
+        self._geoms += boxes
+        return self
+
+    def bar(
+        self, start: Sequence[float], end: Sequence[float], radius: float, color: ArrayLike, sides: int = 10
+    ) -> Self:
+        """Add a round bar from one point to another, metres."""
+        a, b = np.asarray(start, float), np.asarray(end, float)
+        length = float(np.linalg.norm(b - a))
+        x, y, z = ((a + b) / 2).tolist()
+        i, j, k = ((b - a) / length).tolist()
+        bar = Cylinder((x, y, z), radius, length / 2, (i, j, k))
+        self._meshes.append(bar_mesh(bar, color, sides=sides))
+        self._geoms.append(bar)
+        return self
+
+    def mesh(self, mesh: Mesh) -> Self:
+        """Add a mesh."""
+        self._meshes.append(mesh)
+        self._geoms.append(surface(mesh))
+        return self
+
+    def model(self, *, figure: Floats | None = None, mirror: Mirror | None = None) -> ObjectModel:
+        """Return the object model of all parts."""
+        return ObjectModel(joined(*self._meshes), tuple(self._geoms), figure=figure, mirror=mirror)

@@ -42,7 +42,7 @@ from simharness.world.scene.placement.free_space import (
     near_people,
     towards_walls,
 )
-from simharness.world.scene.placement.occlusion import cover
+from simharness.world.scene.placement.occlusion_target import cover
 
 _SPEED = (0.35, 0.7)  # m/s: largest speed on the path
 _LINE = (0.4, 2.5)  # metres from the middle of a line to its ends

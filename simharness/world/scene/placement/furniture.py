@@ -13,7 +13,7 @@ from simharness.world.scene.objects.materials import draw_sheet
 from simharness.world.scene.objects.object_files import load_shipped, variants
 from simharness.world.scene.objects.solids import ObjectModel, Solid
 from simharness.world.scene.placement.free_space import FreeSpace, Site
-from simharness.world.scene.placement.occlusion import lines_in
+from simharness.world.scene.placement.occlusion_target import lines_in
 from simharness.world.scene.placement.sight_lines import SightLines
 from simharness.world.scene.rooms.kinds import furniture_of_rooms
 from simharness.world.scene.rooms.openings import Opening, Wall, room_walls

@@ -135,14 +135,14 @@ class PictureFill:
 
     def add(self, solid: Solid) -> None:
         """Add a solid."""
-        self.filled |= self._of(solid)
+        self.filled |= self._hit_by(solid)
 
     def allows(self, solid: Solid, most: float) -> bool:
         """Return whether one more solid leaves every picture filled up to a share of ``most``, or unchanged."""
-        more = self.filled | self._of(solid)
+        more = self.filled | self._hit_by(solid)
         return bool((more.mean(axis=1) <= np.maximum(most, self.filled.mean(axis=1))).all())
 
-    def _of(self, solid: Solid) -> Bools:
+    def _hit_by(self, solid: Solid) -> Bools:
         return np.reshape([intersects(solid.mesh, starts, ends) for starts, ends in self._rays], self.filled.shape)
 
 

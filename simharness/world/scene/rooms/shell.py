@@ -21,8 +21,7 @@ from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import quad_mesh
 from simharness.world.scene.objects.solids import Solid
-from simharness.world.scene.rooms.court import make_court
-from simharness.world.scene.rooms.fittings import make_fittings
+from simharness.world.scene.rooms.fittings import make_court, make_fittings
 from simharness.world.scene.rooms.kinds import settled
 from simharness.world.scene.rooms.lamps import make_ceiling, shown_lamps
 from simharness.world.scene.rooms.openings import Opening, Wall, room_walls

@@ -4,7 +4,7 @@ from walkers import Rays, ring, space
 
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.world.scene.placement.clutter import place_clutter
-from simharness.world.scene.placement.occlusion import share_hidden
+from simharness.world.scene.placement.occlusion_target import share_hidden
 
 
 def measured(free, solids) -> float:

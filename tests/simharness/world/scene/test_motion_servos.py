@@ -21,7 +21,7 @@ from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.trajectory import RATE, Trajectory, motion_clock
 from simharness.world.scene.dynamics.inverse_dynamics import InverseDynamics
 from simharness.world.scene.dynamics.motion_servos import LEVER, MotionServos, Push, planned_push, track
-from simharness.world.scene.objects.assembly import Assembly
+from simharness.world.scene.objects.shapes import Assembly
 
 GRAVITY = 9.81
 MAN = Kinematics(make_body(Shape(gender=0.1, height=0.42)))

@@ -5,9 +5,8 @@ from hypothesis import strategies as st
 from walkers import ring
 
 from simharness.world.motion.trajectory import Trajectory
-from simharness.world.scene.objects.assembly import Assembly
 from simharness.world.scene.objects.geoms import Box
-from simharness.world.scene.objects.shapes import box_mesh
+from simharness.world.scene.objects.shapes import Assembly, box_mesh
 from simharness.world.scene.placement.sight_lines import PictureFill, SightLines, intersects, lines_of_sight
 
 numbers = st.floats(-2, 2)

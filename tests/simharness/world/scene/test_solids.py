@@ -8,9 +8,8 @@ from walkers import Rays
 from simharness.types.mirror import Mirror
 from simharness.types.random_streams import stream
 from simharness.world.motion.trajectory import Trajectory
-from simharness.world.scene.objects.assembly import Assembly
 from simharness.world.scene.objects.geoms import Box, Cylinder, Surface, carried
-from simharness.world.scene.objects.shapes import TOP, bar_mesh, box_mesh, hexahedron, joined, lathe, shifted
+from simharness.world.scene.objects.shapes import TOP, Assembly, bar_mesh, box_mesh, hexahedron, joined, lathe, shifted
 from simharness.world.scene.placement.sight_lines import intersects
 
 numbers = st.floats(-3, 3)

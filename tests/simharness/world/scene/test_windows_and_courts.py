@@ -8,7 +8,7 @@ import pytest
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.world.rigs.layouts import intrinsics, look_at
-from simharness.world.scene.rooms.court import make_court
+from simharness.world.scene.rooms.fittings import make_court
 from simharness.world.scene.rooms.kinds import ROOM_KINDS, settled
 from simharness.world.scene.rooms.lamps import area_lights
 from simharness.world.scene.rooms.openings import draw_openings
