@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from mvpose.arrays import Floats
 from simharness.reality.annotated_recording import DetectorKind
-from simharness.reality.detector_fit.frame_sums import SCORED, FrameSums, frame_sums
+from simharness.reality.detector_fit.detector_sums import FrameSums
+from simharness.reality.detector_fit.frame_sums import SCORED, frame_sums
 from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints, label_joints
 from simharness.reality.detector_fit.parameters import estimate_parameters
 from simharness.reality.detector_fit.sample import Sample
 from simharness.scenario.sections.detector_section import KINDS
-from simharness.statistics.resampling import block_weights, blocks, interval, resampled
+from simharness.statistics.resampling import block_weights, blocks, interval
 
 RESAMPLES = 500
 
@@ -22,24 +24,24 @@ _RULE_OF_THREE = 3.0
 """An event that never happened in n independent trials has a probability of at most 3 / n, at 95 %. Correlated trials
 count as fewer."""
 
-_COUNTED = {
-    "keypoints.stray": "miss.n",
-    "boxes": "people.n",
-    "boxes.duplicates": "people.detected",
-    "phantoms": "false.n",
-    "size": "size.n",
-    "size.fragments": "fragments.n",
+_COUNTED: Mapping[str, Callable[[FrameSums], Floats]] = {
+    "keypoints.stray": lambda sums: sums.miss.n,
+    "boxes": lambda sums: sums.people.all.n,
+    "boxes.duplicates": lambda sums: sums.people.detected,
+    "phantoms": lambda sums: sums.false.n,
+    "size": lambda sums: sums.size.n,
+    "size.fragments": lambda sums: sums.false.fragments,
 }
 """Sums that count the observations behind a parameter; the others are measured on all joints in the picture."""
 
 _OCCLUSIONS = ("visible", "self_occluded", "occluded")
-_COUNTED_BY_KIND: Mapping[str, tuple[str, int | None]] = {
-    "self_occluded": ("n.miss", _OCCLUSIONS.index("self_occluded")),
-    "occluded": ("n.miss", _OCCLUSIONS.index("occluded")),
-    "scatter_hidden": ("scatter.hidden_n", None),
-    "jitter_mean": ("jitter.n", None),
+_COUNTED_BY_KIND: Mapping[str, Callable[[FrameSums], Floats]] = {
+    "self_occluded": lambda sums: sums.classes["miss"].n[:, _OCCLUSIONS.index("self_occluded")],
+    "occluded": lambda sums: sums.classes["miss"].n[:, _OCCLUSIONS.index("occluded")],
+    "scatter_hidden": lambda sums: sums.scatter.hidden_n,
+    "jitter_mean": lambda sums: sums.jitter.n,
 }
-"""Sums that count the joints of a kind behind a parameter, and their occlusion class; None: all."""
+"""Sums, (T, 9), that count the joints of each kind behind a parameter."""
 
 
 @dataclass(frozen=True)
@@ -151,13 +153,9 @@ def measure_detector(
             "cameras as the truth. Check that calibration, truth and detections belong together"
         )
     sums = frame_sums(labels)
-    whole = estimate_parameters(
-        {key: each.sum(axis=0, keepdims=True) for key, each in sums.items()}, step=labels.step, kind=labels.kind
-    )
+    whole = estimate_parameters(sums.total(), step=labels.step, kind=labels.kind)
     weights = block_weights(sample.time, resamples=resamples, seed=seed)
-    drawn = estimate_parameters(
-        {key: resampled(each, weights) for key, each in sums.items()}, step=labels.step, kind=labels.kind
-    )
+    drawn = estimate_parameters(sums.resampled(weights), step=labels.step, kind=labels.kind)
     independent = blocks(sample.time)
     result = {}
     design = 1 + 2 * np.nan_to_num(whole["correlation.life"][0]) / labels.step
@@ -174,10 +172,8 @@ def measure_detector(
 def point_estimates(sample: Sample) -> dict[str, float]:
     """Return the measured values of a sample without their intervals, by key; NaN where unknown."""
     labels = label_joints(sample)
-    sums = {key: each.sum(axis=0, keepdims=True) for key, each in frame_sums(labels).items()}
-    return {
-        key: float(value[0]) for key, value in estimate_parameters(sums, step=labels.step, kind=labels.kind).items()
-    }
+    values = estimate_parameters(frame_sums(labels).total(), step=labels.step, kind=labels.kind)
+    return {key: float(value[0]) for key, value in values.items()}
 
 
 FITTED_SECTIONS = ("keypoints", "correlation", "scores", "boxes", "phantoms")
@@ -202,18 +198,17 @@ def _count(key: str, sums: FrameSums) -> int:
     section, *rest = key.split(".")
     kind = KINDS.index(rest[-1]) if rest[-1] in KINDS else None
     if rest[0] in CLASSES and kind is not None:
-        n = sums[f"n.{rest[0]}"][..., kind].sum(axis=0)
+        n = sums.classes[rest[0]].n[..., kind].sum(axis=0)
         return int(n[_OCCLUSIONS.index(rest[1])] if rest[1] in _OCCLUSIONS else n.sum())
     if rest[0] in _COUNTED_BY_KIND and kind is not None:
-        name, occlusion = _COUNTED_BY_KIND[rest[0]]
-        joints = sums[name] if occlusion is None else sums[name][:, occlusion]
-        return int(joints[..., kind].sum())
+        return int(_COUNTED_BY_KIND[rest[0]](sums)[:, kind].sum())
     if section == "scores":
-        scores = sums["scores"] if kind is None else sums["scores"][..., kind, :]
+        scores = sums.scores.shown if kind is None else sums.scores.shown[..., kind, :]
         return int((scores[:, :, SCORED.index(rest[0])] if rest[0] in SCORED else scores).sum())
     if kind is not None:
-        return int(sums["scatter.n"][:, kind].sum())
-    return int(sums[_COUNTED.get(key, _COUNTED.get(section, "n.drop"))].sum())
+        return int(sums.scatter.n[:, kind].sum())
+    counted = _COUNTED.get(key, _COUNTED.get(section, lambda sums: sums.classes["drop"].n))
+    return int(counted(sums).sum())
 
 
 def _number(value: float) -> float | None:

@@ -11,13 +11,24 @@ from mvpose.arrays import Bools, Floats
 from simharness.detector.conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.detector.draws import GROSS, LIMB_OF_JOINT
 from simharness.detector.error_classes import MIRROR
+from simharness.reality.detector_fit.detector_sums import (
+    BoneSums,
+    DependenceSums,
+    FalseSums,
+    FrameSums,
+    JitterSums,
+    MissSums,
+    PairSums,
+    PeopleSums,
+    ScatterSums,
+    ScoreHistograms,
+    Trials,
+)
 from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints
 from simharness.reality.detector_fit.tetrachoric import correlation_grid, joint_probability
 from simharness.reality.people_tracks import LIMB_JOINTS
 from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOINT, KINDS, KeypointsSection
 from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError
-
-FrameSums = dict[str, Floats]
 
 REACH = 1.15 * float(KeypointsSection().reach)
 """Distance, in units, from which a miss is a stray: the reach of misses and 15 % for errors of the unit."""
@@ -54,21 +65,25 @@ def lags(step: float) -> NDArray[np.int64]:
 
 
 def frame_sums(labels: LabelledJoints) -> FrameSums:
-    """Return the sums of each frame, by name; the first axis of every array is T."""
-    sums = {
-        **_shares(labels),
-        **_face(labels),
-        **_sizes(labels),
-        **_misses(labels),
-        **_scatter(labels),
-        **_jitters(labels),
-        **_dependence(labels),
-        **_scores(labels),
-        **_people(labels),
-        **_bones(labels),
-        **_border(labels),
-    }
-    return sums
+    """Return the sums of each frame alone."""
+    size, size_drop = _sizes(labels)
+    border, outside = _border(labels)
+    return FrameSums(
+        classes=_shares(labels),
+        face=_face(labels),
+        size=size,
+        size_drop=size_drop,
+        miss=_misses(labels),
+        scatter=_scatter(labels),
+        jitter=_jitters(labels),
+        dependence=_dependence(labels),
+        scores=_scores(labels),
+        people=_people(labels),
+        false=_false_detections(labels),
+        bones=_bones(labels),
+        border=border,
+        outside=outside,
+    )
 
 
 def _by_kind(values: NDArray) -> Floats:
@@ -81,8 +96,8 @@ def _by_occlusion(values: Bools, labels: LabelledJoints) -> Floats:
     return np.stack([_by_kind(values & (labels.occlusion == occlusion)) for occlusion in OCCLUSIONS], axis=1)
 
 
-def _shares(labels: LabelledJoints) -> FrameSums:
-    """Return the joints each class could have taken (``n.``) and took (``k.``), by occlusion class, (T, 3, 9).
+def _shares(labels: LabelledJoints) -> dict[str, Trials]:
+    """Return the joints each class could have taken and took, by occlusion class, (T, 3, 9).
 
     The number of misses that look like inversions and swaps by chance is subtracted from these and added to misses.
     """
@@ -93,30 +108,26 @@ def _shares(labels: LabelledJoints) -> FrameSums:
         k[key] -= by_chance
         n["miss"] += by_chance
         k["miss"] += by_chance
-    return {f"n.{key}": n[key] for key in CLASSES} | {f"k.{key}": k[key] for key in CLASSES}
+    return {key: Trials(n[key], k[key]) for key in CLASSES}
 
 
-def _face(labels: LabelledJoints) -> FrameSums:
+def _face(labels: LabelledJoints) -> Trials:
     """Return joints of the face that nobody else hides, and those not reported, by kind and bearing, (T, 3, 12).
 
     Bearings count towards the side of the joint, so that left and right joints are alike.
     """
     seen, dropped = labels.risk["drop"] & (labels.occlusion != OCCLUDED), labels.taken["drop"]
-    result = {key: np.zeros((len(seen), 3, len(BEARINGS))) for key in ("face.n", "face.k")}
+    result = Trials(*np.zeros((2, len(seen), 3, len(BEARINGS))))
     for joint in range(LIMB_JOINTS[0]):
         towards = labels.bearing if MIRROR[joint] >= joint else -labels.bearing % len(BEARINGS)
         at = towards[..., None] == np.arange(len(BEARINGS))
-        for key, which in (("face.n", seen), ("face.k", seen & dropped)):
-            result[key][:, KIND_OF_JOINT[joint]] += (at & which[..., joint, None]).sum(axis=(1, 2))
+        for sums, which in zip(result, (seen, seen & dropped), strict=True):
+            sums[:, KIND_OF_JOINT[joint]] += (at & which[..., joint, None]).sum(axis=(1, 2))
     return result
 
 
-def _bones(labels: LabelledJoints) -> FrameSums:
-    """Return sums of limb lengths on which three views or more agree, for each person and bone, (T, P, B), in metres.
-
-    ``bones.n``, ``bones.length`` and ``bones.square`` of the lengths, ``bones.noise`` of the variance expected from
-    errors of one unit in each view, ``bones.scale`` of the squared size of a unit at the joints.
-    """
+def _bones(labels: LabelledJoints) -> BoneSums:
+    """Return sums of limb lengths on which three views or more agree."""
     joints, agree = labels.consensus.joints, labels.consensus.agrees.sum(axis=1)
     one, other = np.array(BONES).T
     length = np.linalg.norm(joints[:, :, one] - joints[:, :, other], axis=-1)
@@ -130,16 +141,10 @@ def _bones(labels: LabelledJoints) -> FrameSums:
     variance = labels.consensus.variance
     noise = np.where(known, variance[:, :, one] + variance[:, :, other], 0.0)
     scale = np.where(known, labels.consensus.scale[:, :, one] + labels.consensus.scale[:, :, other], 0.0)
-    return {
-        "bones.n": known.astype(float),
-        "bones.length": away,
-        "bones.square": away**2,
-        "bones.noise": noise.sum(axis=(1, 2)),
-        "bones.scale": scale.sum(axis=(1, 2)),
-    }
+    return BoneSums(known.astype(float), away, away**2, noise.sum(axis=(1, 2)), scale.sum(axis=(1, 2)))
 
 
-def _sizes(labels: LabelledJoints) -> FrameSums:
+def _sizes(labels: LabelledJoints) -> tuple[Trials, Trials]:
     """Return limb joints that are reported and not good, and dropped ones, by tercile of the person's size, (T, 3)."""
     size = np.sqrt(labels.boxes[..., 2] * labels.boxes[..., 3])
     present = labels.association.detected & labels.known[:, None]
@@ -147,17 +152,15 @@ def _sizes(labels: LabelledJoints) -> FrameSums:
         np.digitize(size, np.quantile(size[present], [1 / 3, 2 / 3])) if present.any() else np.zeros(size.shape, int)
     )
     reported, wrong = labels.risk["swap"] | labels.risk["miss"] | labels.risk["jitter"], _wrong(labels)
-    result: dict[str, list[Floats]] = {"size.n": [], "size.k": [], "size.drop.n": [], "size.drop.k": []}
-    for index in range(len(TERCILES)):
-        in_third = (third == index)[..., None]
-        for key, what in (
-            ("size.n", reported),
-            ("size.k", wrong),
-            ("size.drop.n", labels.risk["drop"]),
-            ("size.drop.k", labels.taken["drop"]),
-        ):
-            result[key].append((what & in_third)[..., LIMB_JOINTS].sum(axis=(1, 2, 3)))
-    return {key: np.stack(each, axis=1).astype(float) for key, each in result.items()}
+    in_third = [(third == index)[..., None] for index in range(len(TERCILES))]
+
+    def by_tercile(what: Bools) -> Floats:
+        return np.stack([(what & each)[..., LIMB_JOINTS].sum(axis=(1, 2, 3)) for each in in_third], axis=1).astype(
+            float
+        )
+
+    dropped = Trials(by_tercile(labels.risk["drop"]), by_tercile(labels.taken["drop"]))
+    return Trials(by_tercile(reported), by_tercile(wrong)), dropped
 
 
 def _wrong(labels: LabelledJoints) -> Bools:
@@ -165,8 +168,8 @@ def _wrong(labels: LabelledJoints) -> Bools:
     return labels.taken["swap"] | labels.taken["inversion"] | labels.taken["miss"] | labels.taken["jitter"]
 
 
-def _misses(labels: LabelledJoints) -> FrameSums:
-    """Return misses of limbs, those beyond REACH, and the shares of the boxes beyond 2.35 and beyond REACH, (T,)."""
+def _misses(labels: LabelledJoints) -> MissSums:
+    """Return the sums of misses of limbs."""
     miss = labels.taken["miss"].copy()
     miss[..., : LIMB_JOINTS[0]] = False
     far = np.where(miss, np.hypot(labels.residual[..., 0], labels.residual[..., 1]), 0.0)
@@ -175,14 +178,13 @@ def _misses(labels: LabelledJoints) -> FrameSums:
     at = (np.arange(_CELLS) + 0.5) / _CELLS
     x, y = box[:, :1] + at * box[:, 2:3], box[:, 1:2] + at * box[:, 3:]
     away = np.hypot((x - target[:, :1])[:, :, None], (y - target[:, 1:])[:, None]) / unit[:, None, None]
-    result = {"miss.n": miss.sum(axis=(1, 2, 3)), "miss.beyond": (far >= REACH).sum(axis=(1, 2, 3))}
-    for key, limit in (("miss.box", MISS_FROM), ("miss.box_beyond", REACH)):
-        result[key] = np.bincount(frame, (away >= limit).mean(axis=(1, 2)), len(miss))
-    return {key: each.astype(float) for key, each in result.items()}
+    counts = (each.sum(axis=(1, 2, 3)).astype(float) for each in (miss, far >= REACH))
+    shares = (np.bincount(frame, (away >= limit).mean(axis=(1, 2)), len(miss)) for limit in (MISS_FROM, REACH))
+    return MissSums(*counts, *(each.astype(float) for each in shares))
 
 
-def _scatter(labels: LabelledJoints) -> FrameSums:
-    """Return sums of good keypoints: squares by kind, products with later frames, products of two views in space."""
+def _scatter(labels: LabelledJoints) -> ScatterSums:
+    """Return the sums of good keypoints."""
     good = labels.risk["jitter"] & (labels.error == KeypointError.GOOD)
     square = np.where(good, (labels.residual**2).sum(axis=-1), 0.0)
     n, k = _by_kind(good), _by_kind(square)
@@ -196,24 +198,24 @@ def _scatter(labels: LabelledJoints) -> FrameSums:
     first, second = offset[..., one, :], offset[..., other, :]
     product = np.where(both, (first * second).sum(axis=-1), 0.0)
     mean_square = np.where(both, (first**2 + second**2).sum(axis=-1) / 2, 0.0)
-    return {
-        "scatter.n": n,
-        "scatter.square": k,
-        "scatter.later": np.stack([product for product, _ in later], axis=1),
-        "scatter.later_square": np.stack([square for _, square in later], axis=1),
-        "scatter.near": product.sum(axis=(1, 2, 3)),
-        "scatter.near_n": mean_square.sum(axis=(1, 2, 3)),
-        "scatter.hidden_n": _by_kind(good & (labels.occlusion != VISIBLE)),
-        "scatter.hidden_square": _by_kind(square * (labels.occlusion != VISIBLE)),
-    }
+    return ScatterSums(
+        n=n,
+        square=k,
+        hidden_n=_by_kind(good & (labels.occlusion != VISIBLE)),
+        hidden_square=_by_kind(square * (labels.occlusion != VISIBLE)),
+        later=np.stack([product for product, _ in later], axis=1),
+        later_square=np.stack([square for _, square in later], axis=1),
+        near=product.sum(axis=(1, 2, 3)),
+        near_square=mean_square.sum(axis=(1, 2, 3)),
+    )
 
 
-def _jitters(labels: LabelledJoints) -> FrameSums:
-    """Return the number of jitters, and the sum of their distances as shares of the way from 1.14 to 2.35, (T, 9)."""
+def _jitters(labels: LabelledJoints) -> JitterSums:
+    """Return the sums of jitters."""
     jitter = labels.taken["jitter"]
     away = np.where(jitter, np.hypot(labels.residual[..., 0], labels.residual[..., 1]), GOOD_BELOW)
     way = np.clip((away - GOOD_BELOW) / (MISS_FROM - GOOD_BELOW), 0.0, 1.0)
-    return {"jitter.n": _by_kind(jitter), "jitter.way": _by_kind(way)}
+    return JitterSums(_by_kind(jitter), _by_kind(way))
 
 
 def _later(offset: Floats, good: Bools, lag: int, labels: LabelledJoints) -> tuple[Floats, Floats]:
@@ -232,15 +234,8 @@ def _consecutive(labels: LabelledJoints, lag: int) -> Bools:
     return np.asarray(labels.time[lag:] - labels.time[:-lag] < (lag + 0.5) * labels.step)
 
 
-def _dependence(labels: LabelledJoints) -> FrameSums:
-    """Return observed and expected pairs of joints taken by the same class, and their products over time, (T, ...).
-
-    ``views.k``, ``gross_views.k``, ``limb.k`` (T,): pairs of joints that a class took, over views (GROSS classes apart)
-    and within limbs. ``views.expected``, ``gross_views.expected``, ``limb.expected`` (T, G): expected pairs for each
-    correlation of :func:`correlation_grid`. ``time.excess``, ``time.weight`` (T, L): products of the deviations from
-    the expectation a lag apart, and their value at full correlation. The expectation is the rate for the kind of joint
-    and its occlusion class.
-    """
+def _dependence(labels: LabelledJoints) -> DependenceSums:
+    """Return observed and expected pairs of joints taken by the same class, and their products over time."""
     steps = lags(labels.step)
     frames, states = len(labels.occlusion), len(OCCLUSIONS) * len(KINDS)
     state = labels.occlusion * len(KINDS) + np.array(KIND_OF_JOINT)  # occlusion class and kind of joint
@@ -248,11 +243,10 @@ def _dependence(labels: LabelledJoints) -> FrameSums:
     limbs = np.array([limb == LIMB_OF_JOINT for limb in range(LIMB_OF_JOINT.max() + 1)])
     one, other = np.triu_indices(states)
     same = one == other
-    result = {key: np.zeros(frames) for key in ("views.k", "gross_views.k", "limb.k")}
-    result |= {
-        f"{key.removesuffix('.k')}.expected": np.zeros((frames, len(correlation_grid()))) for key in list(result)
-    }
-    result |= {key: np.zeros((frames, len(steps))) for key in ("time.excess", "time.weight")}
+    views, gross_views, limb = (
+        PairSums(np.zeros(frames), np.zeros((frames, len(correlation_grid())))) for _ in range(3)
+    )
+    excess, weight = np.zeros((2, frames, len(steps)))
     for key in CLASSES:
         risk, taken = labels.risk[key], labels.taken[key]
         at_risk = member & risk[..., None]
@@ -267,18 +261,18 @@ def _dependence(labels: LabelledJoints) -> FrameSums:
         # Over views: the same joint of a person, so only states of one kind form pairs.
         by_joint = at_risk.sum(axis=1, dtype=np.float32).reshape(frames, -1, states)
         by_limb = np.einsum("tvpjs,lj->tvpls", at_risk.astype(np.float32), limbs.astype(np.float32))
-        for name, count, whole in (
-            ("gross_views" if key in GROSS else "views", by_joint, taken.sum(axis=1, dtype=float).reshape(frames, -1)),
+        for sums, count, whole in (
+            (gross_views if key in GROSS else views, by_joint, taken.sum(axis=1, dtype=float).reshape(frames, -1)),
             (
-                "limb",
+                limb,
                 by_limb.reshape(frames, -1, states),
                 np.einsum("tvpj,lj->tvpl", taken.astype(float), limbs).reshape(frames, -1),
             ),
         ):
             # One frame at a time: all pairs of all frames would take a gigabyte.
             met = np.stack([pairs(each).sum(axis=0) for each in count])
-            result[f"{name}.expected"] += met @ curves
-            result[f"{name}.k"] += (whole * (whole - 1) / 2).sum(axis=1)
+            sums.expected[:] += met @ curves
+            sums.k[:] += (whole * (whole - 1) / 2).sum(axis=1)
 
         expected = np.where(risk, chance[state], 0.0)
         beyond = np.where(risk, taken - expected, 0.0)
@@ -287,16 +281,13 @@ def _dependence(labels: LabelledJoints) -> FrameSums:
             if lag >= frames:
                 continue
             whole = _consecutive(labels, lag)
-            result["time.excess"][:-lag, index] += whole * (beyond[:-lag] * beyond[lag:]).sum(axis=(1, 2, 3))
-            result["time.weight"][:-lag, index] += whole * (spread[:-lag] * spread[lag:]).sum(axis=(1, 2, 3))
-    return result
+            excess[:-lag, index] += whole * (beyond[:-lag] * beyond[lag:]).sum(axis=(1, 2, 3))
+            weight[:-lag, index] += whole * (spread[:-lag] * spread[lag:]).sum(axis=(1, 2, 3))
+    return DependenceSums(views, gross_views, limb, excess, weight)
 
 
-def _scores(labels: LabelledJoints) -> FrameSums:
-    """Return histograms of scores on the logit scale by visibility, class and kind, (T, 2, 6, 9, B).
-
-    Also those of false detections, and of joints outside of the image, (T, B) each.
-    """
+def _scores(labels: LabelledJoints) -> ScoreHistograms:
+    """Return the histograms of scores."""
     scores, error = labels.association.scores, labels.error
     frames, bins = len(scores), len(LOGITS) - 1
     row = np.where(error == KeypointError.ABSENT, len(SCORED) - 1, error)
@@ -312,11 +303,8 @@ def _scores(labels: LabelledJoints) -> FrameSums:
     flat = np.bincount(np.nonzero(false > 0)[0] * bins + _bin(false[false > 0]), minlength=frames * bins)
     outside = shown & ~labels.inside
     beyond = np.bincount(np.nonzero(outside)[0] * bins + _bin(scores[outside]), minlength=frames * bins)
-    return {
-        "scores": whole.astype(float),
-        "scores.false": flat.reshape(frames, bins).astype(float),
-        "scores.outside": beyond.reshape(frames, bins).astype(float),
-    }
+    by_frame = (each.reshape(frames, bins).astype(float) for each in (flat, beyond))
+    return ScoreHistograms(whole.astype(float), *by_frame)
 
 
 def _bin(scores: Floats) -> NDArray[np.int64]:
@@ -325,59 +313,58 @@ def _bin(scores: Floats) -> NDArray[np.int64]:
     return np.clip(np.digitize(logit, LOGITS) - 1, 0, len(LOGITS) - 2)
 
 
-def _missed_by_hidden_share(labels: LabelledJoints, expected: Bools, missed: Bools) -> FrameSums:
+def _missed_by_hidden_share(labels: LabelledJoints, expected: Bools, missed: Bools) -> Trials:
     """Return people expected and missed by the share of their limb joints that others or the border hide, (T, 5)."""
     hidden = ((labels.occlusion == OCCLUDED) | ~labels.inside)[..., LIMB_JOINTS].mean(axis=-1)
     nearest = np.round(4 * hidden).astype(int)[..., None] == np.arange(5)
-    return {
-        f"people.hidden.{key}": (nearest & which[..., None]).sum(axis=(1, 2)).astype(float)
-        for key, which in (("n", expected), ("k", missed))
-    }
+    return Trials(*((nearest & which[..., None]).sum(axis=(1, 2)).astype(float) for which in (expected, missed)))
 
 
-def _border(labels: LabelledJoints) -> FrameSums:
-    """Return limb joints outside of the images by their distance from the border, (T, B), and those reported, (T,)."""
+def _border(labels: LabelledJoints) -> tuple[Trials, Trials]:
+    """Return limb joints outside of the images and those reported, by their distance from the border and by kind."""
     outside = (labels.association.detected & labels.known[:, None])[..., None] & ~labels.inside
     outside[..., : LIMB_JOINTS[0]] = False
     bins = np.digitize(labels.beyond, BORDER[1:-1])[..., None] == np.arange(len(BORDER) - 1)
-    return {
-        "border.n": (bins & outside[..., None]).sum(axis=(1, 2, 3)).astype(float),
-        "border.k": (outside & (labels.association.scores > 0)).sum(axis=(1, 2, 3)).astype(float),
-        "outside.n": _by_kind(outside),
-        "outside.k": _by_kind(outside & (labels.association.scores > 0)),
-    }
+    reported = outside & (labels.association.scores > 0)
+    by_distance = (bins & outside[..., None]).sum(axis=(1, 2, 3)).astype(float)
+    border = Trials(by_distance, reported.sum(axis=(1, 2, 3)).astype(float))
+    return border, Trials(_by_kind(outside), _by_kind(reported))
 
 
-def _people(labels: LabelledJoints) -> FrameSums:
-    """Return sums of people missed, detected and duplicated, and of false detections."""
+def _people(labels: LabelledJoints) -> PeopleSums:
+    """Return the sums of people missed, detected and duplicated."""
     expected, detected = labels.expected, labels.association.detected & labels.known[:, None]
     missed = expected & ~detected
-    false = labels.association.false.astype(float)
-    fragments = labels.association.fragments.sum(axis=1)
+    both = expected, missed
+    many = [what.sum(axis=1, dtype=float) for what in both]
+    duplicates = (labels.association.duplicates * labels.known[:, None]).sum(axis=(1, 2))
+    return PeopleSums(
+        all=Trials(*(what.sum(axis=(1, 2), dtype=float) for what in both)),
+        hidden=_missed_by_hidden_share(labels, expected, missed),
+        views=Trials(*(((each**2 - each) / 2).sum(axis=1) for each in many)),
+        time=Trials(*(_again(labels, what) for what in both)),
+        detected=detected.sum(axis=(1, 2), dtype=float),
+        duplicates=duplicates.astype(float),
+    )
+
+
+def _again(labels: LabelledJoints, what: Bools) -> Floats:
+    """Return how many of the people in the views (T, V, P) are the same a lag later, (T, L)."""
     steps = lags(labels.step)
-    result = {
-        **_missed_by_hidden_share(labels, expected, missed),
-        "people.n": expected.sum(axis=(1, 2)),
-        "people.k": missed.sum(axis=(1, 2)),
-        "people.detected": detected.sum(axis=(1, 2)),
-        "people.duplicates": (labels.association.duplicates * labels.known[:, None]).sum(axis=(1, 2)),
-        "false.n": false,
-        "fragments.n": fragments,
-    }
-    for name, what in (("n", expected), ("k", missed)):
-        many = what.sum(axis=1, dtype=float)
-        result[f"people.views.{name}"] = ((many**2 - many) / 2).sum(axis=1)
-        time = np.zeros((len(what), len(steps)))
-        for index, lag in enumerate(steps):
-            if lag < len(what):
-                whole = _consecutive(labels, lag)
-                time[:-lag, index] = whole * (what[:-lag] & what[lag:]).sum(axis=(1, 2))
-        result[f"people.time.{name}"] = time
+    time = np.zeros((len(what), len(steps)))
+    for index, lag in enumerate(steps):
+        if lag < len(what):
+            time[:-lag, index] = _consecutive(labels, lag) * (what[:-lag] & what[lag:]).sum(axis=(1, 2))
+    return time
+
+
+def _false_detections(labels: LabelledJoints) -> FalseSums:
+    """Return the sums of false detections."""
+    false, steps = labels.association.false.astype(float), lags(labels.step)
     products, pairs = np.zeros((*false.shape, len(steps) + 1)), np.zeros((len(false), len(steps) + 1))
     products[..., 0], pairs[:, 0] = false**2, 1
     for index, lag in enumerate(steps, start=1):
         if lag < len(false):
             whole = _consecutive(labels, lag)
             products[:-lag, :, index], pairs[:-lag, index] = whole[:, None] * false[:-lag] * false[lag:], whole
-    result["false.products"], result["false.pairs"] = products, pairs
-    return {key: np.asarray(each, float) for key, each in result.items()}
+    return FalseSums(false, labels.association.fragments.sum(axis=1).astype(float), products, pairs)

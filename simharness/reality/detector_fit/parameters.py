@@ -12,7 +12,8 @@ from scipy.special import expit, logit, ndtr
 from mvpose.arrays import Floats
 from simharness.detector.conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.reality.annotated_recording import DetectorKind
-from simharness.reality.detector_fit.frame_sums import BORDER, LOGITS, SCORED, TERCILES, FrameSums, lags
+from simharness.reality.detector_fit.detector_sums import FrameSums
+from simharness.reality.detector_fit.frame_sums import BORDER, LOGITS, SCORED, TERCILES, lags
 from simharness.reality.detector_fit.joint_labels import CLASSES
 from simharness.reality.detector_fit.tetrachoric import (
     fit_life,
@@ -48,7 +49,7 @@ def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> 
     """
     result: dict[str, Floats] = {}
     with np.errstate(invalid="ignore", divide="ignore"):
-        n, k = ({key: sums[f"{name}.{key}"] for key in CLASSES} for name in ("n", "k"))
+        n, k = ({key: getattr(sums.classes[key], name) for key in CLASSES} for name in ("n", "k"))
         share = {key: np.clip(k[key].sum(axis=1) / n[key].sum(axis=1), 0.0, 1.0) for key in CLASSES}
         for key in CLASSES:
             _put_by_kind(result, f"share.{key}", share[key])
@@ -63,13 +64,14 @@ def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> 
         else:
             result |= _occlusion_factors(n, k, share)
             result["keypoints.border"] = _border(sums)
-        shown, square = (sums[f"scatter.{key}"] - sums[f"scatter.hidden_{key}"] for key in ("n", "square"))
+        scatter = sums.scatter
+        shown, square = scatter.n - scatter.hidden_n, scatter.square - scatter.hidden_square
         _put_by_kind(result, "keypoints.scatter", _sigma(square / shown))
         _put_by_kind(result, "keypoints.scatter_hidden", _hidden_scatter(sums))
         _put_by_kind(result, "keypoints.jitter_mean", _jitter_mean(sums))
         result |= _face(sums)
-        beyond = sums["miss.beyond"] / sums["miss.n"]
-        box, box_beyond = sums["miss.box"] / sums["miss.n"], sums["miss.box_beyond"] / sums["miss.n"]
+        miss = sums.miss
+        beyond, box, box_beyond = miss.beyond / miss.n, miss.box / miss.n, miss.box_beyond / miss.n
         stray = np.clip(beyond / (box_beyond + beyond * (1 - box)), 0.0, 1.0)
         for index in LIMB_KINDS:  # too few misses of each kind; misses of the face stay near it
             result[f"keypoints.stray.{KINDS[index]}"] = stray
@@ -79,8 +81,8 @@ def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> 
             result |= _guess_scores(sums)
         result |= _people_parameters(sums, step)
         for index, third in enumerate(TERCILES):
-            result[f"size.{third}.drop"] = sums["size.drop.k"][:, index] / sums["size.drop.n"][:, index]
-            result[f"size.{third}.wrong"] = sums["size.k"][:, index] / sums["size.n"][:, index]
+            result[f"size.{third}.drop"] = sums.size_drop.k[:, index] / sums.size_drop.n[:, index]
+            result[f"size.{third}.wrong"] = sums.size.k[:, index] / sums.size.n[:, index]
     return result
 
 
@@ -150,18 +152,18 @@ def _guesses(n: dict[str, Floats], k: dict[str, Floats], sums: FrameSums) -> dic
         share = np.where(reported >= _MIN_HIDDEN, wrong / reported, np.nan_to_num(pooled))
         _put_by_kind(result, f"keypoints.guess.{name}", np.clip(share, 0.0, 1.0))
         _put_by_kind(result, f"keypoints.{name}", _factors(k["jitter"][:, index], n["jitter"][:, index] * usual))
-    outside = sums["outside.n"].sum(axis=1, keepdims=True)
-    share = np.broadcast_to(sums["outside.k"].sum(axis=1, keepdims=True) / outside, sums["outside.n"].shape)
+    outside = sums.outside.n.sum(axis=1, keepdims=True)
+    share = np.broadcast_to(sums.outside.k.sum(axis=1, keepdims=True) / outside, sums.outside.n.shape)
     _put_by_kind(result, "keypoints.guess.outside", np.where(outside >= _MIN_HIDDEN, share, np.nan))
     return result
 
 
 def _guess_scores(sums: FrameSums) -> dict[str, Floats]:
     """Return the usual scores of guesses by kind, and the factor of those outside of the image."""
-    wrong = sums["scores"][:, 1, SCORED.index("miss")]
+    wrong = sums.scores.shown[:, 1, SCORED.index("miss")]
     pooled = expit(_quantile(wrong.sum(axis=1), 0.5))[:, None]
     level = np.where(wrong.sum(axis=-1) >= _MIN_HIDDEN, expit(_quantile(wrong, 0.5)), pooled)
-    outside = expit(_quantile(sums["scores.outside"], 0.5))
+    outside = expit(_quantile(sums.scores.outside, 0.5))
     result = {"scores.outside": np.minimum(outside / pooled[:, 0], 1.0)}
     _put_by_kind(result, "scores.guess", level)
     return result
@@ -180,8 +182,8 @@ def _hidden_scatter(sums: FrameSums) -> Floats:
 
     Kinds of which too few are hidden have that of the others.
     """
-    hidden_n, hidden = sums["scatter.hidden_n"], sums["scatter.hidden_square"]
-    shown = (sums["scatter.square"] - hidden) / (sums["scatter.n"] - hidden_n)
+    hidden_n, hidden = sums.scatter.hidden_n, sums.scatter.hidden_square
+    shown = (sums.scatter.square - hidden) / (sums.scatter.n - hidden_n)
     ratio = _sigma(hidden / hidden_n) / _sigma(shown)
     pooled = _averaged(ratio, np.where(np.isfinite(ratio), hidden_n, 0.0))[:, None]
     return np.where(np.isfinite(ratio) & (hidden_n >= _MIN_HIDDEN), ratio, pooled)
@@ -192,14 +194,14 @@ def _jitter_mean(sums: FrameSums) -> Floats:
 
     Kinds with few jitters take from the others: each counts as _PRIOR joints more, at the mean of all.
     """
-    n, way = sums["jitter.n"], sums["jitter.way"]
+    n, way = sums.jitter.n, sums.jitter.way
     pooled = way.sum(axis=1, keepdims=True) / n.sum(axis=1, keepdims=True)
     return np.asarray((way + _PRIOR * np.nan_to_num(pooled, nan=0.5)) / (n + _PRIOR))
 
 
 def _border(sums: FrameSums) -> Floats:
     """Return the distance outside of the image, units, within which as many joints lie as are reported, (R,)."""
-    n, k = sums["border.n"], sums["border.k"]
+    n, k = sums.border.n, sums.border.k
     below = np.concatenate([np.zeros((len(n), 1)), np.cumsum(n, axis=-1)], axis=-1)
     reach = np.array([np.interp(count, row, BORDER) for count, row in zip(k, below + 1e-9 * BORDER, strict=True)])
     return np.where(below[:, -1] >= _MIN_OUTSIDE, reach, np.nan)
@@ -210,7 +212,7 @@ def _face(sums: FrameSums) -> dict[str, Floats]:
 
     Bins with few joints take from their neighbours: each counts as _PRIOR joints more, at the rate of the bins beside.
     """
-    n, k = sums["face.n"], sums["face.k"]
+    n, k = sums.face.n, sums.face.k
     around_n, around_k = (np.roll(each, 1, axis=-1) + np.roll(each, -1, axis=-1) + 1e-9 for each in (n, k))
     rate = (k + _PRIOR * around_k / around_n) / (n + _PRIOR)
     rate = np.where(n.sum(axis=-1, keepdims=True) > 0, rate, np.nan)
@@ -223,20 +225,20 @@ def _face(sums: FrameSums) -> dict[str, Floats]:
 
 def _dependence(sums: FrameSums, step: float) -> dict[str, Floats]:
     """Return the parameters of ``[detector.correlation]``."""
-    enough = sum(sums[f"k.{key}"].sum(axis=(1, 2)) for key in CLASSES) >= _MIN_ERRORS
-    scatter = sums["scatter.later"] / sums["scatter.later_square"]
-    life, noise = fit_noisy_life(lags(step), step, scatter, sums["scatter.later_square"])
+    enough = sum(sums.classes[key].k.sum(axis=(1, 2)) for key in CLASSES) >= _MIN_ERRORS
+    scatter = sums.scatter.later / sums.scatter.later_square
+    life, noise = fit_noisy_life(lags(step), step, scatter, sums.scatter.later_square)
+    excess, weight = sums.dependence.excess, sums.dependence.weight
     result = {
-        "correlation.life": np.where(
-            enough, fit_life(lags(step), step, sums["time.excess"] / sums["time.weight"], sums["time.weight"]), np.nan
-        ),
+        "correlation.life": np.where(enough, fit_life(lags(step), step, excess / weight, weight), np.nan),
         "correlation.scatter_life": life,
         "correlation.scatter_noise": noise,
-        "correlation.scatter_near": np.clip(sums["scatter.near"] / sums["scatter.near_n"], 0.0, 0.95),
+        "correlation.scatter_near": np.clip(sums.scatter.near / sums.scatter.near_square, 0.0, 0.95),
         "correlation.scatter_views": _shared_scatter(sums),
     }
     for key in ("views", "gross_views", "limb"):
-        fitted = tetrachoric_correlation(sums[f"{key}.k"], sums[f"{key}.expected"])
+        pairs = getattr(sums.dependence, key)
+        fitted = tetrachoric_correlation(pairs.k, pairs.expected)
         result[f"correlation.{key}"] = np.where(enough, fitted, np.nan)
     return result
 
@@ -248,10 +250,10 @@ def _shared_scatter(sums: FrameSums) -> Floats:
     variance of the lengths over time has beyond the noise of single views is due to it.
     """
     limbs = list(LIMB_KINDS)
-    single = (sums["scatter.square"][:, limbs].sum(axis=1) / sums["scatter.n"][:, limbs].sum(axis=1)) / 2
-    n = np.maximum(sums["bones.n"], 1.0)
-    spread = (sums["bones.square"] - sums["bones.length"] ** 2 / n).sum(axis=(1, 2))
-    shared = np.maximum(spread - single * sums["bones.noise"], 0.0) / sums["bones.scale"]
+    single = (sums.scatter.square[:, limbs].sum(axis=1) / sums.scatter.n[:, limbs].sum(axis=1)) / 2
+    n = np.maximum(sums.bones.n, 1.0)
+    spread = (sums.bones.square - sums.bones.length**2 / n).sum(axis=(1, 2))
+    shared = np.maximum(spread - single * sums.bones.noise, 0.0) / sums.bones.scale
     return np.clip(shared / (shared + single), 0.0, 1.0)
 
 
@@ -261,7 +263,7 @@ def _score_parameters(sums: FrameSums) -> dict[str, Floats]:
     Args:
         sums: sums of R resamples.
     """
-    shown, whole = sums["scores"][:, 0], sums["scores"].sum(axis=1)  # (R, 6, 9, B), of visible joints and of all
+    shown, whole = sums.scores.shown[:, 0], sums.scores.shown.sum(axis=1)  # (R, 6, 9, B), of visible joints and of all
     limbs = list(LIMB_KINDS)
     rows = {name: SCORED.index(name) for name in SCORED}
     good, miss = shown[:, rows["good"]], whole[:, rows["miss"]]
@@ -285,12 +287,12 @@ def _score_parameters(sums: FrameSums) -> dict[str, Floats]:
         tail = ndtr(-separation / 2)
         under = _other_share(_averaged(_below(good, middle), many), tail, separation)
         over = _other_share(1 - _averaged(_below(miss, middle), miss.sum(axis=-1)), tail, separation)
-    behind = sums["scores"][:, 1, rows["good"]]
+    behind = sums.scores.shown[:, 1, rows["good"]]
     hidden = np.minimum(_averaged(expit(_quantile(behind, 0.5)) / usual, behind.sum(axis=-1)), 1.0)
 
     def usual_of(name: str, share: Floats, visibility: int) -> Floats:
         """Return the usual score of a class, from the quantile ``share`` (R,) of its scores by kind."""
-        row = sums["scores"][:, visibility, rows[name]]
+        row = sums.scores.shown[:, visibility, rows[name]]
         level = expit(_quantile(row, share[:, None])) / joint
         return _averaged(level, np.where(np.isfinite(level), row.sum(axis=-1), 0.0))
 
@@ -351,27 +353,27 @@ def _below(counts: Floats, level: Floats) -> Floats:
 
 def _people_parameters(sums: FrameSums, step: float) -> dict[str, Floats]:
     """Return the parameters of boxes and phantoms."""
-    p = (sums["people.k"] / sums["people.n"])[:, None]
-    hidden_n, hidden_k = sums["people.hidden.n"], sums["people.hidden.k"]
+    p = (sums.people.all.k / sums.people.all.n)[:, None]
+    hidden_n, hidden_k = sums.people.hidden.n, sums.people.hidden.k
     by_hidden = np.where(hidden_n > 0, hidden_k / hidden_n, np.nan)
     for index in range(1, 5):  # where nobody is hidden so much, as where people are hidden less
         by_hidden[:, index] = np.where(hidden_n[:, index] > 0, by_hidden[:, index], by_hidden[:, index - 1])
     because = np.clip(1 - (1 - by_hidden) / (1 - by_hidden[:, :1]), 0.0, 1.0)
-    weight = sums["people.time.n"] * p * (1 - p)
-    missed_again = sums["people.time.k"] - sums["people.time.n"] * p**2
-    rate = sums["false.n"] / sums["false.pairs"][:, :1]  # for each view, (R, V)
-    spread = sums["false.products"] / sums["false.pairs"][:, None] - rate[..., None] ** 2
+    weight = sums.people.time.n * p * (1 - p)
+    missed_again = sums.people.time.k - sums.people.time.n * p**2
+    rate = sums.false.n / sums.false.pairs[:, :1]  # for each view, (R, V)
+    spread = sums.false.products / sums.false.pairs[:, None] - rate[..., None] ** 2
     spread = spread.sum(axis=1)
-    row = sums["scores.false"]
+    row = sums.scores.false
     return {
         "boxes.missed": by_hidden[:, 0],
         **{f"boxes.missed_hidden.{index}": because[:, index] for index in range(5)},
         "boxes.missed_views": tetrachoric_correlation(
-            sums["people.views.k"], sums["people.views.n"][:, None] * joint_probability(p, p)[:, 0]
+            sums.people.views.k, sums.people.views.n[:, None] * joint_probability(p, p)[:, 0]
         ),
         "boxes.life": fit_life(lags(step), step, missed_again / weight, weight),
-        "boxes.duplicates": sums["people.duplicates"] / sums["people.detected"],
-        "size.fragments": sums["fragments.n"] / sums["false.pairs"][:, 0] / sums["false.n"].shape[1],
+        "boxes.duplicates": sums.people.duplicates / sums.people.detected,
+        "size.fragments": sums.false.fragments / sums.false.pairs[:, 0] / sums.false.n.shape[1],
         "phantoms.rate": rate.mean(axis=1),
         "phantoms.life": fit_life(lags(step), step, spread[:, 1:] / spread[:, :1], np.ones_like(spread[:, 1:])),
         "phantoms.score": expit(_quantile(row, 0.5)),

@@ -124,7 +124,7 @@ class TestDrops:
         sample = filmed.sample(staged=True, **DROPPING)
         found = frame_sums(label_joints(sample))
         for index, expected in enumerate((0.03, 0.1, 0.3)):
-            n, k = (found[f"{key}.drop"][:, index, 3:].sum() for key in ("n", "k"))
+            n, k = (each[:, index, 3:].sum() for each in found.classes["drop"])
             assert k / n == pytest.approx(expected, abs=4 * np.sqrt(expected * (1 - expected) / n))
 
     def test_joints_below_a_missing_one_do_not_count(self, filmed):
