@@ -5,7 +5,7 @@ from tempfile import TemporaryDirectory
 
 import polars as pl
 
-from simharness.scenario.study_definition import load_study
+from simharness.scenario.load import load_study
 from simharness.study.study_run import run_study
 
 STUDY = """

@@ -35,9 +35,8 @@ from statistics import fmean
 from mvpose import Estimate
 from mvpose.commands.errors import RunError
 from simharness.gate.trial_command import TrialKey, command_of, setting_name
-from simharness.scenario.load import load
+from simharness.scenario.load import Study, load, load_study
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.study_definition import Study, load_study
 from simharness.scoring.assessment import Assessment, assess
 from simharness.scoring.catalogue import SCORES, ScoreInfo
 from simharness.study.causes.cause_shares import Blame, blame

@@ -17,7 +17,7 @@ from benchmarks.planted_bugs.gate import Gate, write_suite
 from benchmarks.planted_bugs.near_tests import run_tests
 from benchmarks.planted_bugs.records import Outcome, Records
 from benchmarks.planted_bugs.simulations import first_stage
-from simharness.scenario.study_definition import load_study
+from simharness.scenario.load import load_study
 
 _LOCK = threading.Lock()
 _SLOWER = 12.0  # times the limit of a bug: the first run compiles all kernels and simulates everything

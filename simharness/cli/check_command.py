@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from simharness.gate.compare import Verdict
     from simharness.gate.gate_result import FailedCase, GateResult
-    from simharness.scenario.study_definition import Study
+    from simharness.scenario.load import Study
 
 _LISTED = 8  # changes of each kind: a bug that breaks everything breaks a hundred scores
 _STYLES: dict[Verdict, str] = {"worse": "red", "unexpected": "yellow", "better": "green"}
@@ -70,7 +70,7 @@ def check(
     """
     with PROGRAM.exit_on_error():
         from mvpose.commands.output_files import check_place
-        from simharness.scenario.study_definition import load_study
+        from simharness.scenario.load import load_study
 
         reports = {option: path for option, path in (("--junit", junit), ("--summary", summary)) if path is not None}
         if update and reports:

@@ -59,9 +59,9 @@ def show(
 ) -> None:
     """Print a scenario with all keys, defaults and descriptions, and what it needs; of a study also its trials."""
     with PROGRAM.exit_on_error():
+        from simharness.scenario.checks import MOST_TRIALS
+        from simharness.scenario.load import StudyTooLarge, load_study, read_plan
         from simharness.scenario.outline import outline
-        from simharness.scenario.size import MOST_TRIALS
-        from simharness.scenario.study_definition import StudyTooLarge, load_study, read_plan
 
         plan = read_plan(scenario, overrides=overrides or (), seed=seed)
         note = ""

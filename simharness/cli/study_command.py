@@ -95,7 +95,7 @@ def study(
     in a folder NAME: report.html for people, Parquet tables for programs.
     """
     with PROGRAM.exit_on_error(), _stopping():
-        from simharness.scenario.study_definition import LIMIT, load_study
+        from simharness.scenario.load import LIMIT, load_study
 
         limits = None if yes else LIMIT
         loaded = load_study(file, overrides=overrides or (), seeds=seeds, variants=variant or None, limit=limits)

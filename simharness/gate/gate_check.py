@@ -12,7 +12,7 @@ from simharness.gate.gate_result import GateResult
 from simharness.gate.required_seeds import require_seeds
 from simharness.gate.suite import SuiteRun, fingerprint, run_suite
 from simharness.gate.trial_command import TrialKey, command_of, setting_name, settings_at_seeds
-from simharness.scenario.study_definition import Study
+from simharness.scenario.load import Study
 
 
 def baseline_of(study: Study, path: Path) -> Measurement:

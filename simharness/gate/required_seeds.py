@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from simharness.scenario.study_definition import Study
+from simharness.scenario.load import Study
 from simharness.statistics.paired_tests import DRAWS
 
 

@@ -17,9 +17,9 @@ from simharness.gate.frame_times import relative_times
 from simharness.gate.gate_result import FailedCase
 from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
 from simharness.runtime.version import code_version
+from simharness.scenario.load import Study
 from simharness.scenario.sections.method_section import MethodSection
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.study_definition import Study
 from simharness.study.scheduler import TrialSuccess, Unit, run_units
 from simharness.study.stored_trial import StoredTrial, TrialOutput
 from simharness.trial.identity import trial_identity

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from simharness.scenario.document import read_document
 from simharness.scenario.layers import leaves
-from simharness.scenario.study_definition import Setting, Study
+from simharness.scenario.load import Setting, Study
 from simharness.scenario.toml_files import toml
 
 _WORD = re.compile(r"[a-z][a-z0-9_-]*")

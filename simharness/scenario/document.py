@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,8 @@ from typing import Any
 from mvpose.files.input_files import parse_toml
 from mvpose.files.message_text import one_line, shown
 from simharness.scenario.layers import Key, Origins, leaves, set_origin
-from simharness.scenario.named_files import locate_files
 from simharness.scenario.presets import KINDS, merge_with_presets
+from simharness.scenario.sections.scenario import FILE_KEYS
 from simharness.scenario.shipped import shipped_folder, shipped_names
 from simharness.scenario.toml_files import ScenarioError, read_toml, toml_place
 
@@ -184,3 +184,67 @@ def _parse_value(override: str, written: str) -> Any:
     except ValueError as error:
         raise ScenarioError(f"--set {one_line(override, 100)}: {error}") from None
     return parsed["value"] if len(parsed) == 1 else written
+
+
+_PRESET_KEYS = (("cameras", "rig"), ("sensor", "profile"), ("detector", "profile"))  # TOML files or names
+_ESTIMATORS = ("method", "estimators")  # "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE", by name
+
+
+def locate_files(data: dict[str, Any], folder: Path) -> None:
+    """Prefix the files that a scenario, its cases and its sweep name with a folder, in place."""
+    for settings in _settings(data):
+        for key, value in list(_file_values(settings)):
+            section = _section(settings, key[:-1])
+            assert section is not None
+            section[key[-1]] = _located(key, value, folder)
+
+
+def relative_files(settings: dict[str, Any]) -> Iterator[tuple[Key, str]]:
+    """Yield the keys of a scenario that name files by relative paths, and those paths."""
+    for key, values in _file_values(settings):
+        for value in values if isinstance(values, list) else [values]:
+            if _is_file(key, value) and not Path(value).is_absolute():
+                yield key, value
+
+
+def _settings(data: dict[str, Any]) -> Iterator[Any]:
+    """Yield all parts of a file that may have keys of a scenario."""
+    yield data
+    cases, sweep = data.get("cases"), data.get("sweep")
+    if isinstance(cases, dict):
+        yield from cases.values()
+    if isinstance(sweep, dict):
+        yield sweep
+        if isinstance(sweep.get("paired"), list):
+            yield from sweep["paired"]
+
+
+def _file_values(settings: Any) -> Iterator[tuple[Key, Any]]:
+    """Yield the keys that may name files, and their values."""
+    for key in (*FILE_KEYS, *_PRESET_KEYS):
+        section = _section(settings, key[:-1])
+        if section is not None and key[-1] in section:
+            yield key, section[key[-1]]
+    for name, place in (_section(settings, _ESTIMATORS) or {}).items():
+        yield (*_ESTIMATORS, name), place
+
+
+def _section(settings: Any, names: Sequence[str]) -> dict[str, Any] | None:
+    """Return a section; None where it is absent or not a table."""
+    for name in names:
+        settings = settings.get(name) if isinstance(settings, dict) else None
+    return settings if isinstance(settings, dict) else None
+
+
+def _located(key: Key, value: Any, folder: Path) -> Any:
+    if isinstance(value, list):  # of files, or of a sweep
+        return [_located(key, each, folder) for each in value]
+    return str(folder / value) if _is_file(key, value) else value
+
+
+def _is_file(key: Key, value: Any) -> bool:
+    if not isinstance(value, str) or not value:
+        return False
+    if key in _PRESET_KEYS:
+        return value.endswith(".toml")
+    return key in FILE_KEYS or ".py:" in value

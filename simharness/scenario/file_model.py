@@ -9,11 +9,11 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from simharness.scenario.checks import MOST_TRIALS
 from simharness.scenario.sections.cameras_section import CamerasSection, SensorSection
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.size import MOST_TRIALS
 
 Seed = Annotated[int, Field(ge=0, lt=2**53)]
 

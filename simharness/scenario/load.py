@@ -5,13 +5,20 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from simharness.runtime.version import code_version
-from simharness.scenario.resolution import read_plan
+from simharness.scenario.checks import MOST_TRIALS
+from simharness.scenario.resolution import Resolver, ScenarioPlan, read_plan, refuse, value_at, vary
+from simharness.scenario.sections.gate_section import GateSection
+from simharness.scenario.sections.method_section import wrong_variants
 from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.sweep import Value
 from simharness.scenario.toml_files import ScenarioError
+from simharness.scenario.validation_messages import origin_of
 
 
 def load(
@@ -49,3 +56,161 @@ def fingerprint(scenario: Scenario) -> str:
     for file in (*scenario.files, *scenario.method.estimators.files):
         digest.update(file.read_bytes() if os.path.isfile(file) else b"")
     return digest.hexdigest()
+
+
+__all__ = ["LIMIT", "Setting", "Study", "StudyTooLarge", "Value", "load_study"]
+
+LIMIT = 10_000
+"""Largest number of trials of a study that is run without confirmation (``--yes``)."""
+
+
+class StudyTooLarge(ScenarioError):
+    """Study with more trials than the limit."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One combination of factors.
+
+    Attributes:
+        case: name of the case; "" where the file has no cases.
+        varied: where keys are swept one at a time, the dotted key that this setting varies, the first of paired keys;
+            "" for the base, and for combinations.
+        factors: every swept dotted key and its value in this setting, that of the base where it is not varied. None:
+            no value, or different values for the joints.
+        scenario: resolved scenario, with the first seed and all variants of the study.
+    """
+
+    case: str
+    varied: str
+    factors: Mapping[str, Value]
+    scenario: Scenario
+
+
+@dataclass(frozen=True)
+class Study:
+    """All trials of a scenario file.
+
+    Attributes:
+        name: name of the scenario.
+        description: description of the scenario.
+        seeds: seeds of every setting.
+        variants: variants of the method in every trial.
+        factors: dotted keys that are swept, in the order of the file.
+        one_at_a_time: whether each factor is varied alone.
+        settings: settings case by case; the last factor varies fastest.
+        gate: section [gate].
+        path: the file, or the name of a shipped scenario, as it was given.
+        base: the scenario without sweep and cases, at the first seed.
+        data: keys of the file, of its bases and of the command line, before presets and sweep are resolved.
+    """
+
+    name: str
+    description: str
+    seeds: tuple[int, ...]
+    variants: tuple[str, ...]
+    factors: tuple[str, ...]
+    one_at_a_time: bool
+    settings: tuple[Setting, ...]
+    gate: GateSection
+    path: Path
+    base: Scenario
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def trials(self) -> int:
+        """Number of trials: settings times seeds."""
+        return len(self.settings) * len(self.seeds)
+
+    def at(self, setting: Setting, seed: int) -> Scenario:
+        """Return the scenario of a trial."""
+        return setting.scenario.model_copy(update={"seed": seed})
+
+
+def load_study(
+    path: Path | str,
+    *,
+    overrides: Sequence[str] = (),
+    seeds: int | Sequence[int] | None = None,
+    variants: Sequence[str] | None = None,
+    limit: int | None = LIMIT,
+    folder: Path | None = None,
+) -> Study:
+    """Read a scenario file as a study; every setting is resolved and validated.
+
+    Args:
+        path: a TOML file, or the name of a shipped scenario.
+        overrides: as in :func:`simharness.scenario.load.load`; also ``"sweep.cameras.count=[2, 3]"``.
+        seeds: replaces the file's seeds: their number, or a list of them.
+        variants: replaces the file's variants.
+        limit: largest number of trials; None: :data:`~simharness.scenario.checks.MOST_TRIALS`.
+        folder: folder to which files named in the scenario file are relative; by default that of the file.
+
+    Raises:
+        StudyTooLarge: more trials than ``limit``; no setting is made.
+        ScenarioError: as :func:`simharness.scenario.load.load`. All mistakes of a study are reported together.
+    """
+    plan = read_plan(path, overrides=overrides, seeds=seeds, variants=variants, folder=folder)
+    _check_variants(plan)
+    if plan.trials > MOST_TRIALS:
+        raise StudyTooLarge(
+            f"{path}: makes {plan.trials:,} trials ({plan.settings:,} x {len(plan.seeds):,}, settings x seeds), more "
+            f"than the {MOST_TRIALS:,} that a study may have: sweep over fewer values, or split it into several files"
+        )
+    if limit is not None and plan.trials > limit:
+        raise StudyTooLarge(
+            f"{path}: makes {plan.trials:,} trials ({plan.settings:,} x {len(plan.seeds):,}, settings x seeds), more "
+            f"than {limit:,}: sweep over fewer values, or add --yes to run it"
+        )
+    return Study(
+        name=plan.base.name,
+        description=plan.base.description,
+        seeds=tuple(plan.seeds),
+        variants=plan.base.method.variants,
+        factors=plan.sweep.keys,
+        one_at_a_time=plan.sweep.one_at_a_time,
+        settings=tuple(_settings(plan)),
+        gate=plan.gate,
+        path=Path(path),
+        base=plan.base,
+        data=plan.document.data,
+    )
+
+
+def _settings(plan: ScenarioPlan) -> Iterator[Setting]:
+    """Yield every setting; at the end, raise the mistakes of all of them."""
+    mistakes: list[str] = []
+    resolver = Resolver(plan.document, mistakes)
+    for case in plan.cases:
+        for varied, values in plan.sweep.settings(case.values):
+            data, origins = vary(case.data, case.origins, plan.sweep, values)
+            scenario = resolver.scenario(data, origins)
+            if scenario is not None:
+                mistakes += _without_descriptors(scenario, plan)
+                yield Setting(
+                    case.name, varied, {key: value_at(scenario, data, key) for key in plan.sweep.keys}, scenario
+                )
+    refuse(mistakes)
+
+
+def _check_variants(plan: ScenarioPlan) -> None:
+    for key, message in wrong_variants(plan.base.method):
+        origin = origin_of(("method", *key.split(".")), plan.document.origins, str(plan.document.path))
+        raise ScenarioError(f"{origin}: {key if key == 'variants' else f'method.{key}'}: {message}")
+
+
+def _without_descriptors(scenario: Scenario, plan: ScenarioPlan) -> list[str]:
+    """Return a message about variants that need descriptors in a scenario without them."""
+    from mvpose.presets import NEED_DESCRIPTORS, without_repair
+
+    affected = [name for name in scenario.method.variants if without_repair(name) in NEED_DESCRIPTORS]
+    if not affected or scenario.appearance.source != "none":
+        return []
+    return [
+        f"{_origin_of_variants(plan)}: variants: {', '.join(affected)} needs descriptors, which the detections lack; "
+        'choose appearance.source = "pictures" or "drawn", or another variant'
+    ]
+
+
+def _origin_of_variants(plan: ScenarioPlan) -> str:
+    return origin_of(("method", "variants"), plan.document.origins, str(plan.document.path))

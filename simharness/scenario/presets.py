@@ -21,8 +21,8 @@ from pydantic import ValidationError
 
 from mvpose.files.input_files import SETTINGS, read_bytes
 from mvpose.files.message_text import all_in_one_line, listed, shown
+from simharness.scenario.document import locate_files
 from simharness.scenario.layers import Origins, merge
-from simharness.scenario.named_files import locate_files
 from simharness.scenario.sections.cameras_section import CamerasSection, SensorSection
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.section import Section

@@ -16,13 +16,13 @@ from typing import Any
 from pydantic import ValidationError
 
 from mvpose.files.message_text import all_in_one_line, shown
+from simharness.scenario.checks import MOST_TRIALS, oversized
 from simharness.scenario.document import Document, read_document
 from simharness.scenario.layers import Origins, leaves, merge, nested, set_origin
 from simharness.scenario.presets import KINDS, Presets, merge_with_presets
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.sections.section import Section
-from simharness.scenario.size import MOST_TRIALS, oversized
 from simharness.scenario.sweep import Sweep, SweepReader, Value
 from simharness.scenario.toml_files import ScenarioError
 from simharness.scenario.validation_messages import explain_all, origin_of

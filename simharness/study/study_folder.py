@@ -33,8 +33,8 @@ import polars as pl
 from mvpose.files.input_files import read_bytes, read_json_object
 from mvpose.files.message_text import one_line
 from simharness.runtime.parquet_tables import table_of
+from simharness.scenario.load import Study
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.study_definition import Study
 from simharness.scenario.toml_files import dumps_keys
 from simharness.study.trial_store import parquet
 
@@ -127,7 +127,7 @@ def read_study(folder: Path | str) -> Results:
 
 
 def document(study: Study) -> str:
-    """Return a scenario file of the same study, for :func:`simharness.scenario.study_definition.load_study`.
+    """Return a scenario file of the same study, for :func:`simharness.scenario.load.load_study`.
 
     The keys of all its bases are written out. Rigs and detector profiles are written by name; other files are relative
     to the folder in which the study was started.

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mvpose.presets import TRACKING, without_repair
+from simharness.scenario.load import Setting, Study
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.study_definition import Setting, Study
 from simharness.trial.identity import entry_identity, estimator_code, trial_identity
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from mvpose.commands.progress import Reporter, Silence
 from mvpose.files.atomic_files import atomic_folder
+from simharness.scenario.load import Study, Value
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.study_definition import Study, Value
 from simharness.study.scheduler import Measure, TrialFailure, TrialSuccess, Unit, error_text, run_units
 from simharness.study.stored_trial import StoredTrial
 from simharness.study.stored_trial import run_stored_trial as measure_trial

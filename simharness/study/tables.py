@@ -8,7 +8,7 @@ from typing import Any
 
 import polars as pl
 
-from simharness.scenario.study_definition import Value
+from simharness.scenario.load import Value
 from simharness.scoring.catalogue import SCORES
 from simharness.study.study_folder import Tables
 from simharness.study.study_plan import PlannedTrial

@@ -16,8 +16,8 @@ from mvpose.commands.progress import duration
 from mvpose.presets import without_repair
 from mvpose.skeleton import COCO17
 from mvpose.wholebody import skeleton_by_name
+from simharness.scenario.checks import camera_count, oversized
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.size import camera_count, oversized
 from simharness.trial.stages.build_trial import true_rig
 
 _PROCESS = 400e6  # bytes: Python, libraries, compiled kernels, a scene

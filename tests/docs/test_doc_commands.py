@@ -34,7 +34,7 @@ from known_commands import (
 )
 
 from mvpose.formats.calibration.voxelpose import write_calibration
-from simharness.scenario.study_definition import load_study
+from simharness.scenario.load import load_study
 
 
 def test_commands_are_found_in_blocks_and_in_prose():

@@ -230,7 +230,7 @@ class TestBadInput:
         from simharness.gate.baseline import KEPT, Measurement, write_baseline
         from simharness.gate.suite import fingerprint
         from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
-        from simharness.scenario.study_definition import load_study
+        from simharness.scenario.load import load_study
 
         (tmp_path / "small.toml").write_text(SMALL)
         study = load_study(tmp_path / "small.toml")

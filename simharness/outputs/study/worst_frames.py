@@ -15,9 +15,9 @@ from simharness.gate.trial_command import overrides
 from simharness.outputs.run.pictures import MAX_VIEWS, PagePicture, draw_frame
 from simharness.outputs.study.replay import Replay, replay
 from simharness.outputs.study.skeleton_view_3d import skeleton_view_3d
-from simharness.scenario.named_files import relative_files
+from simharness.scenario.document import relative_files
+from simharness.scenario.load import Study, load_study
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.study_definition import Study, load_study
 from simharness.scenario.toml_files import toml
 from simharness.scoring.failure_classes import FailureKind
 from simharness.scoring.pairing import LIMIT

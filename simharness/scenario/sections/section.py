@@ -22,7 +22,7 @@ MOST_CAMERAS = 64
 """Greatest number of cameras of a rig."""
 
 # Every number has a lower and an upper bound, from physics or from cost, so that a typing error is found where
-# it is. What several keys cost together is bounded in simharness.scenario.size.
+# it is. What several keys cost together is bounded in simharness.scenario.checks.
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Factor = Annotated[float, Field(ge=0.0, le=100.0)]
 Length = Annotated[float, Field(gt=0.0, le=LARGEST_RIG)]  # metres

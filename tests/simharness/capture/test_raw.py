@@ -240,8 +240,8 @@ class TestProfiles:
 
     def test_a_scenario_that_is_written_out_is_read_again(self, tmp_path):
         """All keys stand in the file of a result, also those that are zero: no profile changes them."""
+        from simharness.scenario.load import read_plan
         from simharness.scenario.outline import outline
-        from simharness.scenario.study_definition import read_plan
 
         file = tmp_path / "again.toml"
         for profile in ("perfect", "webcam"):

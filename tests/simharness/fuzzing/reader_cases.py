@@ -32,11 +32,10 @@ from simharness.gate.baseline import KEPT, Measurement, read_baseline, write_bas
 from simharness.gate.trial_command import TrialKey
 from simharness.outputs.benchmark.layout import check_place
 from simharness.reality.recording_file import read_keys
-from simharness.scenario.load import load
+from simharness.scenario.load import load, load_study
 from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.people_section import MocapSection, PeopleSection
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.study_definition import load_study
 from simharness.study.study_folder import Tables, read_study, write_study
 from simharness.study.trial_store import Entry, Store
 from simharness.trial.run_folder import read_run, write_run

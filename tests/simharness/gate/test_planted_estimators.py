@@ -11,8 +11,8 @@ from suites import QUICKSTART
 from simharness.gate.baseline import FRAMES, TIME
 from simharness.gate.compare import compare
 from simharness.gate.suite import run_suite
+from simharness.scenario.load import load_study
 from simharness.scenario.sections.gate_section import GateSection
-from simharness.scenario.study_definition import load_study
 
 SUITE = f"""
 extends = {json.dumps(str(QUICKSTART))}

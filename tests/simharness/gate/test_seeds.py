@@ -8,8 +8,8 @@ from simharness.gate.gate_check import baseline_of
 from simharness.gate.required_seeds import least_corrected_p, least_seeds
 from simharness.gate.suite import fingerprint
 from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
+from simharness.scenario.load import load_study
 from simharness.scenario.sections.gate_section import GateSection
-from simharness.scenario.study_definition import load_study
 
 
 @pytest.mark.parametrize("cases", [1, 3])

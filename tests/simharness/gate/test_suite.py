@@ -16,7 +16,7 @@ from simharness.gate.frame_times import reference_work, relative_times
 from simharness.gate.gate_check import baseline_of
 from simharness.gate.required_seeds import least_corrected_p
 from simharness.gate.suite import fingerprint, run_suite
-from simharness.scenario.study_definition import load_study
+from simharness.scenario.load import load_study
 from simharness.scoring.catalogue import SCORES
 from simharness.trial.run_trial import run_trial
 

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from simharness.gate.trial_command import TrialKey, command_of, overrides, setting_name, settings_at_seeds
-from simharness.scenario.load import load
-from simharness.scenario.study_definition import load_study
+from simharness.scenario.load import load, load_study
 
 CI = Path(__file__).parents[3] / "scenarios" / "ci.toml"
 

@@ -23,8 +23,8 @@ cameras.count = [2, 3]
 @pytest.fixture(scope="session")
 def ran(tmp_path_factory):
     """Results of two settings at two seeds with two variants."""
+    from simharness.scenario.load import load_study
     from simharness.scenario.shipped import shipped_folder
-    from simharness.scenario.study_definition import load_study
     from simharness.study.study_run import run_study
 
     folder = tmp_path_factory.mktemp("ran")

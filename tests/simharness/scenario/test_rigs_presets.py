@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from simharness.scenario.load import ScenarioError, load
+from simharness.scenario.load import ScenarioError, load, load_study
 from simharness.scenario.presets import RIGS, summary_of
 from simharness.scenario.sections.cameras_section import CamerasSection
-from simharness.scenario.study_definition import load_study
 from simharness.world.rigs.layouts import build_rig
 
 SHIPPED = sorted(RIGS.shipped.glob("*.toml"))

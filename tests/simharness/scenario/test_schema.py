@@ -7,9 +7,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from simharness.scenario.load import ScenarioError
+from simharness.scenario.load import ScenarioError, load_study
 from simharness.scenario.schema import dumps, scenario_schema
-from simharness.scenario.study_definition import load_study
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 SHIPPED = sorted(SCENARIOS.glob("*.toml"))

@@ -10,7 +10,7 @@ import pytest
 from trials import measured
 
 from simharness.detector.detect import Detected
-from simharness.scenario.study_definition import Setting, Study, load_study
+from simharness.scenario.load import Setting, Study, load_study
 from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.build_trial import Trial, build_trial, true_rig
 from simharness.types.sequence import Sequence

@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 import simharness
-from simharness.scenario.load import load
+from simharness.scenario.load import load, load_study
 from simharness.scenario.shipped import shipped_folder, shipped_names
-from simharness.scenario.study_definition import load_study
 from simharness.scenario.toml_files import ScenarioError
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from simharness.scenario.study_definition import Study, load_study
+from simharness.scenario.load import Study, load_study
 from simharness.scoring.catalogue import SCORES
 from simharness.study.stored_trial import TrialOutput
 from simharness.trial.variant_result import VariantResult

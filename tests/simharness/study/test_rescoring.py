@@ -11,8 +11,7 @@ import pytest
 from trials import simulated
 
 from mvpose import Estimate
-from simharness.scenario.load import load
-from simharness.scenario.study_definition import load_study
+from simharness.scenario.load import load, load_study
 from simharness.scoring import assessment
 from simharness.study.stored_trial import StoredTrial, run_stored_trial
 from simharness.study.study_plan import plan

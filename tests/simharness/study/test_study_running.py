@@ -8,7 +8,7 @@ import pytest
 from fakes import ALWAYS, Fake, called, made_up, study_of, times
 from trials import Recorder
 
-from simharness.scenario.study_definition import load_study
+from simharness.scenario.load import load_study
 from simharness.scoring.catalogue import SCORES
 from simharness.study.study_folder import TABLES, read_study
 from simharness.study.study_run import FailedTrial, Interrupted, run_shard, run_study

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from mvpose import Rig
+from simharness.scenario.load import load_study
 from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
 from simharness.scenario.sections.people_section import PeopleSection, PushSection
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import RenderingSection, Scenario
-from simharness.scenario.study_definition import load_study
 from simharness.study.study_run import run_study
 from simharness.trial.audit import AuditError, audit, check_calibration, check_clocks, sampled_pictures
 from simharness.trial.run_trial import run_trial

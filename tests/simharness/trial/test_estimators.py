@@ -25,9 +25,8 @@ from simharness.outputs.study.page import write_report
 from simharness.outputs.study.replay import replay
 from simharness.outputs.study.worst_frames import _command
 from simharness.runtime.frame_pool import map_frames
-from simharness.scenario.load import load
+from simharness.scenario.load import load, load_study
 from simharness.scenario.sections.method_section import EstimatorsSection, MethodSection
-from simharness.scenario.study_definition import load_study
 from simharness.study.study_run import run_study
 from simharness.trial.run_folder import read_run
 from simharness.trial.stages.build_trial import build_trial

@@ -11,9 +11,8 @@ import pytest
 import mvpose
 import simharness
 from simharness.runtime.code_digest import files_of
-from simharness.scenario.load import load
+from simharness.scenario.load import load, load_study
 from simharness.scenario.sections.section import Section
-from simharness.scenario.study_definition import load_study
 from simharness.study.study_plan import plan
 from simharness.trial import identity
 from simharness.trial.identity import entry_identity, estimator_code, trial_identity

@@ -3,8 +3,7 @@
 import pytest
 from trials import measured
 
-from simharness.scenario.load import load
-from simharness.scenario.study_definition import load_study
+from simharness.scenario.load import load, load_study
 from simharness.study.study_plan import plan
 from simharness.trial.stages.estimators import estimators_of
 

@@ -7,8 +7,7 @@ import pytest
 from trials import measured as measure
 
 from mvpose.commands.errors import RunError
-from simharness.scenario.load import load
-from simharness.scenario.study_definition import load_study
+from simharness.scenario.load import load, load_study
 from simharness.scoring import stage_blame
 from simharness.scoring.catalogue import SCORES
 from simharness.study.study_run import run_study
