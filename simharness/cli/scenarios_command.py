@@ -15,7 +15,7 @@ from simharness.cli.program import PROGRAM
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from simharness.scenario.resolution import ScenarioPlan
+    from simharness.scenario.load import ScenarioPlan
 
 
 def add_to(app: typer.Typer) -> None:
@@ -29,8 +29,9 @@ def add_to(app: typer.Typer) -> None:
 def scenarios() -> None:
     """List the shipped scenarios, and the rigs and the sensor and detector profiles for your own."""
     with PROGRAM.exit_on_error():
-        from simharness.scenario.presets import PROFILES, RIGS, SENSORS, summary_of
-        from simharness.scenario.resolution import read_plan
+        from simharness.scenario.layers import PROFILES, RIGS, SENSORS
+        from simharness.scenario.load import read_plan
+        from simharness.scenario.presets import summary_of
         from simharness.scenario.shipped import shipped_folder
 
         folder = shipped_folder()
@@ -59,7 +60,7 @@ def show(
 ) -> None:
     """Print a scenario with all keys, defaults and descriptions, and what it needs; of a study also its trials."""
     with PROGRAM.exit_on_error():
-        from simharness.scenario.checks import MOST_TRIALS
+        from simharness.scenario.file_model import MOST_TRIALS
         from simharness.scenario.load import StudyTooLarge, load_study, read_plan
         from simharness.scenario.outline import outline
 

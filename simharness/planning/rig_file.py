@@ -18,7 +18,8 @@ from mvpose.files.atomic_files import write_atomic
 from mvpose.files.message_text import one_line
 from mvpose.formats.calibration.pose2sim import write_calibration
 from simharness.planning.planned_room import Room
-from simharness.scenario.presets import RIGS, file_of, read_preset
+from simharness.scenario.layers import RIGS
+from simharness.scenario.presets import file_of, read_preset
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.toml_files import read_toml, toml
 from simharness.world.rigs.layouts import build_rig, look_at

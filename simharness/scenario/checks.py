@@ -1,12 +1,23 @@
-"""Size of a scenario: what its keys cost together, and the largest that is accepted."""
+"""Checks of resolved settings: validation against the models, and what their keys cost together."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from pydantic import ValidationError
 
 from mvpose.detections import MOST_DETECTIONS
+from mvpose.files.message_text import all_in_one_line
+from simharness.scenario.layers import Origins
 from simharness.scenario.sections.cameras_section import CamerasSection
+from simharness.scenario.sections.gate_section import GateSection
 from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.sections.section import Section
+from simharness.scenario.toml_files import ScenarioError
+from simharness.scenario.validation_messages import explain_all, origin_of
 
 MOST_FRAMES = 100_000
 """Largest number of frames: an hour at 25 Hz."""
@@ -17,8 +28,54 @@ MOST_SIGHTS = 10_000_000
 MOST_PIXELS = 10**13
 """Largest number of rendered pixels: days of rendering."""
 
-MOST_TRIALS = 1_000_000
-"""Largest number of trials of a study, and of its seeds."""
+
+class Checker:
+    """Validation of resolved settings; mistakes are collected in a list."""
+
+    def __init__(self, file: str, mistakes: list[str]) -> None:
+        """Check settings of ``file``; append messages to ``mistakes``."""
+        self._file = file
+        self._mistakes = mistakes
+        self._sections: dict[Any, Section] = {}
+
+    def scenario(self, data: Mapping[str, Any], origins: Origins) -> Scenario | None:
+        """Return the scenario of keys over their presets; None where they are not valid.
+
+        Equal sections are shared as one object, because thousands of settings differ in a few sections.
+        """
+        try:
+            # Through JSON, where pydantic's strict mode accepts arrays as tuples: count = "4" and count = true are
+            # refused, count = 4 and fov = 75 are accepted.
+            scenario = Scenario.model_validate_json(json.dumps(data, default=str), strict=True)
+        except ValidationError as error:
+            self._mistakes += explain_all(error, origins, self._file)
+            return None
+        self._mistakes += [
+            f"{origin_of(key.split('.'), origins, self._file)}: {message}" for key, message in oversized(scenario)
+        ]
+        sections = {key: section for key, section in scenario if isinstance(section, Section)}
+        shared = {
+            # Sections are shared only with equal sets of given keys: some checks depend on which keys were given.
+            key: self._sections.setdefault((key, section, frozenset(section.model_fields_set)), section)
+            for key, section in sections.items()
+        }
+        return scenario.model_copy(update=shared)
+
+    def gate(self, data: Any, origins: Origins) -> GateSection:
+        """Return the section [gate]."""
+        try:
+            return GateSection.model_validate_json(json.dumps(data, default=str), strict=True)
+        except ValidationError as error:
+            self._mistakes += explain_all(error, origins, self._file, section=("gate",))
+            return GateSection()
+
+
+def refuse(mistakes: Sequence[str]) -> None:
+    """Raise a :class:`ScenarioError` with every distinct mistake, if there are any."""
+    if mistakes:
+        # All values of a range may be wrong in the same way: the message about the first is enough.
+        messages = {re.split(", (?:e.g.|got) ", mistake)[0]: mistake for mistake in reversed(mistakes)}
+        raise ScenarioError(all_in_one_line(list(reversed(messages.values()))))
 
 
 def camera_count(cameras: CamerasSection) -> int | None:

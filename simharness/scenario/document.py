@@ -1,4 +1,7 @@
-"""Document: a scenario file joined with the files that it extends and the overrides of the command line."""
+"""Document: a scenario file joined with the files that it extends and the overrides of the command line.
+
+Paths in scenario files are relative to the folder of the file; on the command line, to the working directory.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +15,13 @@ from typing import Any
 
 from mvpose.files.input_files import parse_toml
 from mvpose.files.message_text import one_line, shown
-from simharness.scenario.layers import Key, Origins, leaves, set_origin
-from simharness.scenario.presets import KINDS, merge_with_presets
+from simharness.scenario.layers import PRESET_KINDS, Key, Origins, leaves, merge_with_presets, set_origin
 from simharness.scenario.sections.scenario import FILE_KEYS
 from simharness.scenario.shipped import shipped_folder, shipped_names
 from simharness.scenario.toml_files import ScenarioError, read_toml, toml_place
+
+_PRESET_KEYS = tuple((kind.section, kind.key) for kind in PRESET_KINDS)  # TOML files or names
+_ESTIMATORS = ("method", "estimators")  # "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE", by name
 
 
 @dataclass(frozen=True)
@@ -142,7 +147,7 @@ def _override(data: dict[str, Any], overrides: Sequence[str], origins: Origins) 
         origins: origins of the keys; those of the command line are added.
     """
     parsed = [_parse_override(override) for override in overrides]
-    for kind in KINDS:  # presets first, so that all other overrides change the chosen preset
+    for kind in PRESET_KINDS:  # presets first, so that all other overrides change the chosen preset
         chosen = [value for key, value in parsed if key == (kind.section, kind.key)]
         if chosen:
             data = merge_with_presets(data, {kind.section: {kind.key: chosen[-1]}})
@@ -184,10 +189,6 @@ def _parse_value(override: str, written: str) -> Any:
     except ValueError as error:
         raise ScenarioError(f"--set {one_line(override, 100)}: {error}") from None
     return parsed["value"] if len(parsed) == 1 else written
-
-
-_PRESET_KEYS = (("cameras", "rig"), ("sensor", "profile"), ("detector", "profile"))  # TOML files or names
-_ESTIMATORS = ("method", "estimators")  # "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE", by name
 
 
 def locate_files(data: dict[str, Any], folder: Path) -> None:

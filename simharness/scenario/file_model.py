@@ -9,11 +9,13 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from simharness.scenario.checks import MOST_TRIALS
 from simharness.scenario.sections.cameras_section import CamerasSection, SensorSection
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.scenario.sections.scenario import Scenario
+
+MOST_TRIALS = 1_000_000
+"""Largest number of trials of a study, and of its seeds."""
 
 Seed = Annotated[int, Field(ge=0, lt=2**53)]
 
@@ -48,7 +50,7 @@ class DetectorFileSection(DetectorSection):
 
 
 class ScenarioFile(Scenario):
-    """Keys of a scenario file. :mod:`simharness.scenario.resolution` gives them meaning."""
+    """Keys of a scenario file. :mod:`simharness.scenario.load` gives them meaning."""
 
     extends: str = Field(
         "",

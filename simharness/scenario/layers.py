@@ -1,11 +1,21 @@
-"""Layers of settings: a file over its base, a scenario over its presets, a sweep over a scenario."""
+"""Layers of settings: a file over its base, a scenario over its presets, a sweep over a scenario.
+
+Kinds of presets are rigs, sensor profiles and detector profiles: ``[detector] profile = "typical"`` takes
+``scenarios/detectors/typical.toml``, ``[sensor] profile = "webcam"`` takes ``scenarios/sensors/webcam.toml`` and
+``[cameras] rig = "dome12"`` takes ``scenarios/rigs/dome12.toml``.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from simharness.scenario.sections.detector_section import KINDS
+from simharness.scenario.sections.cameras_section import CamerasSection, SensorSection
+from simharness.scenario.sections.detector_section import KINDS, DetectorSection
+from simharness.scenario.sections.section import Section
+from simharness.scenario.shipped import shipped_folder
 
 Key = tuple[str, ...]
 Origins = dict[Key, str]
@@ -14,6 +24,48 @@ people.count=6`` for ("people", "count"). Entries are in the order in which keys
 
 RANGE = ("from", "to", "steps", "scale")
 """Keys of a range of values in a sweep."""
+
+
+@dataclass(frozen=True)
+class PresetKind:
+    """Kind of preset.
+
+    Attributes:
+        section: section to which the presets belong.
+        key: key of the section that names a preset.
+        title: name of the kind in messages.
+        folder: name of the folder of the presets.
+        model: model of the section.
+        default: preset of scenarios that name none; "": no preset.
+    """
+
+    section: str
+    key: str
+    title: str
+    folder: str
+    model: type[Section]
+    default: str
+
+    @property
+    def shipped(self) -> Path:
+        """Folder of the shipped presets."""
+        return shipped_folder() / self.folder
+
+    def name_in(self, data: Mapping[str, Any]) -> Any:
+        """Return the preset with which the settings of a scenario begin; "": none, the section is written out.
+
+        A detector that is written out has a key ``name``.
+        """
+        section = data.get(self.section, {})
+        if not isinstance(section, Mapping):
+            return ""
+        return section.get(self.key, "" if "name" in section else self.default)
+
+
+PROFILES = PresetKind("detector", "profile", "detector profile", "detectors", DetectorSection, "typical")
+RIGS = PresetKind("cameras", "rig", "rig", "rigs", CamerasSection, "")
+SENSORS = PresetKind("sensor", "profile", "sensor profile", "sensors", SensorSection, "machine-vision")
+PRESET_KINDS = (PROFILES, RIGS, SENSORS)
 
 
 def merge(base: Any, changes: Any) -> Any:
@@ -29,6 +81,15 @@ def merge(base: Any, changes: Any) -> Any:
     if not isinstance(base, Mapping):
         return changes
     return {**base, **{key: merge(base.get(key), value) for key, value in changes.items()}}
+
+
+def merge_with_presets(base: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return changes over a base, where a preset that the changes name replaces a section that is written out."""
+    for kind in PRESET_KINDS:
+        chosen = changes.get(kind.section)
+        if isinstance(chosen, Mapping) and chosen.get(kind.key) and not kind.name_in(base):
+            base = {name: section for name, section in base.items() if name != kind.section}
+    return merge(base, changes)
 
 
 def is_range(table: Mapping[str, Any]) -> bool:

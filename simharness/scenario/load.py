@@ -1,4 +1,36 @@
-"""Loading of a single scenario: a TOML file in, a validated :class:`Scenario` out."""
+"""Loading of scenario files: a single :class:`Scenario`, or a :class:`Study` with all its settings.
+
+A file is read in steps, each in a module of its own: :mod:`.document` reads it (:mod:`.toml_files`) and the files that
+it extends, :mod:`.sweep` takes sweep, cases and seeds out of it and makes the keys of each setting, :mod:`.presets`
+puts rigs, sensor and detector profiles under them, and :mod:`.checks` validates the result.
+
+Beside the keys of a scenario, a scenario file may have::
+
+    extends = "quickstart"            # a base: a shipped scenario, or a file relative to this one
+    seeds = 20                        # their number, from the scenario's seed on, or a list of seeds
+    variants = ["full", "fast"]       # the same as method.variants
+
+    [sweep]                           # keys of a scenario, each with values: all combinations
+    cameras.count = [2, 3, 5, 8]
+    detector.phantoms.rate = { from = 0.0, to = 2.0, steps = 5 }        # scale = "log" for a geometric range
+    detector.profile = ["poor", "typical"]
+    one_at_a_time = true              # instead: the base, and each key alone
+
+    [[sweep.paired]]                  # keys that are varied together
+    cameras.count = [3, 5]
+    cameras.radius = [3.0, 4.0]
+
+    [cases.crowd]                     # named changes, each run with every setting of the sweep
+    people.count = 8
+
+    [method.estimators]               # user-defined estimators: simharness.trial.stages.estimators
+    custom = "custom.py:Custom"
+
+    [gate]                            # simharness.scenario.sections.gate_section
+
+A setting at a seed is a trial; all variants of a trial get the same detections. A file without these keys is a study of
+one trial.
+"""
 
 from __future__ import annotations
 
@@ -11,54 +43,17 @@ from pathlib import Path
 from typing import Any
 
 from simharness.runtime.version import code_version
-from simharness.scenario.checks import MOST_TRIALS
-from simharness.scenario.resolution import Resolver, ScenarioPlan, read_plan, refuse, value_at, vary
+from simharness.scenario.checks import Checker, refuse
+from simharness.scenario.document import Document, read_document
+from simharness.scenario.file_model import MOST_TRIALS
+from simharness.scenario.layers import Origins, merge, set_origin
+from simharness.scenario.presets import Presets
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.scenario.sections.method_section import wrong_variants
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.sweep import Value
+from simharness.scenario.sweep import Sweep, SweepReader, Value, value_at, vary
 from simharness.scenario.toml_files import ScenarioError
 from simharness.scenario.validation_messages import origin_of
-
-
-def load(
-    path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = None, folder: Path | None = None
-) -> Scenario:
-    """Read a scenario file.
-
-    Args:
-        path: a TOML file, or the name of a shipped scenario ("quickstart"). Its keys are documented in
-            :mod:`simharness.scenario.sections.scenario`; it is merged over the file that it extends, and over the rig
-            and the detector profile that it names.
-        overrides: ``"people.count=6"``: a dotted key and a TOML value that replaces the one of the file. A value that
-            is not TOML is taken as text, so that ``rendering.renderer=gl`` needs no quotes.
-        seed: replaces the scenario's seed.
-        folder: folder to which files named in the scenario file are relative; by default that of the file.
-
-    Raises:
-        ScenarioError: the file does not exist or is not TOML; a key does not exist (the message names the nearest) or
-            has a value of a wrong type or out of range (all are reported together); or the file is a study, with more
-            than one trial.
-    """
-    plan = read_plan(path, overrides=overrides, seed=seed, folder=folder)
-    if plan.is_study:
-        raise ScenarioError(
-            f"{path}: is a study, not a single scenario: it has {plan.trials:,} trials ({plan.settings:,} x "
-            f"{len(plan.seeds):,}, settings x seeds); run it with simharness study {path}"
-        )
-    return plan.base
-
-
-def fingerprint(scenario: Scenario) -> str:
-    """Return ten hexadecimal digits that depend on all values of a scenario, its files and the version of the code."""
-    resolved = json.dumps({"code": code_version(), "scenario": scenario.model_dump(mode="json")}, sort_keys=True)
-    digest = hashlib.blake2b(resolved.encode(), digest_size=5)
-    for file in (*scenario.files, *scenario.method.estimators.files):
-        digest.update(file.read_bytes() if os.path.isfile(file) else b"")
-    return digest.hexdigest()
-
-
-__all__ = ["LIMIT", "Setting", "Study", "StudyTooLarge", "Value", "load_study"]
 
 LIMIT = 10_000
 """Largest number of trials of a study that is run without confirmation (``--yes``)."""
@@ -127,6 +122,91 @@ class Study:
         return setting.scenario.model_copy(update={"seed": seed})
 
 
+@dataclass(frozen=True)
+class ScenarioCase:
+    """Named change of the base; the base itself in a file without cases.
+
+    Attributes:
+        name: name of the case; "" where the file has no cases.
+        data: keys of the scenario file with the changes.
+        origins: origins of the keys.
+        changes: keys that the case changes.
+        scenario: resolved scenario.
+        values: values of all swept keys, dotted, where they are not varied.
+    """
+
+    name: str
+    data: dict[str, Any]
+    origins: Origins
+    changes: Mapping[str, Any]
+    scenario: Scenario
+    values: Mapping[str, Value]
+
+
+@dataclass(frozen=True)
+class ScenarioPlan:
+    """Resolved scenario file: the base scenario, and what is varied.
+
+    Attributes:
+        document: keys of the file and its bases.
+        base: the scenario without sweep and cases; its seed is the first one.
+        seeds: seeds of every setting.
+        sweep: factors and their values.
+        cases: at least one case.
+        gate: section [gate].
+    """
+
+    document: Document
+    base: Scenario
+    seeds: Sequence[int]
+    sweep: Sweep
+    cases: tuple[ScenarioCase, ...]
+    gate: GateSection
+
+    @property
+    def settings(self) -> int:
+        """Number of settings."""
+        return sum(self.sweep.count(case.values) for case in self.cases)
+
+    @property
+    def trials(self) -> int:
+        """Number of trials: settings times seeds."""
+        return self.settings * len(self.seeds)
+
+    @property
+    def is_study(self) -> bool:
+        """Whether there is more than the base at one seed."""
+        return bool(self.sweep.axes or self.cases[0].name or len(self.seeds) > 1)
+
+
+def load(
+    path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = None, folder: Path | None = None
+) -> Scenario:
+    """Read a scenario file.
+
+    Args:
+        path: a TOML file, or the name of a shipped scenario ("quickstart"). Its keys are documented in
+            :mod:`simharness.scenario.sections.scenario`; it is merged over the file that it extends, and over the rig
+            and the detector profile that it names.
+        overrides: ``"people.count=6"``: a dotted key and a TOML value that replaces the one of the file. A value that
+            is not TOML is taken as text, so that ``rendering.renderer=gl`` needs no quotes.
+        seed: replaces the scenario's seed.
+        folder: folder to which files named in the scenario file are relative; by default that of the file.
+
+    Raises:
+        ScenarioError: the file does not exist or is not TOML; a key does not exist (the message names the nearest) or
+            has a value of a wrong type or out of range (all are reported together); or the file is a study, with more
+            than one trial.
+    """
+    plan = read_plan(path, overrides=overrides, seed=seed, folder=folder)
+    if plan.is_study:
+        raise ScenarioError(
+            f"{path}: is a study, not a single scenario: it has {plan.trials:,} trials ({plan.settings:,} x "
+            f"{len(plan.seeds):,}, settings x seeds); run it with simharness study {path}"
+        )
+    return plan.base
+
+
 def load_study(
     path: Path | str,
     *,
@@ -177,14 +257,90 @@ def load_study(
     )
 
 
+def read_plan(
+    path: Path | str,
+    *,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    seeds: int | Sequence[int] | None = None,
+    variants: Sequence[str] | None = None,
+    folder: Path | None = None,
+) -> ScenarioPlan:
+    """Read and resolve a scenario file.
+
+    Args:
+        path: a TOML file, or the name of a shipped scenario.
+        overrides: as in :func:`simharness.scenario.load.load`.
+        seed: replaces the scenario's seed.
+        seeds: replaces the study's seeds: their number, or a list of them.
+        variants: replaces the variants.
+        folder: folder to which files named in the scenario file are relative; by default that of the file.
+
+    Raises:
+        ScenarioError: as :func:`simharness.scenario.load.load`.
+    """
+    document = read_document(path, overrides=overrides, folder=folder)
+    data, origins = dict(document.data), document.origins
+    for key, value in (("seed", seed), ("seeds", seeds)):
+        if value is not None:
+            data[key] = list(value) if isinstance(value, Sequence) else value
+            set_origin(origins, (key,), f"--{key}")
+    if variants is not None:
+        data = merge(data, {"method": {"variants": list(variants)}})
+        set_origin(origins, ("method", "variants"), "--variants")
+
+    mistakes: list[str] = []
+    reader = SweepReader(origins, str(document.path), mistakes)
+    settings = _Settings(document, mistakes)
+    sweep = reader.sweep(data.pop("sweep", {}))
+    changes = reader.cases(data.pop("cases", {}), sweep) or {"": {}}
+    gate = settings.checker.gate(data.pop("gate", {}), origins)
+    all_seeds = reader.seeds(data)
+    reader.check_presets(data, sweep)
+    base = settings.scenario(data, origins)
+    cases = []
+    for name, changed in changes.items():
+        keys = reader.change(data, name, changed)
+        scenario = settings.scenario(*keys)
+        if scenario is not None:
+            values = {key: value_at(scenario, keys[0], key) for key in sweep.keys}
+            cases.append(ScenarioCase(name, *keys, changed, scenario, values))
+    if mistakes:  # report those of swept values as well: settings are not made after a mistake
+        for axis in sweep.axes:
+            for axis_values in axis.values:
+                settings.scenario(*vary(data, origins, sweep, dict(zip(axis.keys, axis_values, strict=True))))
+    refuse(mistakes)
+    assert base is not None
+    return ScenarioPlan(document, base, all_seeds, sweep, tuple(cases), gate)
+
+
+class _Settings:
+    """Settings of a scenario file: keys over the presets that they name, then checked."""
+
+    def __init__(self, document: Document, mistakes: list[str]) -> None:
+        """Read settings of ``document``; append messages to ``mistakes``."""
+        self.checker = Checker(str(document.path), mistakes)
+        self._presets = Presets(document.folders)
+        self._mistakes = mistakes
+
+    def scenario(self, data: dict[str, Any], origins: Origins) -> Scenario | None:
+        """Return the scenario of some keys; None where they are not valid."""
+        try:
+            resolved = self._presets.under(data, origins)
+        except ScenarioError as error:
+            self._mistakes.append(str(error))
+            return None
+        return self.checker.scenario(resolved, origins)
+
+
 def _settings(plan: ScenarioPlan) -> Iterator[Setting]:
     """Yield every setting; at the end, raise the mistakes of all of them."""
     mistakes: list[str] = []
-    resolver = Resolver(plan.document, mistakes)
+    settings = _Settings(plan.document, mistakes)
     for case in plan.cases:
         for varied, values in plan.sweep.settings(case.values):
             data, origins = vary(case.data, case.origins, plan.sweep, values)
-            scenario = resolver.scenario(data, origins)
+            scenario = settings.scenario(data, origins)
             if scenario is not None:
                 mistakes += _without_descriptors(scenario, plan)
                 yield Setting(
@@ -214,3 +370,12 @@ def _without_descriptors(scenario: Scenario, plan: ScenarioPlan) -> list[str]:
 
 def _origin_of_variants(plan: ScenarioPlan) -> str:
     return origin_of(("method", "variants"), plan.document.origins, str(plan.document.path))
+
+
+def fingerprint(scenario: Scenario) -> str:
+    """Return ten hexadecimal digits that depend on all values of a scenario, its files and the version of the code."""
+    resolved = json.dumps({"code": code_version(), "scenario": scenario.model_dump(mode="json")}, sort_keys=True)
+    digest = hashlib.blake2b(resolved.encode(), digest_size=5)
+    for file in (*scenario.files, *scenario.method.estimators.files):
+        digest.update(file.read_bytes() if os.path.isfile(file) else b"")
+    return digest.hexdigest()

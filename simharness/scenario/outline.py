@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from simharness.scenario.layers import leaves
-from simharness.scenario.resolution import ScenarioPlan
+from simharness.scenario.load import ScenarioPlan
 from simharness.scenario.sweep import Axis
 from simharness.scenario.toml_files import dumps
 

@@ -13,7 +13,6 @@ import json
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,55 +21,10 @@ from pydantic import ValidationError
 from mvpose.files.input_files import SETTINGS, read_bytes
 from mvpose.files.message_text import all_in_one_line, listed, shown
 from simharness.scenario.document import locate_files
-from simharness.scenario.layers import Origins, merge
-from simharness.scenario.sections.cameras_section import CamerasSection, SensorSection
+from simharness.scenario.layers import PRESET_KINDS, PROFILES, Origins, PresetKind, merge
 from simharness.scenario.sections.detector_section import DetectorSection
-from simharness.scenario.sections.section import Section
-from simharness.scenario.shipped import shipped_folder
 from simharness.scenario.toml_files import ScenarioError, read_toml
 from simharness.scenario.validation_messages import explain_all
-
-
-@dataclass(frozen=True)
-class PresetKind:
-    """Kind of preset.
-
-    Attributes:
-        section: section to which the presets belong.
-        key: key of the section that names a preset.
-        title: name of the kind in messages.
-        folder: name of the folder of the presets.
-        model: model of the section.
-        default: preset of scenarios that name none; "": no preset.
-    """
-
-    section: str
-    key: str
-    title: str
-    folder: str
-    model: type[Section]
-    default: str
-
-    @property
-    def shipped(self) -> Path:
-        """Folder of the shipped presets."""
-        return shipped_folder() / self.folder
-
-    def name_in(self, data: Mapping[str, Any]) -> Any:
-        """Return the preset with which the settings of a scenario begin; "": none, the section is written out.
-
-        A detector that is written out has a key ``name``.
-        """
-        section = data.get(self.section, {})
-        if not isinstance(section, Mapping):
-            return ""
-        return section.get(self.key, "" if "name" in section else self.default)
-
-
-PROFILES = PresetKind("detector", "profile", "detector profile", "detectors", DetectorSection, "typical")
-RIGS = PresetKind("cameras", "rig", "rig", "rigs", CamerasSection, "")
-SENSORS = PresetKind("sensor", "profile", "sensor profile", "sensors", SensorSection, "machine-vision")
-KINDS = (PROFILES, RIGS, SENSORS)
 
 
 def file_of(kind: PresetKind, name: str, folders: Sequence[Path], *, near: Path = Path()) -> Path:
@@ -174,7 +128,7 @@ class Presets:
         Raises:
             ScenarioError: no such preset, or it has a key or value that the section refuses.
         """
-        for kind in KINDS:
+        for kind in PRESET_KINDS:
             name = kind.name_in(data)
             section = data.get(kind.section, {})
             if not isinstance(section, Mapping):
@@ -202,12 +156,3 @@ class Presets:
                 raise ScenarioError(f"{where}{error}") from None
             self._read[kind.section, name] = read_preset(kind, path)
         return self._read[kind.section, name]
-
-
-def merge_with_presets(base: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return changes over a base, where a preset that the changes name replaces a section that is written out."""
-    for kind in KINDS:
-        chosen = changes.get(kind.section)
-        if isinstance(chosen, Mapping) and chosen.get(kind.key) and not kind.name_in(base):
-            base = {name: section for name, section in base.items() if name != kind.section}
-    return merge(base, changes)

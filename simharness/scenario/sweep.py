@@ -1,15 +1,32 @@
-"""[sweep]: values of the keys of a scenario, and their combinations."""
+"""[sweep], [cases] and seeds: values of the keys of a scenario, their combinations, and the keys of each setting."""
 
 from __future__ import annotations
 
 import itertools
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import Any
 
-from simharness.scenario.layers import RANGE, Key, Origins, is_range, overlap
+from mvpose.files.message_text import shown
+from simharness.scenario.file_model import MOST_TRIALS
+from simharness.scenario.layers import (
+    PRESET_KINDS,
+    RANGE,
+    Key,
+    Origins,
+    is_range,
+    leaves,
+    merge,
+    merge_with_presets,
+    nested,
+    overlap,
+    set_origin,
+)
+from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.sections.section import Section
 from simharness.scenario.validation_messages import explain, is_key, origin_of, section_at
 
 Value = str | int | float | bool | tuple[Any, ...] | None
@@ -94,7 +111,7 @@ class Sweep:
 
 
 class SweepReader:
-    """Reader of [sweep] and [cases]; mistakes are collected in a list."""
+    """Reader of [sweep], [cases] and seeds; mistakes are collected in a list."""
 
     def __init__(self, origins: Origins, file: str, mistakes: list[str]) -> None:
         """Read sections of ``file``, whose keys have the origins ``origins``; append messages to ``mistakes``."""
@@ -150,6 +167,51 @@ class SweepReader:
                     )
         return {name: dict(changes) for name, changes in section.items()}
 
+    def seeds(self, data: dict[str, Any]) -> Sequence[int]:
+        """Remove the seeds from the keys of the file, set the scenario's seed to the first of them, and return them."""
+        seeds = data.pop("seeds", 1)
+        origin = origin_of(("seeds",), self.origins, self._file)
+        if isinstance(seeds, list) and seeds and all(isinstance(seed, int) and 0 <= seed < 2**53 for seed in seeds):
+            if len(set(seeds)) < len(seeds):
+                self._mistakes.append(f"{origin}: seeds: a seed is in the list twice; remove one of them")
+            single = origin_of(("seed",), self.origins, self._file)
+            if single.startswith("--"):
+                self._mistakes.append(
+                    f"{single}: the study has a list of seeds, seeds = {shown(seeds)}, which replaces seed; set seeds "
+                    "instead, seeds = 1 for a single one"
+                )
+            data["seed"] = seeds[0]
+            return tuple(seeds)
+        if isinstance(seeds, bool) or not isinstance(seeds, int) or not 1 <= seeds <= MOST_TRIALS:
+            self._mistakes.append(
+                f"{origin}: seeds: expected a number of seeds, 1 to {MOST_TRIALS:,}, or a list of seeds, e.g. "
+                f"[0, 1, 2], got {shown(seeds)}"
+            )
+            seeds = 1
+        first = data.get("seed", 0)
+        # A seed that is not a valid number is reported with the scenario.
+        return range(first, first + seeds) if isinstance(first, int) and first < 2**53 else range(seeds)
+
+    def check_presets(self, data: Mapping[str, Any], sweep: Sweep) -> None:
+        """Refuse to sweep over presets beside a section that is written out and would change each of them."""
+        for kind in PRESET_KINDS:
+            key = f"{kind.section}.{kind.key}"
+            written = data.get(kind.section)
+            if key in sweep.keys and isinstance(written, Mapping) and written and not kind.name_in(data):
+                self._refuse(
+                    ("sweep", kind.section, kind.key),
+                    f"[{kind.section}] has the keys {', '.join(written)}, "
+                    f"which would change every {kind.title} of the sweep; name the {kind.title} to which they belong, "
+                    f'[{kind.section}] {kind.key} = "NAME"',
+                )
+
+    def change(self, data: dict[str, Any], name: str, changes: Mapping[str, Any]) -> tuple[dict[str, Any], Origins]:
+        """Return the keys of the file with the changes of a case, and the origins of all keys."""
+        origins = dict(self.origins)
+        for key in leaves(changes):
+            set_origin(origins, key, self.origin(("cases", name, *key)))
+        return merge_with_presets(data, changes), origins
+
     def origin(self, key: Key) -> str:
         """Return the origin of a key of [sweep] or [cases], with which its messages begin."""
         origin = origin_of(key, self.origins, self._file)
@@ -175,8 +237,8 @@ class SweepReader:
     def _refuse_repeated(self, axis: Axis, key: Key) -> None:
         repeated = next((value for index, value in enumerate(axis.values) if value in axis.values[:index]), None)
         if repeated is not None:
-            shown = " and ".join(map(_shown, repeated))
-            self._refuse(key, f"{' and '.join(axis.keys)}: {shown} is in the list twice; remove one of them")
+            values = " and ".join(map(_shown, repeated))
+            self._refuse(key, f"{' and '.join(axis.keys)}: {values} is in the list twice; remove one of them")
 
     def _varied(
         self, section: Mapping[str, Any], within: Key = ("sweep",), above: Key = ()
@@ -202,6 +264,44 @@ class SweepReader:
         except ValueError as error:
             self._refuse(key, f"{dotted}: {error}")
             return []
+
+
+def vary(
+    data: dict[str, Any], origins: Origins, sweep: Sweep, values: Mapping[str, Value]
+) -> tuple[dict[str, Any], Origins]:
+    """Return the keys of a scenario file with swept keys at some values, and the origins of all keys.
+
+    Args:
+        data: keys of a scenario file.
+        origins: origins of the keys.
+        sweep: the sweep of the values.
+        values: values by dotted key.
+    """
+    changes: dict[str, Any] = {}
+    origins = dict(origins)
+    for dotted, value in values.items():
+        key = tuple(dotted.split("."))
+        changes = merge(changes, nested(key, value))
+        set_origin(origins, key, sweep.origins[dotted])
+    return merge_with_presets(data, changes), origins
+
+
+def value_at(scenario: Scenario, data: Mapping[str, Any], key: str) -> Value:
+    """Return the value of a dotted key in a setting; None where it has none, or different numbers for the joints.
+
+    Args:
+        scenario: the resolved setting.
+        data: keys of its scenario file, which name its presets.
+        key: dotted key of a scenario file.
+    """
+    for kind in PRESET_KINDS:
+        if key == f"{kind.section}.{kind.key}":
+            return kind.name_in(data)
+    value: Any = reduce(getattr, key.split("."), scenario)
+    if not isinstance(value, Section):
+        return value
+    numbers = {each for _, each in value}
+    return numbers.pop() if len(numbers) == 1 else None
 
 
 def _values(written: Any) -> list[Value]:

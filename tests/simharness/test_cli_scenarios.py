@@ -7,8 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.scenario.load import load
-from simharness.scenario.resolution import read_plan
+from simharness.scenario.load import load, read_plan
 from simharness.scenario.schema import dumps
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import mvpose
 import simharness
-from simharness.scenario.presets import SENSORS
+from simharness.scenario.layers import SENSORS
 
 START = "tools.reid.rendering"
 """Module that renders crops; its imports, direct and indirect, belong to the digest."""

@@ -6,7 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from simharness.scenario.presets import SENSORS, read_preset
+from simharness.scenario.layers import SENSORS
+from simharness.scenario.presets import read_preset
 from simharness.scenario.sections.cameras_section import SensorSection
 
 PROFILES = {"machine-vision": 0.3, "webcam": 0.25, "phone": 0.2, "action": 0.15, "perfect": 0.1}

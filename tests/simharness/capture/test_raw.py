@@ -10,8 +10,9 @@ from mvpose.camera import Camera
 from simharness.capture.picture import scaled
 from simharness.capture.raw import BLACK, WHITE, raw_picture
 from simharness.capture.sensor import develop
+from simharness.scenario.layers import SENSORS
 from simharness.scenario.load import load
-from simharness.scenario.presets import SENSORS, summary_of
+from simharness.scenario.presets import summary_of
 from simharness.scenario.sections.cameras_section import SensorSection
 from simharness.types.random_streams import stream
 from simharness.types.srgb import from_linear, to_linear

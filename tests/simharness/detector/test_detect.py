@@ -9,8 +9,9 @@ from worlds import within, world
 from mvpose import preset
 from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
+from simharness.scenario.layers import PROFILES
 from simharness.scenario.load import load
-from simharness.scenario.presets import PROFILES, read_profile
+from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import CaptureFrames

@@ -5,10 +5,9 @@ from functools import reduce
 
 import pytest
 
-from simharness.scenario.checks import MOST_FRAMES, MOST_TRIALS, oversized
-from simharness.scenario.file_model import ScenarioFile
-from simharness.scenario.load import StudyTooLarge, load, load_study
-from simharness.scenario.resolution import read_plan
+from simharness.scenario.checks import MOST_FRAMES, oversized
+from simharness.scenario.file_model import MOST_TRIALS, ScenarioFile
+from simharness.scenario.load import StudyTooLarge, load, load_study, read_plan
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.shipped import shipped_folder
 from simharness.scenario.toml_files import ScenarioError

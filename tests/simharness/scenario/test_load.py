@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scenario.load import ScenarioError, fingerprint, load
-from simharness.scenario.resolution import read_plan
+from simharness.scenario.load import ScenarioError, fingerprint, load, read_plan
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.scenario import Scenario

@@ -4,8 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from simharness.scenario.layers import PROFILES
 from simharness.scenario.load import ScenarioError, load
-from simharness.scenario.presets import PROFILES, read_profile
+from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.detector_section import KINDS, DetectorSection, KeypointsSection
 from simharness.scenario.toml_files import dumps
 

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from simharness.scenario.layers import RIGS
 from simharness.scenario.load import ScenarioError, load, load_study
-from simharness.scenario.presets import RIGS, summary_of
+from simharness.scenario.presets import summary_of
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.world.rigs.layouts import build_rig
 

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scenario.load import ScenarioError, StudyTooLarge, load, load_study
-from simharness.scenario.resolution import read_plan
+from simharness.scenario.load import ScenarioError, StudyTooLarge, load, load_study, read_plan
 from simharness.scenario.sweep import Sweep
 from simharness.study.study_folder import document
 
