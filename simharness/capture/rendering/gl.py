@@ -4,9 +4,9 @@ One pass gives colour in RGB, depth in the z-buffer, and the id in alpha as (id 
 exactly; parts need a second pass. Multi-sampling would blend ids and take depth away from the pixel centre (measured:
 30 % of the pixels wrong by more than 5 mm), so the frame buffer has one sample per pixel.
 
-The shaders at the end of this module implement the lighting, shadows and textures of the rasteriser, and use the shadow map that
-its kernel draws. So pictures look the same with both renderers in lighting in closed form. Lighting with sources (lamps
-and windows of rooms) is shown by its nearest closed form, which is what
+The shaders at the end of this module implement the lighting, shadows and textures of the rasteriser, and use the shadow
+map that its kernel draws. So pictures look the same with both renderers in lighting in closed form. Lighting with
+sources (lamps and windows of rooms) is shown by its nearest closed form, which is what
 :class:`~simharness.types.lighting.Lighting` holds beside them.
 """
 
