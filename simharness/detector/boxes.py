@@ -17,11 +17,11 @@ from scipy.special import ndtri
 from mvpose import COCO17
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
-from simharness.detector.conditions import BOX_SHARE, overlaps
 from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import LIMB_OF_JOINT, Key, KeyedDraws, logistic
 from simharness.detector.steps import Context, StepStage, step
 from simharness.detector.view_geometry import hidden_shares
+from simharness.detector.viewing_conditions import BOX_SHARE, overlaps
 from simharness.scenario.sections.detector_section import BoxesSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility

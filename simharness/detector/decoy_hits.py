@@ -11,7 +11,6 @@ from scipy.special import ndtr
 from mvpose import COCO17
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
-from simharness.detector.conditions import BOX_SHARE
 from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.false_positives import (
@@ -24,6 +23,7 @@ from simharness.detector.false_positives import (
     project_upright,
 )
 from simharness.detector.steps import Context, StepStage, step
+from simharness.detector.viewing_conditions import BOX_SHARE
 from simharness.scenario.sections.detector_section import DecoyHitsSection
 from simharness.types.views import Views
 

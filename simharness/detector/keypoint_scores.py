@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from mvpose.arrays import Bools, Floats
-from simharness.detector.conditions import OUTSIDE, VISIBLE, Conditions
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import KeyedDraws, logistic
 from simharness.detector.steps import Context, StepStage, step
+from simharness.detector.viewing_conditions import OUTSIDE, VISIBLE, Conditions
 from simharness.scenario.sections.detector_section import CorrelationSection, ScoresSection
 from simharness.types.truth import KeypointError
 

@@ -20,7 +20,6 @@ from scipy.special import ndtr
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
 from simharness.detector.bias import pixel_offsets
-from simharness.detector.conditions import OCCLUDED, OUTSIDE, SELF_OCCLUDED, VISIBLE, Conditions
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import ErrorDraws, KeyedDraws
 from simharness.detector.error_classes import MIRROR, PAIRED, jitter_distance
@@ -29,6 +28,7 @@ from simharness.detector.reported import ReportedJoints, last_pixels
 from simharness.detector.scatter import Scatter
 from simharness.detector.steps import Context, StepStage, step
 from simharness.detector.view_geometry import bearings, image_axes
+from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE, SELF_OCCLUDED, VISIBLE, Conditions
 from simharness.scenario.sections.detector_section import BiasSection, CorrelationSection, KeypointsSection
 from simharness.types.sequence import Sequence
 from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError

@@ -8,9 +8,9 @@ import numpy as np
 
 from mvpose.networks import PoseHead, ReId
 from mvpose.networks.crops import Images
-from simharness.detector.conditions import oks_units
 from simharness.detector.detect import Detected
 from simharness.detector.error_classes import classify
+from simharness.detector.viewing_conditions import oks_units
 
 
 def read_keypoints(head: PoseHead, detected: Detected, images: Images) -> Detected:

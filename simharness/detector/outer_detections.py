@@ -27,11 +27,11 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.skeleton import Skeleton
 from mvpose.wholebody.estimator import rows_of
 from simharness.detector.bias import pixel_offsets
-from simharness.detector.conditions import BOX_SHARE, OUTSIDE, VISIBLE, occlusion_classes
 from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.scatter import Scatter
 from simharness.detector.steps import Context
 from simharness.detector.view_geometry import image_axes
+from simharness.detector.viewing_conditions import BOX_SHARE, OUTSIDE, VISIBLE, occlusion_classes
 from simharness.scenario.sections.detector_section import BiasSection
 from simharness.types.outer_joints import OuterTruth
 from simharness.types.truth import KeypointError

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
 from simharness.detector.bias import SIDE
-from simharness.detector.conditions import OCCLUDED, OUTSIDE, VISIBLE, Conditions
 from simharness.detector.draws import ErrorDraws, with_parents
 from simharness.detector.view_geometry import head_bearings
+from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE, VISIBLE, Conditions
 from simharness.scenario.sections.detector_section import (
     BEARINGS,
     KIND_OF_JOINT,

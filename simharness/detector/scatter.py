@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from mvpose import COCO17
 from mvpose.arrays import Floats
-from simharness.detector.conditions import VISIBLE
 from simharness.detector.draws import Key, KeyedDraws
+from simharness.detector.viewing_conditions import VISIBLE
 from simharness.scenario.sections.detector_section import CorrelationSection, KeypointsSection
 from simharness.types.truth import GOOD_BELOW
 

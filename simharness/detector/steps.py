@@ -32,9 +32,9 @@ from enum import IntEnum
 from functools import cached_property
 
 from mvpose.camera import Rig
-from simharness.detector.conditions import Conditions
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import KeyedDraws
+from simharness.detector.viewing_conditions import Conditions
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views

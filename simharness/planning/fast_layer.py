@@ -16,7 +16,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.camera import Camera
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.detector.conditions import VISIBLE, oks_units
+from simharness.detector.viewing_conditions import VISIBLE, oks_units
 from simharness.planning.camera_terms import CameraTerms, covariance, detect_in
 from simharness.planning.reconstruction import Reconstruction, reconstruct
 from simharness.planning.standing_people import ACTIVITIES, StandingScenes, pose_pool, standing_scenes

@@ -20,7 +20,7 @@ import numpy as np
 from mvpose import Camera
 from mvpose.arrays import Floats
 from mvpose.kernels import njit
-from simharness.detector.conditions import oks_units
+from simharness.detector.viewing_conditions import oks_units
 from simharness.planning.candidates import Candidate
 from simharness.planning.fast_layer import FastLayer
 from simharness.planning.planned_room import Room

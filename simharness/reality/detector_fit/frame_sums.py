@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Bools, Floats
-from simharness.detector.conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.detector.draws import GROSS, LIMB_OF_JOINT
 from simharness.detector.error_classes import MIRROR
+from simharness.detector.viewing_conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.reality.detector_fit.detector_sums import (
     BoneSums,
     DependenceSums,

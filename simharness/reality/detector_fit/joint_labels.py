@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from mvpose import Rig
 from mvpose.arrays import Bools, Floats
-from simharness.detector.conditions import OUTSIDE, OVERLAP_MIN, VISIBLE, oks_units, overlaps
 from simharness.detector.draws import PARENT
 from simharness.detector.error_classes import MIRROR, classify, distinguishable, opposite_hits
 from simharness.detector.view_geometry import head_bearings, image_axes
+from simharness.detector.viewing_conditions import OUTSIDE, OVERLAP_MIN, VISIBLE, oks_units, overlaps
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.association import Association, associate
 from simharness.reality.detector_fit.consensus import Consensus, find_consensus

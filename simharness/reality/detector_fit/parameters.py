@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import expit, logit, ndtr
 
 from mvpose.arrays import Floats
-from simharness.detector.conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
+from simharness.detector.viewing_conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.detector_sums import FrameSums
 from simharness.reality.detector_fit.frame_sums import BORDER, LOGITS, SCORED, TERCILES, lags

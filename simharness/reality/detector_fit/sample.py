@@ -11,7 +11,7 @@ from mvpose import COCO17, Detections, Rig
 from mvpose.arrays import Bools, Floats
 from mvpose.checks import as_array
 from mvpose.recording import People
-from simharness.detector.conditions import Conditions
+from simharness.detector.viewing_conditions import Conditions
 from simharness.reality.annotated_recording import AnnotatedRecording, DetectorKind
 from simharness.reality.people_tracks import LIMB_JOINTS, annotated
 from simharness.reality.reenactment import Film

@@ -9,7 +9,7 @@ import numpy as np
 
 from mvpose import COCO17, SHELF14, Detections
 from mvpose.arrays import Bools, Floats
-from simharness.detector.conditions import OCCLUDED, OUTSIDE
+from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.association import Association, associate
 from simharness.reality.detector_fit.occlusion import complete_face, in_picture, occlusion_classes, person_boxes

@@ -7,9 +7,9 @@ from scipy.stats import binom
 from mvpose import COCO17, Camera, Detections, Rig
 from mvpose.duplicates import Duplicates
 from simharness.detector.boxes import DUPLICATE_SCATTER, DUPLICATE_SCORE, UPPER_BODY, apply_box_errors
-from simharness.detector.conditions import BOX_SHARE, overlaps
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import LIMB_OF_JOINT, KeyedDraws
+from simharness.detector.viewing_conditions import BOX_SHARE, overlaps
 from simharness.scenario.sections.detector_section import BoxesSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility

@@ -7,8 +7,8 @@ import pytest
 from worlds import within, world
 
 from mvpose import preset
-from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
+from simharness.detector.viewing_conditions import Conditions
 from simharness.scenario.layers import PROFILES
 from simharness.scenario.load import load
 from simharness.scenario.presets import read_profile

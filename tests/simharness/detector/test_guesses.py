@@ -7,8 +7,8 @@ import pytest
 from worlds import find, standing, within, world
 
 from mvpose import COCO17
-from simharness.detector.conditions import Conditions
 from simharness.detector.guesses import BEARINGS, guess_places, pixels_per_metre, poses_in_pictures
+from simharness.detector.viewing_conditions import Conditions
 from simharness.types.truth import MISS_FROM, KeypointError
 from simharness.types.views import Visibility
 

@@ -8,7 +8,7 @@ from scipy.stats import chi
 from worlds import find, standing, within, world
 
 from mvpose import COCO17
-from simharness.detector.conditions import BOX_SHARE, Conditions, overlaps
+from simharness.detector.viewing_conditions import BOX_SHARE, Conditions, overlaps
 from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError
 from simharness.types.views import Visibility
 

@@ -5,8 +5,8 @@ import pytest
 from worlds import world
 
 from mvpose.wholebody import skeleton_by_name
-from simharness.detector.conditions import BOX_SHARE
 from simharness.detector.detect import detect
+from simharness.detector.viewing_conditions import BOX_SHARE
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.outer_joints import OuterTruth, OuterViews
 from simharness.types.truth import KeypointError

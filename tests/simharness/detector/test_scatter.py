@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from worlds import RATE, find, standing, world
 
-from simharness.detector.conditions import Conditions
+from simharness.detector.viewing_conditions import Conditions
 from simharness.types.truth import GOOD_BELOW
 from simharness.types.views import Visibility
 

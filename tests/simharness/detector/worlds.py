@@ -6,9 +6,9 @@ import numpy as np
 from scipy.stats import binom
 
 from mvpose import Camera, Rig
-from simharness.detector.conditions import Conditions
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.keypoints import find_keypoints
+from simharness.detector.viewing_conditions import Conditions
 from simharness.scenario.sections.detector_section import CorrelationSection, KeypointsSection
 from simharness.types.sequence import LANDMARKS, Sequence
 from simharness.types.views import Views, Visibility

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simharness.detector.conditions import VISIBLE
+from simharness.detector.viewing_conditions import VISIBLE
 from simharness.planning import Box, FastLayer, Volume
 from simharness.planning.camera_terms import covariance, expected_distance, information
 from simharness.planning.standing_people import APART, bearings_of, pose_pool, standing_scenes, taken_floor

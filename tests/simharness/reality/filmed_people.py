@@ -8,8 +8,8 @@ from mvpose import Detections, Rig
 from mvpose.commands.progress import Silence, Stages
 from mvpose.recording import People
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
+from simharness.detector.viewing_conditions import Conditions
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.sample import Sample
 from simharness.reality.reenactment import Film

@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 
 from mvpose import COCO17
 from simharness.detector.bias import pixel_offsets
-from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
 from simharness.detector.error_classes import MIRROR, classify, opposite_hits
+from simharness.detector.viewing_conditions import Conditions
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.truth import KeypointError
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from turning_people import PERSON, ring
 
-from simharness.detector.conditions import oks_units
+from simharness.detector.viewing_conditions import oks_units
 from simharness.reality.detector_fit.consensus import find_consensus
 
 DISTORTION = (0.115, -0.219, 0.0012, 0.0086, 0.113)  # of a webcam

@@ -1,6 +1,6 @@
 import numpy as np
 
-from simharness.detector.conditions import OUTSIDE, Conditions
+from simharness.detector.viewing_conditions import OUTSIDE, Conditions
 from simharness.reality.detector_fit import occlusion
 
 
