@@ -1,11 +1,11 @@
-"""Bundle adjustment: derivatives, an oracle, recovery of known errors, and what the prior decides."""
+"""Bundle adjustment: derivatives, an oracle, recovery of known errors, the prior, and errors about one person."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from moving_people import disturbed, film, walk
-from people import ring
+from people import look_at, ring
 from scipy.optimize import least_squares
 
 from mvpose import Rig
@@ -19,19 +19,27 @@ from mvpose.calibration.adjustment import (
     shared_joints,
 )
 from mvpose.calibration.calibration_prior import Prior, PriorWeights
+from mvpose.calibration.cameras import fit
 from mvpose.calibration.normal_equations import (
     CLOCK,
     FREEDOM,
     POSE,
+    _much_farther,
     changed,
     difference,
+    joint_views,
     normal_equations,
     with_errors,
 )
-from mvpose.calibration.sightings import Sightings, gather
+from mvpose.calibration.sightings import Sightings, gather, match_over_time, sightings_of
+from mvpose.calibration.tracklets import link
 from mvpose.skeleton import COCO17
 
 BENT = [-0.12, 0.02, 0.001, -0.001, 0.0]
+
+
+_PLACES = ((4.0, 0.3, 2.1), (1.0, 3.8, 1.6), (-3.3, 2.4, 2.6), (-2.6, -3.2, 1.9), (1.6, -4.1, 2.4))
+_VIEW = 1
 
 
 def sightings_of_points(rig, points, *, noise=1.0, sigma=4.0, seed=0, velocity=0.0):
@@ -268,3 +276,34 @@ def test_what_is_held_stays(filmed):
     assert not found.covariance[~free.ravel()].any()
     for view in (0, 1, 2, 4):
         np.testing.assert_array_equal(found.rig[view].P, wrong[view].P)
+
+
+def test_one_person_far_off_is_wrong_and_all_people_far_off_are_not():
+    off = np.array([[0.9, 12.0, np.nan], [1.1, 10.0, 20.0], [9.0, 14.0, np.nan]])
+    expected = np.zeros((3, 3), bool)
+    expected[2, 0] = True
+    np.testing.assert_array_equal(_much_farther(off), expected)
+
+
+def test_noise_is_not_wrong():
+    assert not _much_farther(np.array([[0.5], [3.9]])).any()
+
+
+@pytest.fixture(scope="module")
+def matched():
+    rig = Rig([look_at(np.array(place), np.array([0.1 * v, 0.0, 1.0])) for v, place in enumerate(_PLACES)])
+    frames, _ = film(rig, walk(3, frames=60, period=0.1), noise=3.0)
+    tracklets = link(rig, frames, period=0.1)
+    return rig, sightings_of(tracklets, match_over_time(rig, tracklets).person)
+
+
+@pytest.mark.parametrize(("affected", "found"), [("one person", []), ("everybody", [_VIEW])])
+def test_a_fault_is_one_for_everybody(matched, affected, found):
+    rig, sightings = matched
+    rows = sightings.view == _VIEW
+    if affected == "one person":
+        people, counts = np.unique(sightings.person[rows & sightings.shared], return_counts=True)
+        assert len(people) > 1
+        rows &= sightings.person == people[np.argmax(counts)]
+    joints, _ = joint_views(replace(sightings, pixels=sightings.pixels + 30.0 * rows[:, None]))
+    assert [each.fault.view for each in fit(rig.packed, joints).faults] == found

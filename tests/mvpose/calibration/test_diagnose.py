@@ -1,4 +1,4 @@
-"""The doctor on people who walk: the planted fault is named, and nothing where nothing is wrong."""
+"""The doctor on people who walk: planted faults are named, nothing where nothing is wrong, and what it cannot tell."""
 
 from dataclasses import replace
 
@@ -9,10 +9,14 @@ from people import look_at
 from scipy.spatial.transform import Rotation
 
 from mvpose import Detections, Rig
-from mvpose.calibration.diagnose import diagnose
+from mvpose.calibration import diagnose
 
 _FRAMES, _PERIOD = 60, 0.1
 _PLACES = ((4.0, 0.3, 2.1), (1.0, 3.8, 1.6), (-3.3, 2.4, 2.6), (-2.6, -3.2, 1.9), (1.6, -4.1, 2.4))
+
+
+_SPARSE_PERIOD = 0.1
+_SPARSE_PLACES = ((4.0, 0.3, 2.1), (1.0, 3.8, 1.6), (-3.3, 2.4, 2.6), (-2.6, -3.2, 1.9))
 
 
 def uneven(count):
@@ -164,3 +168,25 @@ def _with_view(frame, other, view):
     rest, taken = frame.select(frame.view != view), other.select(other.view == view)
     columns = [np.concatenate([getattr(rest, key), getattr(taken, key)]) for key in ("view", "keypoints", "scores")]
     return Detections.from_keypoints(*columns)
+
+
+def rig_of(count):
+    return Rig([look_at(_SPARSE_PLACES[v], (0.1 * v, 0.0, 1.0), name=f"c{v}") for v in range(count)])
+
+
+RECORDINGS = {
+    "two cameras": lambda: (rig_of(2), walk(2, frames=50, period=_SPARSE_PERIOD), None),
+    "different people": lambda: (rig_of(4), walk(4, frames=50, period=_SPARSE_PERIOD), [{v} for v in range(4)]),
+    "one person stands still": lambda: (rig_of(4), walk(1, frames=50, period=_SPARSE_PERIOD, still=True), None),
+}
+
+
+@pytest.mark.parametrize("degrees", [0.0, 1.0])
+@pytest.mark.parametrize("name", RECORDINGS)
+def test_the_doctor_cannot_tell(name, degrees):
+    rig, joints, only = RECORDINGS[name]()
+    frames, _ = film(rig, joints, noise=3.0, only=only)
+    diagnosis = diagnose(disturbed(rig, degrees, 0.05 * degrees, seed=3), frames, period=_SPARSE_PERIOD)
+    assert diagnosis.verdict == "cannot tell"
+    assert diagnosis.alarms == ()
+    assert any(each.kind == "cannot-tell" and each.camera is None and each.mend for each in diagnosis.findings)

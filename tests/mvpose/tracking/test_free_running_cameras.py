@@ -1,16 +1,23 @@
-"""Cameras that deliver one after the other: no frame shows anybody to two of them."""
+"""Times of pictures: cameras that deliver one after the other, and rows of a rolling shutter."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from people import ring
 from walking_people import film, identities, walking
 
 import mvpose
-from mvpose import Detections
+from mvpose import Detections, Rig, preset
 from mvpose.tracking import Tracker, track
 from mvpose.tracking.recent_pictures import RecentPictures
 
 PATHS = [(-0.9, -0.5, 0.9, 0.3), (0.9, 0.6, -0.8, -0.4), (0.0, 1.2, 0.3, -0.9)]
 RATE = 30.0
+
+
+ROLLING_PATHS = [(-1.0, -0.6, 2.0, 0.0), (1.0, 0.6, -2.0, 0.0)]
+READOUT = 0.03
 
 
 def _one_by_one(paths, times, **settings):
@@ -140,3 +147,50 @@ def test_a_tracker_restored_between_pictures_goes_on_with_the_same_bytes(middle)
         one, other = tracker.estimate(rig, part), restored.estimate(rig, part)
         assert one.joints.tobytes() == other.joints.tobytes()
         assert one.ids.tobytes() == other.ids.tobytes()
+
+
+def _seen(camera, time, readout):
+    """Pixels of the joints of people, each at the time of its row, (n, 17, 2)."""
+    joints = walking(time, paths=ROLLING_PATHS)
+    velocity = (walking(time + 1e-3, paths=ROLLING_PATHS) - walking(time - 1e-3, paths=ROLLING_PATHS)) / 2e-3
+    pixels = camera.project(joints)
+    for _ in range(5):
+        late = readout * ((pixels[..., 1] + 0.5) / camera.size[1] - 0.5)
+        pixels = camera.project(joints + late[..., None] * velocity)
+    return pixels
+
+
+def _rolling_error(rig, readout):
+    """Mean error of the joints after a while, metres."""
+    tracker, errors = Tracker(preset("fast")), []
+    for time in np.arange(20) / 25:
+        pixels = np.concatenate([_seen(camera, time, readout) for camera in rig])
+        view = np.repeat(np.arange(len(rig)), len(ROLLING_PATHS))
+        given = Detections.from_keypoints(view, pixels, np.full((len(view), 17), 0.9))
+        estimate = tracker.estimate(rig, replace(given, time=np.full(len(rig), time)))
+        assert estimate.ids.tolist() == [0, 1]
+        distance = np.linalg.norm(estimate.joints[:, None] - walking(time, paths=ROLLING_PATHS), axis=-1).mean(axis=-1)
+        errors.append(distance.min(axis=1).mean())
+    return np.mean(errors[10:])
+
+
+def test_a_known_readout_costs_little_and_an_unknown_one_much():
+    rig = ring(5)
+    rolling = Rig([replace(camera, readout=READOUT) for camera in rig])
+    whole, known, unknown = _rolling_error(rig, 0.0), _rolling_error(rolling, READOUT), _rolling_error(rig, READOUT)
+    assert known < whole + 0.15 * (unknown - whole)
+    assert unknown > 1.3 * whole
+
+
+def test_cameras_of_one_rig_may_differ():
+    rig = ring(5)
+    some = Rig([replace(camera, readout=READOUT * (k == 2)) for k, camera in enumerate(rig)])
+    assert _rolling_error(some, 0.0) > _rolling_error(
+        rig, 0.0
+    )  # a wrong readout of one camera moves its rays, and only its
+
+
+@pytest.mark.parametrize("readout", [-0.01, np.inf, np.nan])
+def test_a_readout_that_is_no_time_is_refused(readout):
+    with pytest.raises(ValueError, match="readout must be 0 s or more and finite"):
+        replace(ring(2)[0], readout=readout)
