@@ -16,6 +16,7 @@ ALONE = {
     "simharness render gathering --video --overlay truth,detections,estimates": PICTURES,
     "simharness render gathering --set sensor.profile=webcam --set sensor.jpeg=60": PICTURES,
     "simharness run passage": RAYS,
+    "simharness mjcf quickstart": SMALL_SCENE,
     "simharness scenarios": "",
     "simharness schema": "",
     "simharness show FILE": "",

@@ -18,11 +18,12 @@ from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.room_file import read_room
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.people_section import PeopleSection
+from simharness.scenario.sections.room_section import ClutterSection
 
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in FENCE.findall(page))
-    assert languages == {"python": 15, "toml": 12, "yaml": 1}
+    assert languages == {"python": 15, "toml": 13, "yaml": 1}
 
 
 def test_the_shares_of_the_face_are_valid():
@@ -30,6 +31,13 @@ def test_the_shares_of_the_face_are_valid():
     assert (
         DetectorSection.model_validate(tomllib.loads(block)).keypoints.face.ears[9] == 0.99
     )  # 270 degrees: the far side
+
+
+def test_objects_of_files_are_named_by_a_scenario():
+    (block,) = {block for block in blocks("toml") if "objects = [" in block}
+    assert (
+        len(ClutterSection.model_validate_json(json.dumps(tomllib.loads(block)["clutter"]), strict=True).objects) == 2
+    )
 
 
 def test_the_push_of_the_scenarios_is_valid():
