@@ -21,8 +21,7 @@ from pydantic import ValidationError
 from mvpose import Rig
 from mvpose.files.message_text import all_in_one_line, one_line
 from mvpose.formats.calibration.calibration_formats import read_calibration
-from mvpose.formats.detection_files import DetectionFiles
-from mvpose.formats.detection_formats import FORMATS as DETECTION_FORMATS
+from mvpose.formats.detections.recorded_frames import read_frames
 from mvpose.formats.joint_names import JointNames, to_shelf14
 from mvpose.formats.people.people_files import PeopleFiles
 from mvpose.formats.people.people_formats import FORMATS as PEOPLE_FORMATS
@@ -63,14 +62,13 @@ def read_recording(
         rig = _rig(place, keys.calibration)
     given = keys.detections
     with _key(file, "detections"):
-        detections = DETECTION_FORMATS[given.format](
-            DetectionFiles(
-                place / given.path,
-                tuple(camera.name for camera in rig),
-                frames,
-                given.first,
-                None if given.skeleton is None else given.skeleton.of(None),
-            )
+        detections = read_frames(
+            [camera.name for camera in rig],
+            place / given.path,
+            frames,
+            first=given.first,
+            format=given.format or None,
+            skeleton=None if given.skeleton is None else given.skeleton.of(None),
         )
     with _key(file, "truth"):
         people = _people(place, keys, frames)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
-from mvpose.formats.detection_formats import FORMATS as DETECTION_FORMATS
+from mvpose.formats.detections.detection_formats import FORMATS as DETECTION_FORMATS
 from mvpose.formats.joint_names import KNOWN, JointNames, known_skeleton
 from mvpose.formats.people.people_formats import readable
 from simharness.reality.annotated_recording import DetectorKind
@@ -100,9 +100,11 @@ class CalibrationKeys(Section):
 class DetectionKeys(Section):
     """[detections] of a recording."""
 
-    format: Annotated[str, _one_of(lambda: DETECTION_FORMATS)] = Field(description="format of the detections")
+    format: Annotated[str, _one_of(lambda: DETECTION_FORMATS)] = Field(
+        "", description="format of the detections; by default recognised by their content"
+    )
     path: Name = Field(description="folder of the detections, with a folder or file for each camera")
-    first: Whole = Field(0, description="frame number of the first file of each camera, of OpenPose")
+    first: Whole = Field(0, description="frame number of the first picture of each camera; not of COCO results")
     skeleton: SkeletonKey | None = Field(None, description="skeleton of the detections")
     kind: DetectorKind = Field("bottom-up", description="kind of the detector")
 

@@ -9,8 +9,6 @@ heat maps have no place in the format.
 
 from __future__ import annotations
 
-import os
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,8 +18,15 @@ from numpy.typing import ArrayLike
 
 from mvpose import COCO17, Detections
 from mvpose.arrays import Floats
-from mvpose.files.input_files import natural_order, read_json_object
-from mvpose.formats.detection_files import DetectionFiles
+from mvpose.files.input_files import read_json_object
+from mvpose.files.message_text import shown
+from mvpose.formats.detections.detection_file import (
+    DetectionFile,
+    DetectionFormat,
+    PicturePeople,
+    picture_people,
+    usual_skeleton,
+)
 from mvpose.formats.joint_names import BODY_25, KNOWN, JointNames, to_coco17
 from mvpose.skeleton import Skeleton
 
@@ -51,20 +56,30 @@ def read_people(path: str | Path, *, skeleton: JointNames = _BODY25) -> tuple[Fl
     people = read_json_object(path, what=_WHAT).get("people")
     if not isinstance(people, list):
         raise ValueError(f"{path}: no list 'people'; expected {_WHAT}")
-    keypoints, scores = to_coco17(*keypoints_of(path, people, skeleton), skeleton)
+    keypoints, scores = to_coco17(*_values(path, people, skeleton), skeleton)
     detected = (scores > 0).any(axis=1)
     return keypoints[detected], scores[detected]
 
 
-def keypoints_of(path: Path, people: Sequence[Any], skeleton: JointNames) -> tuple[Floats, Floats]:
-    """Return the keypoints (n, J, 2) and scores (n, J) of ``people`` in a file, on its own skeleton.
-
-    Raises:
-        ValueError: a person without keypoints of the skeleton; the message names the file.
-    """
+def _values(path: Path, people: Sequence[Any], skeleton: JointNames) -> tuple[Floats, Floats]:
+    """Return the keypoints (n, J, 2) and scores (n, J) of ``people`` in a file, on its own skeleton."""
     body = np.array([_keypoints(path, index, person, skeleton) for index, person in enumerate(people)])
     body = body.reshape(-1, len(skeleton), 3)
     return body[..., :2], body[..., 2]
+
+
+def _read(file: DetectionFile, skeleton: JointNames | None) -> dict[int, PicturePeople]:
+    """Read the people of a picture."""
+    people = file.object.get("people")
+    if not isinstance(people, list):
+        raise ValueError(f"{file.path}: people must be a list, got {shown(people)}")
+    if skeleton is None and people and isinstance(people[0], dict):
+        values = people[0].get("pose_keypoints_2d")
+        skeleton = usual_skeleton(file.path, len(values) // 3 if isinstance(values, list) else 0)
+    return {0: picture_people(file.path, *_values(file.path, people, skeleton or _BODY25), skeleton or _BODY25)}
+
+
+FORMAT = DetectionFormat("OpenPose", lambda file: "people" in file.object, _read, lambda file: "people" in file.object)
 
 
 def read_frame(paths: Sequence[str | Path], *, skeleton: JointNames = _BODY25) -> Detections:
@@ -86,59 +101,6 @@ def read_frame(paths: Sequence[str | Path], *, skeleton: JointNames = _BODY25) -
         np.concatenate([np.zeros((0, len(COCO17), 2)), *(keypoints for keypoints, _ in views)]),
         np.concatenate([np.zeros((0, len(COCO17))), *(scores for _, scores in views)]),
     )
-
-
-def read_detections(files: DetectionFiles) -> tuple[Detections, ...]:
-    """Read the requested frames from the folders ``path/CAMERA``.
-
-    The files of a folder, sorted by the numbers in their names, belong to consecutive frames from ``files.first`` on;
-    or, where there are as many as requested frames, which have gaps, to these in order.
-
-    Raises:
-        ValueError: a camera without folder or files, a requested frame without file, or a fault of a file.
-    """
-    paths = [_paths(files, camera) for camera in files.cameras]
-    skeleton = files.skeleton or _BODY25
-    return tuple(read_frame(of_frame, skeleton=skeleton) for of_frame in zip(*paths, strict=True))
-
-
-def _paths(files: DetectionFiles, camera: str) -> list[Path]:
-    """Return the file of a camera for each requested frame."""
-    folder = files.path / camera
-    paths = _files_of(folder)
-    rows = files.frames - files.first
-    if len(paths) == len(rows) <= rows.max():
-        return paths
-    if rows.min() < 0 or rows.max() >= len(paths):
-        outside = files.frames[(rows < 0) | (rows >= len(paths))]
-        raise ValueError(
-            f"{folder}: has {len(paths)} files, of frames {files.first} to {files.first + len(paths) - 1}, but frame "
-            f"{outside[0]} is requested; correct frames or first (the frame number of the first file)"
-        )
-    numbers = [int(found[-1]) for path in paths if (found := re.findall(r"\d+", path.stem))]
-    steps = np.diff(numbers)
-    if len(numbers) == len(paths) and steps.min(initial=2) == 1 < steps.max():
-        hole = int(np.flatnonzero(steps > 1)[0])
-        raise ValueError(
-            f"{folder}: expected a file for every frame, but {paths[hole].name} is followed by {paths[hole + 1].name}; "
-            "add the missing files: {'people': []} where nobody was detected"
-        )
-    return [paths[row] for row in rows]
-
-
-def _files_of(folder: Path) -> list[Path]:
-    parent = folder.parent
-    if not os.path.isdir(folder):
-        present = sorted(each.name for each in parent.iterdir() if each.is_dir()) if parent.is_dir() else []
-        has = f"{parent} has the folders {', '.join(present)}" if present else f"{parent} has no folders"
-        raise ValueError(
-            f"{folder}: no such folder; expected OpenPose files of the camera {folder.name!r}; {has}. "
-            "Name the folders as the cameras of the calibration, or select cameras"
-        )
-    paths = sorted(folder.glob("*.json"), key=natural_order)
-    if not paths:
-        raise ValueError(f"{folder}: has no *.json; expected {_WHAT}, one for each frame")
-    return paths
 
 
 def people_file(keypoints: ArrayLike, scores: ArrayLike, *, skeleton: Skeleton = COCO17) -> dict[str, Any]:

@@ -1,24 +1,50 @@
-"""Detections of a whole recording: the views of :mod:`.view_people`, joined frame by frame."""
+"""Detections of a whole recording: read camera by camera in any registered format, and joined frame by frame.
+
+The skeleton of files is that which is declared, or else the usual one with this number of joints. Everything becomes
+COCO-17, or stays on its skeleton where all joints are requested and :mod:`mvpose.wholebody` knows it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from mvpose.arrays import Floats, Integers
 from mvpose.detections import Detections
+from mvpose.files.input_files import file_numbers, natural_order
 from mvpose.files.message_text import listed
-from mvpose.formats.detections.sources import Assignment, assign, find_sources
-from mvpose.formats.detections.view_people import Picture, ViewPeople, read_view
-from mvpose.formats.joint_names import JointNames
+from mvpose.formats.detections.detection_file import USUAL, DetectionFile, DetectionFormat, PicturePeople, summary
+from mvpose.formats.detections.detection_formats import FORMATS, format_of, suffixes
+from mvpose.formats.detections.sources import Assignment, Source, assign, find_sources
+from mvpose.formats.joint_names import KNOWN, JointNames, to_coco17
 from mvpose.skeleton import COCO17, Skeleton
-from mvpose.wholebody import skeleton_by_name, with_body_boxes
+from mvpose.wholebody import known_names, skeleton_by_name, with_body_boxes
 
 MOST_FRAMES = 2_000_000
 """Largest number of frames of a recording: 11 hours at 50 Hz."""
+
+Numbering = Callable[[Sequence[int]], Mapping[int, int]]
+"""Function of the numbers of the pictures of a camera that returns the frame of each picture to be taken."""
+
+
+@dataclass(frozen=True)
+class ViewPeople:
+    """People of one camera.
+
+    Attributes:
+        source: where they were read.
+        pictures: by the number of the frame, increasing.
+        complete: whether pictures without people are among them.
+        kind: the format of the files: "OpenPose", "COCO", "MMPose" or "RTMLib".
+    """
+
+    source: Source
+    pictures: Mapping[int, PicturePeople]
+    complete: bool
+    kind: str
 
 
 @dataclass(frozen=True)
@@ -34,7 +60,7 @@ class RecordedFrames:
     """
 
     numbers: Integers
-    pictures: tuple[dict[int, Picture], ...]
+    pictures: tuple[dict[int, PicturePeople], ...]
     assignment: Assignment
     kinds: tuple[str, ...]
     skeleton: Skeleton = COCO17
@@ -102,7 +128,7 @@ def read_recording(
     for view in views:
         chosen = {number: picture for number, picture in view.pictures.items() if number in kept}
         if not view.complete:
-            chosen |= dict.fromkeys(kept - chosen.keys(), _NOBODY)
+            chosen |= dict.fromkeys(kept - chosen.keys(), PicturePeople.nobody())
         pictures.append(chosen)
     empty = [camera for camera, each in zip(cameras, pictures, strict=True) if not any(map(len, each.values()))]
     if empty:
@@ -113,7 +139,164 @@ def read_recording(
     return RecordedFrames(numbers, tuple(pictures), assignment, tuple(view.kind for view in views), joints)
 
 
-_NOBODY = Picture(np.zeros((0, 17, 2)), np.zeros((0, 17)), np.zeros((0, 4)), np.zeros(0))
+def read_frames(
+    cameras: Sequence[str],
+    folder: Path,
+    frames: Integers,
+    *,
+    first: int = 0,
+    format: str | None = None,
+    skeleton: JointNames | None = None,
+) -> tuple[Detections, ...]:
+    """Read some frames of a recording, on COCO-17 and without times.
+
+    Files that have the pictures without people, too, count the frames: in the order of their numbers, they belong to
+    consecutive frames from ``first`` on; or, where there are as many as requested frames, which have gaps, to these.
+    Files of other formats (COCO) state the number of each frame.
+
+    Args:
+        cameras: names of the V cameras, in the order of the rig; files or folders have these names.
+        folder: folder of the detections of all cameras, see :func:`mvpose.formats.detections.sources.find_sources`.
+        frames: numbers of the requested frames, (F,), increasing.
+        first: number of the frame of the first picture of each camera.
+        format: name of a registered format; None: by the content of the files.
+        skeleton: joints of the files; None: by their number.
+
+    Raises:
+        ValueError: files that are missing or faulty, a camera without files, or requested frames without a picture.
+    """
+    found = assign(cameras, find_sources([folder]), option="calibration.cameras")
+    if not found.by_name:
+        names = listed([each.name for each in found.sources])
+        raise ValueError(
+            f"{folder}: has detections of {names}, but the cameras are {listed(cameras)}; name the folders or files as "
+            "the cameras of the calibration"
+        )
+    views = []
+    for source in found.sources:
+
+        def numbering(numbers: Sequence[int], source: Source = source) -> Mapping[int, int]:
+            return _frame_of_pictures(source.path, numbers, frames, first)
+
+        views.append(read_view(source, skeleton=skeleton, format=format, numbering=numbering))
+        own = views[-1].pictures
+        if own and not own.keys() & set(frames.tolist()):
+            raise ValueError(
+                f"{source.path}: has frames {min(own)} to {max(own)}, none of the requested frames {frames[0]} to "
+                f"{frames[-1]}; expected the numbers of the frames"
+            )
+    nobody = PicturePeople.nobody()
+    return tuple(
+        _joined([view.pictures.get(number, nobody) for view in views], None, COCO17) for number in frames.tolist()
+    )
+
+
+def _frame_of_pictures(path: Path, numbers: Sequence[int], frames: Integers, first: int) -> dict[int, int]:
+    """Return the requested frame of each picture of a camera that has one, given the numbers of its pictures."""
+    rows = frames - first
+    if len(numbers) == len(rows) <= rows.max():
+        return dict(zip(numbers, frames.tolist(), strict=True))
+    if rows.min() < 0 or rows.max() >= len(numbers):
+        outside = frames[(rows < 0) | (rows >= len(numbers))]
+        raise ValueError(
+            f"{path}: has {len(numbers)} pictures, of frames {first} to {first + len(numbers) - 1}, but frame "
+            f"{outside[0]} is requested; correct frames or first (the frame number of the first picture)"
+        )
+    steps = np.diff(numbers)
+    if steps.min(initial=2) == 1 < steps.max():
+        hole = int(np.flatnonzero(steps > 1)[0])
+        raise ValueError(
+            f"{path}: expected people of every picture, but {numbers[hole]} is followed by {numbers[hole + 1]}; add "
+            "the missing ones: {'people': []} where nobody was detected"
+        )
+    return {numbers[row]: frame for row, frame in zip(rows.tolist(), frames.tolist(), strict=True)}
+
+
+def read_view(
+    source: Source,
+    *,
+    skeleton: JointNames | None = None,
+    all_joints: bool = False,
+    format: str | None = None,
+    numbering: Numbering = lambda numbers: dict(zip(numbers, numbers, strict=True)),
+) -> ViewPeople:
+    """Read the people of one camera, without those of whom no joint of COCO-17 was detected.
+
+    Args:
+        source: its folder or file.
+        skeleton: joints of the files; None: by their number.
+        all_joints: keep the joints beyond COCO-17.
+        format: name of a registered format; None: by the content of the files.
+        numbering: frames of the pictures; of formats whose files state the frames, not called.
+
+    Raises:
+        ValueError: a file that cannot be read, is of no known format, has an unknown number of joints, or scores that
+            are not 0..1; no picture at all; or all joints are requested of a skeleton that is not shipped.
+    """
+    chosen = None if format is None else FORMATS[format]
+    kinds = []
+    if source.path.is_dir():
+        found = (each for each in source.path.iterdir() if each.suffix.lower() in suffixes())
+        files = sorted(found, key=natural_order)
+        if not files:
+            raise ValueError(f"{source.path}: an empty folder; expected a *.json file for each picture")
+        paths = dict(sorted(zip(file_numbers(files), files, strict=True)))
+        pictures = {}
+        for number, frame in numbering(list(paths)).items():
+            people, kind = _of_picture(DetectionFile(paths[number]), chosen, skeleton)
+            pictures[frame] = people
+            kinds.append(kind)
+    else:
+        file = DetectionFile(source.path)
+        kinds = [chosen or format_of(file)]
+        read = dict(sorted(kinds[0].read(file, skeleton).items()))
+        frames = numbering(list(read)) if kinds[0].complete else dict(zip(read, read, strict=True))
+        pictures = {frame: read[number] for number, frame in frames.items()}
+    convert = _whole if all_joints else _body
+    shown = {number: convert(source.path, each) for number, each in sorted(pictures.items())}
+    return ViewPeople(source, shown, all(each.complete for each in kinds), kinds[-1].title)
+
+
+def _of_picture(
+    file: DetectionFile, chosen: DetectionFormat | None, skeleton: JointNames | None
+) -> tuple[PicturePeople, DetectionFormat]:
+    """Return the people in a file of one picture, and its format."""
+    known = FORMATS.values() if chosen is None else [chosen]
+    kind = next((each for each in known if each.of_picture(file)), None)
+    if kind is None:
+        got = summary(file.json) if file.json is not None else file.path.suffix
+        raise ValueError(f"{file.path}: expected the people of one picture, {{'people': [...]}}, got {got}")
+    ((_, people),) = kind.read(file, skeleton).items()
+    return people, kind
+
+
+def _body(_: Path, picture: PicturePeople) -> PicturePeople:
+    """Return a picture on COCO-17."""
+    keypoints, scores = to_coco17(picture.keypoints, picture.scores, picture.joints)
+    return _with_somebody(replace(picture, keypoints=keypoints, scores=scores, joints=KNOWN["coco17"]))
+
+
+def _whole(path: Path, picture: PicturePeople) -> PicturePeople:
+    """Return a picture on its own skeleton."""
+    joints = picture.joints
+    if joints.name not in KNOWN and joints.joints[:17] == COCO17.joints:
+        joints = USUAL.get(len(joints), joints)  # MMPose has other names for the points of hands and faces
+    if joints.name not in (*known_names(), "coco17"):
+        raise ValueError(
+            f"{path}: all joints of the skeleton {joints.name} are requested; expected one of "
+            f"{', '.join(known_names())}, or a TOML file that describes it; or take those of the body only"
+        )
+    scores = np.clip(np.nan_to_num(picture.scores), 0.0, 1.0)
+    keypoints = np.where(scores[..., None] > 0, picture.keypoints, np.nan)
+    return _with_somebody(replace(picture, keypoints=keypoints, scores=scores, joints=joints))
+
+
+def _with_somebody(picture: PicturePeople) -> PicturePeople:
+    """Return a picture without people of whom none of the 17 joints was detected."""
+    rows = picture.joints.rows(COCO17.joints)
+    some = (picture.scores[:, rows[rows >= 0]] > 0).any(axis=1)
+    parts = (picture.keypoints[some], picture.scores[some], picture.boxes[some], picture.box_scores[some])
+    return PicturePeople(*parts, picture.joints)
 
 
 def _joints(cameras: Sequence[str], views: Sequence[ViewPeople]) -> Skeleton:
@@ -164,17 +347,15 @@ def _frame_numbers(cameras: Sequence[str], views: Sequence[ViewPeople], frames: 
     return np.array(numbers, np.int64)
 
 
-def _joined(pictures: Sequence[Picture | None], times: Floats, skeleton: Skeleton) -> Detections:
+def _joined(pictures: Sequence[PicturePeople | None], times: Floats | None, skeleton: Skeleton) -> Detections:
     """Return the detections of one frame; a camera without picture has the time NaN."""
-    count = len(skeleton)
-    nobody = Picture(np.zeros((0, count, 2)), np.zeros((0, count)), np.zeros((0, 4)), np.zeros(0))
+    nobody = PicturePeople.nobody(len(skeleton))
     present = [each if each else nobody for each in pictures]
     view = np.repeat(np.arange(len(present)), [len(each) for each in present])
     keypoints = np.concatenate([each.keypoints for each in present])
     scores = np.concatenate([each.scores for each in present])
     spanned = with_body_boxes(view, keypoints, scores, skeleton=skeleton)
     boxes, box_scores = (np.concatenate([getattr(each, key) for each in present]) for key in ("boxes", "box_scores"))
-    time = np.where([each is None for each in pictures], np.nan, times)
     return Detections(
         spanned.view,
         spanned.keypoints,
@@ -182,5 +363,5 @@ def _joined(pictures: Sequence[Picture | None], times: Floats, skeleton: Skeleto
         np.where(np.isfinite(boxes).all(axis=1)[:, None], boxes, spanned.boxes),
         np.where(np.isfinite(box_scores), box_scores, spanned.box_scores),
         skeleton,
-        time=time,
+        time=None if times is None else np.where([each is None for each in pictures], np.nan, times),
     )

@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mvpose.files.input_files import natural_order, read_json
+from mvpose.files.input_files import natural_order
 from mvpose.files.message_text import listed, one_line
-
-SUFFIXES = (".json", ".npz")
-"""Endings of files of detections."""
+from mvpose.formats.detections.detection_file import DetectionFile
+from mvpose.formats.detections.detection_formats import FORMATS, suffixes
 
 _INSIDE = ("pose-sync", "pose", "predictions")  # folders of Pose2Sim's and MMPose's layouts that hold the detections
 _AFFIXES = re.compile(r"^(alphapose-results_|results_)|(_json|_keypoints|_predictions|_results|_detections)$")
@@ -60,7 +59,7 @@ def _below(path: Path) -> list[Source]:
     if not os.path.exists(path):
         raise ValueError(f"{name}: no such file or folder; expected detections: {_KINDS}")
     if not path.is_dir():
-        if path.suffix.lower() not in SUFFIXES:
+        if path.suffix.lower() not in suffixes():
             raise ValueError(f"{name}: expected detections, {_KINDS}; `mvpose detect` makes them of videos")
         return [_source(path)]
     files = _files(path)
@@ -80,19 +79,13 @@ def _below(path: Path) -> list[Source]:
 
 
 def _files(folder: Path) -> list[Path]:
-    return sorted((each for each in folder.iterdir() if each.suffix.lower() in SUFFIXES), key=natural_order)
+    return sorted((each for each in folder.iterdir() if each.suffix.lower() in suffixes()), key=natural_order)
 
 
-def _is_of_one_picture(file: Path) -> bool:
+def _is_of_one_picture(path: Path) -> bool:
     """Return whether a file holds the people of one picture, so that its folder holds those of one camera."""
-    if file.suffix.lower() != ".json":
-        return False
-    content = read_json(file, what=f"detections: {_KINDS}")
-    if isinstance(content, dict):
-        return "people" in content or "instances" in content
-    return (
-        isinstance(content, list) and bool(content) and isinstance(content[0], dict) and "keypoint_scores" in content[0]
-    )
+    file = DetectionFile(path)
+    return any(path.suffix.lower() in each.suffixes and each.of_picture(file) for each in FORMATS.values())
 
 
 def _source(path: Path) -> Source:
@@ -122,7 +115,9 @@ class Assignment:
         return f"detections of cameras, {how}: {pairs}{unused}"
 
 
-def assign(cameras: Sequence[str], sources: Sequence[Source], *, what: str = "detections") -> Assignment:
+def assign(
+    cameras: Sequence[str], sources: Sequence[Source], *, what: str = "detections", option: str = "--cameras"
+) -> Assignment:
     """Assign a source to each camera.
 
     Names count as equal if they are after the removal of upper case and punctuation; or if each contains the other's
@@ -132,6 +127,7 @@ def assign(cameras: Sequence[str], sources: Sequence[Source], *, what: str = "de
         cameras: names of the cameras.
         sources: what there is.
         what: what the sources hold, for messages.
+        option: option or key that selects cameras, for messages.
 
     Raises:
         ValueError: two sources that fit one camera, a camera without source, or, where no name fits, another number of
@@ -155,12 +151,12 @@ def assign(cameras: Sequence[str], sources: Sequence[Source], *, what: str = "de
         lacking = listed([camera for camera in cameras if camera not in exact])
         raise ValueError(
             f"no {what} for the camera {lacking}: the {what} are called {names}; add them, rename them as the "
-            f"cameras of the calibration, or select cameras: --cameras {','.join(exact)}"
+            f"cameras of the calibration, or select cameras: {option} {','.join(exact)}"
         )
     if len(sources) != len(cameras):
         raise ValueError(
             f"the calibration has {len(cameras)} cameras, {listed(cameras)}, but there are {what} of "
-            f"{len(sources)}, {names}; name folders or files as the cameras, or select cameras: --cameras NAME,NAME"
+            f"{len(sources)}, {names}; name folders or files as the cameras, or select cameras: {option} NAME,NAME"
         )
     return Assignment(tuple(sources), by_name=False)
 

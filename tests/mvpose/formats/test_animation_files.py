@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose import COCO17, preset
 from mvpose.formats.calibration.voxelpose import read_calibration
-from mvpose.formats.detection_files import DetectionFiles
-from mvpose.formats.detections.openpose import read_detections
+from mvpose.formats.detections.recorded_frames import read_frames
 from mvpose.formats.joint_names import canonical
 from mvpose.formats.people import FORMATS, Export, Options
 from mvpose.recording import People
@@ -271,7 +270,7 @@ def test_bvh_of_real_people_on_shelf(shared_data):
     folder = shared_data / "shelf"
     rig = read_calibration(folder / "calibration_shelf.json", size=(1032, 776))
     cameras = tuple(camera.name for camera in rig)
-    frames = read_detections(DetectionFiles(folder / "openpose", cameras, np.arange(100)))
+    frames = read_frames(cameras, folder / "openpose", np.arange(100))
     people = People.of_estimates(preset("track").track(rig, frames))
     files = dict(FORMATS["bvh"].write(Export(people, Options())))
     distances = []

@@ -253,7 +253,7 @@ class TestRegistry:
     def test_unknown_formats_and_missing_packages_are_found_before_anything_is_written(self, tmp_path):
         with pytest.raises(ValueError, match="unknown format 'fbx' of people; expected one of parquet, json"):
             write_people(recording(), tmp_path / "out", formats=["trc", "fbx"])
-        register("odd", PeopleFormat(FORMATS["trc"].write, "x", ("no_such_package",), "mvpose[odd]"))
+        register("odd", PeopleFormat("x", FORMATS["trc"].write, requires=("no_such_package",), install="mvpose[odd]"))
         try:
             with pytest.raises(ValueError, match=r"needs the package no_such_package, .* pip install 'mvpose\[odd\]'"):
                 check_formats(["odd"])

@@ -15,7 +15,7 @@ from lab_files import (
     write_rtmlib_arrays,
 )
 
-from mvpose.formats.detections.recorded_frames import read_recording
+from mvpose.formats.detections.recorded_frames import read_frames, read_recording
 from mvpose.formats.detections.sources import Source, assign, find_sources
 
 NAMES = ["cam0", "cam1", "cam2", "cam3"]
@@ -55,6 +55,16 @@ class TestLayouts:
             np.testing.assert_allclose(detections.scores, 0.9)
             assert (detections.box_scores <= 1).all()
             np.testing.assert_allclose(detections.time, frame / 25.0)
+
+    @pytest.mark.parametrize("write", LAYOUTS)
+    def test_some_frames_of_every_layout(self, tmp_path, write):
+        _, _, pixels = filmed(frames=11)
+        write(tmp_path / "lab", NAMES, pixels)
+        wanted = np.array([2, 3, 10])
+        for frame, detections in zip(wanted, read_frames(NAMES[1:], tmp_path / "lab", wanted), strict=True):
+            assert detections.view.tolist() == [0, 0, 1, 1, 2, 2]
+            np.testing.assert_allclose(detections.keypoints.reshape(3, 2, 17, 2), pixels[frame][1:], atol=1e-9)
+            assert detections.time is None
 
     def test_boxes_of_all_layouts_span_the_keypoints(self, tmp_path):
         _, _, pixels = filmed(frames=2)

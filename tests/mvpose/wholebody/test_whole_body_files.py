@@ -89,7 +89,7 @@ class TestReading:
     def test_skeletons_that_differ_or_are_not_shipped(self, tmp_path):
         *_, pixels = filmed(skeleton_by_name("halpe26"), frames=2)
         write_mmpose(tmp_path / "odd", pixels, [*COCO17.joints[:16], "foot", *(f"point-{k}" for k in range(9))])
-        with pytest.raises(ValueError, match=r"cam0.json: all joints of the skeleton cam0 are asked for; expected one"):
+        with pytest.raises(ValueError, match=r"cam0.json: all joints of the skeleton cam0 are requested; expected one"):
             read_recording(NAMES, [tmp_path / "odd"], all_joints=True)
         write_mmpose(tmp_path / "mixed", pixels)
         content = json.loads((tmp_path / "mixed" / "cam2.json").read_text())

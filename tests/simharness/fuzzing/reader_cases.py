@@ -21,8 +21,7 @@ from test_store import make_record
 
 from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
 from mvpose.formats.calibration.calibration_formats import read_calibration
-from mvpose.formats.detection_files import DetectionFiles
-from mvpose.formats.detection_formats import FORMATS as DETECTIONS
+from mvpose.formats.detections.recorded_frames import read_frames
 from mvpose.formats.people import FORMATS, PeopleFiles, write_people
 from mvpose.networks import Session
 from mvpose.recording import People
@@ -71,7 +70,13 @@ def calibration(file, write):
 def write_detections(folder, kind):
     person = np.c_[np.arange(25.0), np.arange(25.0), np.full(25, 0.5)].ravel().tolist()
     for camera in ("a", "b"):
-        if kind == "openpose":
+        if kind == "mmpose":
+            instance = {"keypoints": np.ones((17, 2)).tolist(), "keypoint_scores": [0.5] * 17, "bbox": [[1, 2, 30, 40]]}
+            frames = [{"frame_id": 0, "instances": [instance, instance]}]
+            (folder / f"{camera}.json").write_text(json.dumps(frames))
+        elif kind == "rtmlib":
+            np.savez(folder / f"{camera}.npz", keypoints=np.ones((2, 3, 17, 2)), scores=np.full((2, 3, 17), 0.5))
+        elif kind == "openpose":
             (folder / camera).mkdir()
             (folder / camera / "0.json").write_text(
                 json.dumps({"version": 1.3, "people": [{"pose_keypoints_2d": person}] * 2})
@@ -85,7 +90,7 @@ def detections(file, kind):
     return ReaderCase(
         file,
         lambda folder: write_detections(folder, kind),
-        lambda folder: DETECTIONS[kind](DetectionFiles(folder, ("a", "b"), np.array([0]))),
+        lambda folder: read_frames(("a", "b"), folder, np.array([0])),
     )
 
 
@@ -204,6 +209,8 @@ CASES = {
     "Pose2Sim TOML": calibration("c.toml", lambda folder: pose2sim.write_calibration(folder / "c.toml", RIG)),
     "OpenPose people": detections("b/0.json", "openpose"),
     "COCO results": detections("b.json", "coco"),
+    "MMPose predictions": detections("b.json", "mmpose"),
+    "RTMLib arrays": detections("b.npz", "rtmlib"),
     "MATLAB truth": joints(
         "actors-mat",
         "gt.mat",

@@ -9,6 +9,8 @@ from mvpose import COCO17, SHELF14, Camera, Rig
 from mvpose.formats.calibration.panoptic import write_calibration as write_panoptic
 from mvpose.formats.calibration.voxelpose import write_calibration as write_voxelpose
 from mvpose.formats.joint_names import BODY_25
+from mvpose.formats.people import Options, write_people
+from mvpose.recording import People
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.reality.recording_file import find_recording, read_recording, shipped_recordings
 from simharness.scenario.toml_files import dumps_keys
@@ -146,6 +148,41 @@ class TestDetections:
         given = {"format": "coco", "path": "coco", "first": None}
         assert_detections(read_recording(described(folder, detections=given)))
 
+    @pytest.mark.parametrize("form", ["mmpose", "rtmlib", "arrays"])
+    @pytest.mark.parametrize("named", [True, False])
+    def test_every_format_of_detections_is_read_named_or_not(self, folder, form, named):
+        """These files count the pictures: those of the recording's frames 10 to 21."""
+        (folder / "found").mkdir()
+        for view, camera in enumerate(CAMERAS):
+            keypoints, scores = np.zeros((12, 1, 17, 2)), np.zeros((12, 1, 17))
+            rows = np.array(FRAMES) - 10
+            keypoints[rows, 0], scores[rows] = PIXELS[:, view], 0.7
+            frames = [{"keypoints": k.tolist(), "scores": s.tolist()} for k, s in zip(keypoints, scores, strict=True)]
+            if form == "mmpose":
+                frames = [
+                    {
+                        "frame_id": k,
+                        "instances": [{"keypoints": each["keypoints"][0], "keypoint_scores": each["scores"][0]}],
+                    }
+                    for k, each in enumerate(frames)
+                ]
+            if form == "arrays":
+                np.savez(folder / "found" / f"{camera}.npz", keypoints=keypoints, scores=scores)
+            else:
+                (folder / "found" / f"{camera}.json").write_text(json.dumps(frames))
+        kind = {"arrays": "rtmlib"}.get(form, form) if named else None
+        assert_detections(read_recording(described(folder, detections={"format": kind, "path": "found"})))
+
+    @pytest.mark.parametrize("kind", ["json", "parquet", "csv", "npz", "trc", "c3d"])
+    def test_people_of_every_format_are_truth(self, folder, kind):
+        joints = RNG.normal(size=(12, 2, 14, 3))
+        people = People(np.arange(12) / 30.0, [0, 1], joints, skeleton=SHELF14)
+        options = Options(up="z")
+        paths = write_people(people, folder / "truth", formats=[kind], options=options)
+        truth = {"format": kind, "file": [f"truth/{path.name}" for path in paths], "first": 10}
+        recording = read_recording(described(folder, truth=truth))
+        np.testing.assert_allclose(recording.truth, joints[np.array(FRAMES) - 10], atol=1e-4)
+
     def test_a_declared_skeleton(self, folder):
         names = [f"j{k}" for k in range(25)]
         declared = {
@@ -166,18 +203,18 @@ class TestDetections:
     def test_a_missing_file_is_not_overlooked(self, folder):
         (folder / "openpose" / "00_01" / "image_5.json").unlink()
         (folder / "openpose" / "00_01" / "image_12.json").write_text('{"people": []}')
-        with pytest.raises(ValueError, match=r"image_4\.json is followed by image_6\.json"):
+        with pytest.raises(ValueError, match=r"00_01: expected people of every picture, but 4 is followed by 6"):
             read_recording(described(folder))
 
     @pytest.mark.parametrize(
         ("detections", "message"),
         [
-            ({"path": "nowhere"}, r"nowhere/00_00: no such folder"),
+            ({"path": "nowhere"}, r"nowhere: no such file or folder; expected detections"),
             (
                 {"first": 11},
-                r"00_00: has 12 files, of frames 11 to 22, but frame 10 is requested; correct frames or first",
+                r"00_00: has 12 pictures, of frames 11 to 22, but frame 10 is requested; correct frames or first",
             ),
-            ({"first": 9}, r"00_00: has 12 files, of frames 9 to 20, but frame 21 is requested"),
+            ({"first": 9}, r"00_00: has 12 pictures, of frames 9 to 20, but frame 21 is requested"),
             ({"skeleton": "coco18"}, r"image_0\.json: .* must be 54 numbers \(coco18\), got 75"),
             ({"skeleton": {"map": {"nose": "N"}}}, r"give skeleton the names: \{ joints = "),
         ],
@@ -188,7 +225,9 @@ class TestDetections:
 
     def test_a_camera_without_detections_is_named(self, folder):
         (folder / "openpose" / "00_01").rename(folder / "openpose" / "cam1")
-        with pytest.raises(ValueError, match=r"00_01: no such folder; .* has the folders 00_00, 00_02, cam1"):
+        with pytest.raises(
+            ValueError, match=r"no detections for the camera 00_01: the .* are called 00_00, 00_02, cam1"
+        ):
             read_recording(described(folder))
 
 

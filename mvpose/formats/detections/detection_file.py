@@ -1,0 +1,192 @@
+"""Files of detections of one camera: their content, the people in a picture, and what a format is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.arrays import Floats
+from mvpose.files.archives import arrays_of
+from mvpose.files.input_files import read_bytes, read_json
+from mvpose.files.message_text import listed, shown
+from mvpose.formats.joint_names import KNOWN, JointNames
+
+USUAL = {
+    len(KNOWN[name]): KNOWN[name] for name in ("coco17", "coco18", "body25", "halpe26", "wholebody133", "halpe136")
+}
+"""Skeleton by its number of joints, where none is declared."""
+
+WHAT = "detections of one camera: OpenPose, COCO or AlphaPose results, MMPose predictions or RTMLib arrays"
+"""Expected content of a file, for messages."""
+
+_GREATEST_SCORE = 2.0  # heat maps and SimCC overshoot 1, mostly by a few per cent; 2 is a visible joint of COCO
+
+
+@dataclass(frozen=True)
+class PicturePeople:
+    """People in one picture.
+
+    Attributes:
+        keypoints: (n, J, 2), pixels; NaN where missing.
+        scores: (n, J), 0 to 1; 0 where missing.
+        boxes: x, y, width, height, (n, 4), pixels; NaN in the row of a person without box.
+        box_scores: (n,), 0 to 1; NaN for a person without one.
+        joints: the J joints.
+    """
+
+    keypoints: Floats
+    scores: Floats
+    boxes: Floats
+    box_scores: Floats
+    joints: JointNames = KNOWN["coco17"]
+
+    def __len__(self) -> int:
+        return len(self.scores)
+
+    @classmethod
+    def nobody(cls, joints: int = 17) -> PicturePeople:
+        """Return an empty picture."""
+        return cls(np.zeros((0, joints, 2)), np.zeros((0, joints)), np.zeros((0, 4)), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class DetectionFile:
+    """A file of detections of unknown format. Its content is parsed at most once, when a format looks at it."""
+
+    path: Path
+
+    @cached_property
+    def content(self) -> bytes:
+        """All bytes of the file.
+
+        Raises:
+            ValueError: the file does not exist or cannot be read.
+        """
+        return read_bytes(self.path, what=WHAT)
+
+    @cached_property
+    def json(self) -> Any:
+        """The JSON value of a file ``*.json``; None for others.
+
+        Raises:
+            ValueError: no such file, or no JSON.
+        """
+        return read_json(self.path, what=WHAT) if self.path.suffix.lower() == ".json" else None
+
+    @cached_property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """The arrays ``keypoints`` and ``scores`` of a file ``*.npz``; none for others.
+
+        Raises:
+            ValueError: no such file, or a damaged one.
+        """
+        if self.path.suffix.lower() != ".npz":
+            return {}
+        try:
+            return arrays_of(self.content, only=("keypoints", "scores"))
+        except ValueError as error:
+            raise ValueError(f"{self.path}: {error}; expected the arrays keypoints and scores") from None
+
+    @property
+    def entries(self) -> list[dict[str, Any]]:
+        """The objects of a JSON list; none if it is another value."""
+        return self.json if isinstance(self.json, list) and all(isinstance(each, dict) for each in self.json) else []
+
+    @property
+    def object(self) -> dict[str, Any]:
+        """The JSON object; empty if the content is another value."""
+        return self.json if isinstance(self.json, dict) else {}
+
+
+@dataclass(frozen=True)
+class DetectionFormat:
+    """Format of detections of one camera.
+
+    Attributes:
+        title: name in messages: "OpenPose".
+        recognises: test of a file.
+        read: reader: people by the number of the picture, on the skeleton of the file, given the declared one or None.
+        of_picture: test whether a recognised file holds one picture; its folder then holds those of one camera.
+        complete: whether pictures without people are in the files, too, so that they count the frames.
+        suffixes: endings of files.
+    """
+
+    title: str
+    recognises: Callable[[DetectionFile], bool]
+    read: Callable[[DetectionFile, JointNames | None], Mapping[int, PicturePeople]]
+    of_picture: Callable[[DetectionFile], bool] = lambda file: False
+    complete: bool = True
+    suffixes: tuple[str, ...] = (".json",)
+
+
+def picture_people(
+    where: object, keypoints: Any, scores: Any, skeleton: JointNames | None, boxes: Any = None, box_scores: Any = None
+) -> PicturePeople:
+    """Return the people of one picture, given the values of a file.
+
+    Args:
+        where: file and place in it, for messages.
+        keypoints: (n, J, 2), pixels.
+        scores: (n, J).
+        skeleton: the J joints; None: by their number.
+        boxes: (n, 4), pixels; None: none has a box.
+        box_scores: (n,); None: none has one.
+
+    Raises:
+        ValueError: no numbers, other shapes, an unknown number of joints, or scores that are not about 0 to 1.
+    """
+    try:
+        keypoints, scores = np.asarray(keypoints, float), np.asarray(scores, float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{where}: keypoints and scores must be numbers, (n, J, 2) and (n, J)") from None
+    if not keypoints.size and not scores.size:
+        return PicturePeople.nobody()
+    if keypoints.ndim != 3 or keypoints.shape[2] != 2 or scores.shape != keypoints.shape[:2]:
+        raise ValueError(
+            f"{where}: keypoints must be (n, J, 2) and scores (n, J), got {keypoints.shape} and {scores.shape}"
+        )
+    names = skeleton or usual_skeleton(where, keypoints.shape[1])
+    if len(names) != keypoints.shape[1]:
+        raise ValueError(f"{where}: has {keypoints.shape[1]} joints, but skeleton {names.name} has {len(names)}")
+    if np.nanmax(scores) > _GREATEST_SCORE:  # those slightly above 1 are clipped later
+        raise ValueError(
+            f"{where}: scores must lie in 0..1, got {np.nanmax(scores):.6g}; divide per cent by 100, take the sigmoid "
+            "of logits"
+        )
+    boxes = np.full((len(scores), 4), np.nan) if boxes is None else np.asarray(boxes, float).reshape(-1, 4)
+    box_scores = np.full(len(scores), np.nan) if box_scores is None else np.asarray(box_scores, float)
+    bad = ~np.isfinite(boxes).all(axis=1) | (boxes[:, 2:] < 0).any(axis=1)
+    return PicturePeople(keypoints, scores, np.where(bad[:, None], np.nan, boxes), box_scores, names)
+
+
+def usual_skeleton(where: object, joints: int) -> JointNames:
+    """Return the skeleton with a number of joints.
+
+    Raises:
+        ValueError: none is known.
+    """
+    if joints not in USUAL:
+        known = listed([f"{name.name} ({count})" for count, name in USUAL.items()])
+        raise ValueError(f"{where}: has {joints} joints a person; expected {known}, or a --skeleton by its name")
+    return USUAL[joints]
+
+
+def summary(content: Any) -> str:
+    """Return the kind and the keys of a JSON value, for messages."""
+    if isinstance(content, dict):
+        return f"an object with {_keys(content)}"
+    if not isinstance(content, list):
+        return f"{shown(content)}, no object or list"
+    if content and isinstance(content[0], dict):
+        return f"a list of objects with {_keys(content[0])}"
+    return f"a list that begins with {shown(content[0])}" if content else "an empty list"
+
+
+def _keys(content: Mapping[str, Any]) -> str:
+    return f"the keys {listed(list(content))}" if content else "no keys"
