@@ -88,11 +88,12 @@ def render(
 
 def _facts(record: Record) -> list[tuple[str, str]]:
     scenario = record.scenario
-    things = (*scenario.clutter.model_dump(exclude={"coverage"}).values(), *scenario.decoys.model_dump().values())
+    counts = scenario.clutter.model_dump(exclude={"coverage", "objects"}) | scenario.decoys.model_dump()
+    objects = len(scenario.clutter.objects) + sum(counts.values())
     return [
         ("people", f"{scenario.people.count}"),
         ("cameras", f"{len(record.rig)} × {record.rig[0].size[0]}×{record.rig[0].size[1]}"),
-        ("objects", f"{sum(things)}"),
+        ("objects", f"{objects}"),
         ("detector", "a pose head" if scenario.detector.onnx else scenario.detector.name),
         ("frames", f"{len(record.time)} at {scenario.rate:g} Hz"),
         ("detections", f"{sum(map(len, record.detections))}"),
