@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mvpose import Detections, Estimate, Matching
-from simharness.outputs.run.page import joint_errors, person_errors, render
+from simharness.outputs.run.page import _facts, joint_errors, person_errors, render
 from simharness.outputs.run.result_folder import score_table
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.people_section import PeopleSection
@@ -101,3 +101,8 @@ def test_text_of_the_user_is_escaped():
     page = render(make_record(description="<script>alert(1)</script> & more"))
     assert "<script>" not in page
     assert "&lt;script&gt;" in page
+
+
+def test_objects_of_kinds_and_of_files_are_counted():
+    clutter = {"boxes": 2, "objects": ("sofa.obj",)}
+    assert ("objects", "4") in _facts(make_record(clutter=clutter, decoys={"posters": 1}))
