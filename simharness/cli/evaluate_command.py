@@ -223,7 +223,7 @@ def _estimator(name: str, *, lag: float, period: float) -> Estimator:
 
 def _write(summary: dict[str, Any], path: Path, *, seeds: Iterable[int], variants: Iterable[str], start: float) -> None:
     """Write a summary with its provenance; keys of the summary itself take precedence."""
-    from simharness.trial.provenance import provenance
+    from simharness.trial.identity import provenance
 
     seconds = perf_counter() - start
     made = provenance(command=PROGRAM.command_line(), seeds=seeds, variants=variants, seconds=seconds)

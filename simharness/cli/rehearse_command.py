@@ -113,7 +113,7 @@ def rehearse(
         from simharness.outputs.planning.rehearsal_page import render_rehearsal
         from simharness.planning.rehearse_rig import RehearsalEffort, rehearse_rig
         from simharness.planning.rig_file import read_rig
-        from simharness.trial.provenance import provenance
+        from simharness.trial.identity import provenance
 
         room = _room(surroundings)
         corners = None if room is None else (*(2 * room.space.bounds[1]).tolist(), room.space.height)

@@ -81,7 +81,7 @@ def validate(
         from simharness.reality.validation.validation import QUICK, ValidationPlan
         from simharness.reality.validation.validation import validate as compare
         from simharness.reality.validation.validation_summary import summarize_halves, summarize_validation
-        from simharness.trial.provenance import provenance
+        from simharness.trial.identity import provenance
 
         plan = replace(QUICK if quick else ValidationPlan(), workers=workers or os.cpu_count() or 1)
         count = twins or (_QUICK_TWINS if quick else _TWINS)

@@ -33,7 +33,7 @@ from simharness.scenario.sections.cameras_section import FaultsSection
 from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.matching import count_groups
 from simharness.scoring.pcp import Part
-from simharness.trial.conditions import ConditionedTrial, estimate_frames
+from simharness.trial.conditioned_trial import ConditionedTrial, estimate_frames
 from simharness.trial.stages.build_trial import Trial, exposures_of
 from simharness.trial.stages.simulation import DetectedSequence
 from simharness.world.scene.build import Scene

@@ -17,7 +17,7 @@ from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.matching import count_violations
 from simharness.scoring.score_summary import VariantScores, summarize
 from simharness.scoring.tracking.identity_figures import tracking_of_some
-from simharness.trial.conditions import estimate_frames
+from simharness.trial.conditioned_trial import estimate_frames
 
 FILES = "files"
 """Name of the people of files in an evaluation."""

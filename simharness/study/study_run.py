@@ -21,9 +21,8 @@ from simharness.study.study_plan import PlannedTrial, plan
 from simharness.study.tables import tables
 from simharness.study.trial_store import Entry, EntryState, Store, StoreError
 from simharness.trial.archive import TrialArchive
-from simharness.trial.identity import code
+from simharness.trial.identity import code, provenance
 from simharness.trial.needs import require_memory
-from simharness.trial.provenance import provenance
 from simharness.trial.stages.estimators import estimators_of
 
 

@@ -1,4 +1,4 @@
-"""Identities of results: hashes of everything that determines a result.
+"""Identities of results, hashes of everything that determines a result, and their provenance: command and machine.
 
 A trial is a scenario at a seed. Its results are made in steps, and each step has an identity:
 
@@ -27,7 +27,9 @@ import hashlib
 import importlib.metadata
 import json
 import os
-from dataclasses import dataclass
+import platform
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +38,7 @@ import simharness
 from mvpose.formats.calibration.camera_folder import calibration_files
 from mvpose.formats.people.people_formats import people_files
 from simharness.runtime.code_digest import digest_of_folders
+from simharness.runtime.version import code_version
 from simharness.scenario.sections.scenario import FILE_KEYS, Scenario
 from simharness.trial.stages.estimators import sources_of
 from simharness.world.scene.objects.object_files import object_dependencies
@@ -65,6 +68,9 @@ FAILURES_ALONE = ("scoring/failure_classes.py", "scoring/stage_blame.py")
 
 FAILURES = ("types", "scoring/pairing.py", *FAILURES_ALONE)
 """Folders and modules of ``simharness`` that find failures and the stage of the method to blame."""
+
+PROVENANCE = ("command", "seeds", "variants", "code", "digests", "versions", "machine", "seconds")
+"""The keys of :func:`provenance`."""
 
 _SIZE = 16  # bytes of a digest, so that no two trials share one by chance
 
@@ -143,6 +149,43 @@ def estimator_code(place: str) -> str:
     source, _, attribute = place.rpartition(":")
     sources = {name: hashlib.blake2b(text).hexdigest() for name, text in sources_of(place).items()}
     return _digest({"place": [Path(source).name, attribute], "sources": sources})
+
+
+def provenance(*, command: str | None, seeds: Iterable[int], variants: Iterable[str], seconds: float) -> dict[str, Any]:
+    """Return the provenance of a result, ready for JSON.
+
+    Args:
+        command: command line of the user.
+        seeds: seeds of the scenes; empty for recorded data.
+        variants: variants of the method.
+        seconds: duration of the run.
+
+    Returns:
+        The arguments, and ``code`` (version), ``digests`` (of the code: simulation, method, scores, failures),
+        ``versions`` (of packages), ``machine``.
+    """
+    return {
+        "command": command,
+        "seeds": list(seeds),
+        "variants": list(variants),
+        "code": code_version(),
+        "digests": asdict(code()),
+        "versions": {"python": platform.python_version(), **versions()},
+        "machine": {"system": platform.platform(), "processor": platform.machine(), "cpus": os.cpu_count()},
+        "seconds": seconds,
+    }
+
+
+def provenance_sentence(provenance: Mapping[str, Any]) -> str:
+    """Return a sentence with the code, the libraries and the machine that made a result.
+
+    Args:
+        provenance: keys of :func:`provenance`.
+    """
+    digests = ", ".join(f"{name} {digest[:8]}" for name, digest in provenance["digests"].items())
+    versions = ", ".join(f"{name} {version}" for name, version in provenance["versions"].items())
+    machine = provenance["machine"]
+    return f"Code {provenance['code']} ({digests}) with {versions}; {machine['processor']}, {machine['cpus']} cores."
 
 
 def _files(scenario: Scenario) -> dict[str, list[Path]]:

@@ -11,7 +11,7 @@ from mvpose.commands.errors import RunError
 from simharness.cli import app
 from simharness.reality.recording_file import read_recording
 from simharness.scenario.presets import read_profile
-from simharness.trial.provenance import PROVENANCE
+from simharness.trial.identity import PROVENANCE
 
 QUICKSTART = str(Path(__file__).parents[2] / "scenarios" / "quickstart.toml")
 TINY = [

@@ -15,7 +15,7 @@ import pytest
 from simharness.outputs.study.digest import SCORED, markdown
 from simharness.runtime.version import code_version
 from simharness.scenario.load import load, load_study
-from simharness.trial.provenance import PROVENANCE
+from simharness.trial.identity import PROVENANCE
 from tools.paper_tables.tables import INPUTS, paper_tables, read_inputs
 from tools.paper_tables.text import markdown as paper_text
 

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from simharness.cli import app
 from simharness.reality.published_scores import ABLATION, COMPARISON
-from simharness.trial.provenance import PROVENANCE, provenance
+from simharness.trial.identity import PROVENANCE, provenance
 from tools.paper_tables.__main__ import main
 from tools.paper_tables.tables import INPUTS, VARIANTS, paper_tables, read_inputs, write_tables
 from tools.paper_tables.text import markdown

@@ -17,7 +17,7 @@ from typing import Any
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.presets import NEED_DESCRIPTORS
 from simharness.reality.published_scores import ABLATION, COMPARISON
-from simharness.trial.provenance import PROVENANCE
+from simharness.trial.identity import PROVENANCE
 from tools.paper_tables.text import markdown
 
 VARIANTS = ("full", "appearance", "geometry", "no-3dps", "no-matching", "hungarian", "fast")

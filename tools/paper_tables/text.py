@@ -8,7 +8,7 @@ from typing import Any
 from mvpose.commands.progress import duration
 from mvpose.report.tables import markdown_table
 from simharness.runtime.number_text import fixed, signed
-from simharness.trial.provenance import provenance_sentence
+from simharness.trial.identity import provenance_sentence
 
 _DATA = {"campus": "Campus", "shelf": "Shelf"}
 _OF = {

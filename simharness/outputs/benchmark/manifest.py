@@ -13,7 +13,7 @@ from mvpose.wholebody import skeleton_by_name
 from simharness.outputs.benchmark.joint_confidences import CONFIDENCES
 from simharness.outputs.benchmark.layout import BODIES, FORMAT, PEOPLE, PICTURES
 from simharness.scenario.sections.scenario import Scenario
-from simharness.trial.provenance import provenance
+from simharness.trial.identity import provenance
 from simharness.trial.stages.build_trial import Trial
 from simharness.world.humans.population import is_child
 from simharness.world.motion.choreography import roles

@@ -28,7 +28,7 @@ from simharness.outputs.planning.rig_view_3d import rig_view_3d
 from simharness.planning.rehearsal_result import HEIGHTS, Estimated, ExtraCamera, Rehearsal
 from simharness.runtime.number_text import fixed, signed
 from simharness.statistics.intervals import Interval
-from simharness.trial.provenance import provenance_sentence
+from simharness.trial.identity import provenance_sentence
 
 _LAYER, _SIMULATION, _GEOMETRY = "fast layer", "simulation", "geometry"
 _WORST_MM, _BEST_MM = 100.0, 15.0  # ends of the colours of joint errors
@@ -42,7 +42,7 @@ def render_rehearsal(rehearsal: Rehearsal, *, provenance: Mapping[str, Any]) -> 
 
     Args:
         rehearsal: the rehearsal.
-        provenance: keys of :func:`simharness.trial.provenance.provenance`.
+        provenance: keys of :func:`simharness.trial.identity.provenance`.
 
     Returns:
         A self-contained HTML document.

@@ -24,7 +24,7 @@ from simharness.outputs.study.page import THRESHOLDS
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval, mean_interval
 from simharness.study.study_folder import Results
-from simharness.trial.provenance import PROVENANCE
+from simharness.trial.identity import PROVENANCE
 
 SCORED = tuple(dict.fromkeys(HEADS + PRINTED))
 _OVER_TIME = tuple(dict.fromkeys((*HEADS_OVER_TIME, *tables.OVER_TIME)))  # where a variant tracks people
@@ -65,7 +65,7 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
     """Return the numbers of a study, JSON-ready; means come with the ends of their 95 % intervals over seeds.
 
     Returns:
-        The keys of :data:`simharness.trial.provenance.PROVENANCE`, where ``seconds`` is the sum over all trials, and:
+        The keys of :data:`simharness.trial.identity.PROVENANCE`, where ``seconds`` is the sum over all trials, and:
         ``means`` by variant, and ``cases`` with such means by case; ``factors`` with the scores at every value, and
         with the keys that these are means over; ``breaking`` points; ``by_case`` with factors and breaking points of
         each case separately, while the ones above pool all cases; ``failures``, see

@@ -14,7 +14,7 @@ from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import AP_MM, SCORES, ScoreInfo
 from simharness.scoring.failure_classes import FailureKind
 from simharness.scoring.stage_blame import Stage
-from simharness.trial.provenance import provenance_sentence
+from simharness.trial.identity import provenance_sentence
 
 HEADS = ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts")
 """Scores of the first table of a digest."""

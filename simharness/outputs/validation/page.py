@@ -18,7 +18,7 @@ from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.validation import Validation
 from simharness.reality.validation.verdicts import BOUNDS, VerdictState
 from simharness.runtime.number_text import fixed
-from simharness.trial.provenance import provenance_sentence
+from simharness.trial.identity import provenance_sentence
 
 _HEADS = {"voxelpose": "VoxelPose", "2019": "2019"}
 _RATIOS = (
@@ -33,7 +33,7 @@ def render_validation(validation: Validation, *, provenance: Mapping[str, Any], 
 
     Args:
         validation: the validation.
-        provenance: keys of :func:`simharness.trial.provenance.provenance`.
+        provenance: keys of :func:`simharness.trial.identity.provenance`.
         fitted_on: name of the recording to which the twins were fitted; empty: the same.
 
     Returns:

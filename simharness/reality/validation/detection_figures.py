@@ -8,18 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mvpose import COCO17, SHELF14, Detections
 from mvpose.affinity import FusedAffinity
 from mvpose.arrays import Bools, Floats
 from mvpose.rays import viewing_rays
+from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.detector_fit.sample import LIMB_JOINTS
+from simharness.reality.detector_fit.association import Association, associate
+from simharness.reality.detector_fit.occlusion import complete_face, in_picture, occlusion_classes, person_boxes
+from simharness.reality.detector_fit.sample import LIMB_JOINTS, Sample
 from simharness.reality.validation.evidence import Compared, compared
-from simharness.reality.validation.shown_people import ShownPeople, people_detections, shown_people
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS
 from simharness.statistics.resampling import resampled
 
@@ -45,6 +48,7 @@ AFFINITY_EDGES = np.linspace(0.0, 1.0, 21)
 AMBIGUOUS = 0.5
 """Affinity from which the method may match two detections."""
 
+_OF_SHELF14 = [SHELF14.index(COCO17.joints[joint]) for joint in LIMB_JOINTS]
 _EARS = slice(3, 5)
 _MAD_TO_DEVIATION = 1.4826  # of a normal distribution
 _IN_PICTURE = 0.5  # share of a person's limb joints on the picture, from which a detection is expected
@@ -104,6 +108,33 @@ class DetectionFigures:
         return result | {f"score.q{100 * q:.0f}": each for q, each in zip(_SCORE_QUANTILES, self.scores, strict=True)}
 
 
+@dataclass(frozen=True)
+class ShownPeople:
+    """Detections of a recording by the annotated person whom they show.
+
+    Attributes:
+        recording: the recording.
+        reference: limb joints of the actors, COCO-17, (F, A, 17, 3) metres; NaN where not annotated, and in the face.
+        association: detections by actor.
+        triangulated: joints of the actors, the points nearest to the rays of all views, each of equal weight,
+            (F, A, 17, 3) metres; NaN with fewer than two views. They are not robust on purpose: they show gross errors.
+        inside: which joints lie on the pictures, (F, V, A, 17).
+        behind: which of these are hidden by another person, (F, V, A, 17).
+    """
+
+    recording: AnnotatedRecording
+    reference: Floats
+    association: Association
+    triangulated: Floats
+    inside: Bools
+    behind: Bools
+
+    @property
+    def annotated(self) -> Bools:
+        """Which actors are annotated, (F, A)."""
+        return cast(Bools, np.isfinite(self.reference[:, :, LIMB_JOINTS, 0]).all(axis=-1))
+
+
 def measure_detections(recording: AnnotatedRecording) -> DetectionFigures:
     """Measure the detections of a recording; see :class:`DetectionFigures`."""
     shown = shown_people(recording)
@@ -140,6 +171,26 @@ def compare_detections(
         key: compared(value, resamples.get(key, np.array([np.nan])), [twin[key] for twin in of_twins])
         for key, value in values.items()
     }
+
+
+def shown_people(recording: AnnotatedRecording) -> ShownPeople:
+    """Find out whom the detections show, by the distance of their limb joints from those of the truth.
+
+    A person with some unknown limb joints counts as not annotated.
+    """
+    reference = np.full((*recording.truth.shape[:2], len(COCO17), 3), np.nan)
+    reference[:, :, LIMB_JOINTS] = recording.truth[:, :, _OF_SHELF14]
+    reference[~np.all(np.isfinite(reference[:, :, LIMB_JOINTS]), axis=(2, 3))] = np.nan
+    rig = recording.rig
+    pixels = np.stack([camera.project(reference) for camera in rig], axis=1)
+    sample = Sample(recording.name, rig, np.arange(len(recording)) / recording.rate, reference, recording.detections)
+    association = associate(sample, pixels, person_boxes(reference, rig))
+    triangulated = _triangulate(recording, association)
+    joints, normals = complete_face(reference, association.consensus)
+    classes = occlusion_classes(joints, normals, association.unannotated, rig)
+    known = np.all(np.isfinite(joints), axis=-1)[:, None]
+    inside = in_picture(joints, rig) & known & (classes != OUTSIDE)
+    return ShownPeople(recording, reference, association, triangulated, inside, inside & (classes == OCCLUDED))
 
 
 def bone_variation(lengths: Floats) -> Floats:
@@ -232,3 +283,24 @@ def _bone_lengths(joints: Floats) -> Floats:
     ends = np.array(list(BONES.values()))  # (4, 2 sides, 2 ends)
     lengths = np.linalg.norm(joints[:, :, ends[..., 0]] - joints[:, :, ends[..., 1]], axis=-1)
     return 1000.0 * np.swapaxes(lengths, 2, 3)
+
+
+def people_detections(association: Association, frame: int) -> tuple[Detections, np.ndarray]:
+    """Return the detections of annotated people in a frame, and the actor of each, (m,)."""
+    view, actor = np.nonzero(association.detected[frame])
+    keypoints, scores = association.keypoints[frame, view, actor], association.scores[frame, view, actor]
+    return Detections.from_keypoints(view, keypoints, scores), actor
+
+
+def _triangulate(recording: AnnotatedRecording, association: Association) -> Floats:
+    """Return the points nearest to the rays of all views, in the sense of least squares, (F, A, 17, 3) metres."""
+    rig = recording.rig
+    rays = np.stack([camera.rays(association.keypoints[:, view]) for view, camera in enumerate(rig)], axis=1)
+    reported = np.all(np.isfinite(rays), axis=-1)
+    rays = np.where(reported[..., None], rays, 0.0)
+    across = np.where(reported[..., None, None], np.eye(3) - rays[..., :, None] * rays[..., None, :], 0.0)
+    matrix, target = across.sum(axis=1), np.einsum("fvajxy,vy->fajx", across, rig.centers)
+    enough = reported.sum(axis=1) >= 2
+    result = np.full(target.shape, np.nan)
+    result[enough] = np.linalg.solve(matrix[enough], target[enough][..., None])[..., 0]
+    return result

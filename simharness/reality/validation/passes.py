@@ -17,7 +17,7 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.validation.score_sums import ScoreSums
 from simharness.runtime.frame_pool import map_frames
 from simharness.scoring.frame_scores import ByRule, score_by_rules
-from simharness.trial.conditions import estimate_frames
+from simharness.trial.conditioned_trial import estimate_frames
 
 VARIANTS = ("full", "fast", "no-3dps", "no-matching")
 """Presets of :class:`mvpose.Pipeline` that a validation compares."""

@@ -16,10 +16,9 @@ from simharness.scoring.pairing import pair
 from simharness.scoring.score_registry import ScoreInfo, ScoreInput, scores
 from simharness.scoring.tracking.clear_mot import clear_mot
 from simharness.scoring.tracking.hota import hota
-from simharness.scoring.tracking.identity_scores import identity_scores
+from simharness.scoring.tracking.identity_scores import identity_scores, pose_figures
 from simharness.scoring.tracking.motion_scores import rms_jerk, velocity_error
 from simharness.scoring.tracking.tracked_frames import DISTANCES, PLACES, TrackedFrames, ids_of, tracked_frames
-from simharness.scoring.tracking.tracked_poses import pose_figures
 
 Figures = dict[str, float | None]
 Summary = dict[str, Any]

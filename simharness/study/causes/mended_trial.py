@@ -14,7 +14,7 @@ from simharness.scoring.assessment import assess
 from simharness.scoring.stage_blame import true_labels
 from simharness.study.causes.cause_catalogue import Cause, causes_by_name
 from simharness.trial.audit import audit
-from simharness.trial.conditions import ConditionedTrial, estimate_frames, takes_labels
+from simharness.trial.conditioned_trial import ConditionedTrial, estimate_frames, takes_labels
 from simharness.trial.run_trial import with_variants
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.estimation import EstimateFrames

@@ -17,7 +17,7 @@ from simharness.outputs.study.digest import PRINTED, curves, digest, markdown, w
 from simharness.scoring.catalogue import SCORES
 from simharness.scoring.failure_classes import FailureKind
 from simharness.scoring.stage_blame import Stage
-from simharness.trial.provenance import PROVENANCE
+from simharness.trial.identity import PROVENANCE
 
 SVG = "{http://www.w3.org/2000/svg}"
 COUNTS = [2, 3, 5]

@@ -22,7 +22,7 @@ from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.rehearse_rig import RehearsalEffort, rehearse_rig
 from simharness.planning.rig_file import read_rig
 from simharness.scenario.presets import read_profile
-from simharness.trial.provenance import provenance
+from simharness.trial.identity import provenance
 from simharness.types.floor import Volume
 
 pytestmark = pytest.mark.slow

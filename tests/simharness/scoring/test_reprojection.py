@@ -5,7 +5,7 @@ import pytest
 from recordings import record, ring, walk
 
 from mvpose import Camera, Rig
-from simharness.scoring.reprojection import reprojection_errors
+from simharness.scoring.assessment import reprojection_errors
 from simharness.types.recording import Recording
 from simharness.types.views import Visibility
 

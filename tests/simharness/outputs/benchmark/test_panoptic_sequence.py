@@ -23,7 +23,7 @@ from simharness.scenario.load import load
 from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.room_section import RoomSection
-from simharness.trial.provenance import PROVENANCE
+from simharness.trial.identity import PROVENANCE
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import picture_source_of
 from simharness.types.views import Visibility

@@ -9,9 +9,8 @@ from turning_people import joints_of, walkers
 from mvpose import Detections
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.reality.recording_file import read_recording
-from simharness.reality.validation.detection_figures import BONES, bone_variation, measure_detections
+from simharness.reality.validation.detection_figures import BONES, bone_variation, measure_detections, shown_people
 from simharness.reality.validation.passes import annotated
-from simharness.reality.validation.shown_people import shown_people
 
 
 def changed(recording, change):

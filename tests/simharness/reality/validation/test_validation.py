@@ -21,7 +21,7 @@ from simharness.reality.validation.validation import ValidationPlan, validate
 from simharness.reality.validation.validation_summary import summarize_validation
 from simharness.reality.validation.verdicts import VerdictState
 from simharness.scenario.toml_files import dumps_keys
-from simharness.trial.provenance import provenance
+from simharness.trial.identity import provenance
 
 PLAN = ValidationPlan(twin_every=1, draws=2, detection_draws=1, variants=("full", "fast"))
 TWINS = 2

@@ -8,7 +8,7 @@ from mvpose.skeleton import COCO17
 from simharness.scenario.load import load
 from simharness.scenario.sections.cameras_section import FaultsSection
 from simharness.scoring.stage_blame import true_labels
-from simharness.trial.conditions import ConditionedTrial, estimate_frames
+from simharness.trial.conditioned_trial import ConditionedTrial, estimate_frames
 from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.build_trial import build_trial
 from simharness.types.views import Visibility
