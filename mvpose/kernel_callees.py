@@ -12,11 +12,13 @@ import contextlib
 from collections.abc import Iterator
 from typing import Any
 
-from numba.core.codegen import CPUCodeLibrary
-from numba.core.cpu import CPUContext
-from numba.core.dispatcher import Dispatcher, _FunctionCompiler
+from numba.core import codegen, cpu, dispatcher
 
 __all__ = ["callees_linked", "is_callee", "under_way"]
+
+_code: Any = codegen.CPUCodeLibrary
+_context: Any = cpu.CPUContext
+_functions: Any = dispatcher
 
 _MARK = "_only_linked"  # attribute of numba's libraries of callees
 
@@ -25,7 +27,7 @@ _kernels: list[Any] = []  # compiler of the kernel that is under way, if any
 
 def is_callee(compiled: Any) -> bool:
     """Return whether a result of numba's compiler is code of a callee, which Python cannot call."""
-    return getattr(compiled.library, _MARK, False)
+    return bool(getattr(compiled.library, _MARK, False))
 
 
 def under_way() -> bool:
@@ -40,8 +42,9 @@ def callees_linked(kernel: Any) -> Iterator[None]:
     Args:
         kernel: numba's dispatcher of the kernel. The caller holds numba's lock of compilation.
     """
-    customize, make_executable = _FunctionCompiler._customize_flags, CPUContext.get_executable
-    emit, add = CPUCodeLibrary._finalize_final_module, Dispatcher.add_overload
+    compilers, dispatchers = _functions._FunctionCompiler, _functions.Dispatcher
+    customize, make_executable = compilers._customize_flags, _context.get_executable
+    emit, add = _code._finalize_final_module, dispatchers.add_overload
 
     def without_wrapper(compiler: Any, flags: Any) -> Any:
         flags = customize(compiler, flags)
@@ -65,18 +68,18 @@ def callees_linked(kernel: Any) -> Iterator[None]:
         library._verify_declare_only_symbols()
         library._finalized = True
 
-    def add_overload(dispatcher: Any, compiled: Any) -> None:
+    def add_overload(callee: Any, compiled: Any) -> None:
         if is_callee(compiled):
-            dispatcher.overloads[tuple(compiled.signature.args)] = compiled
+            callee.overloads[tuple(compiled.signature.args)] = compiled
         else:
-            add(dispatcher, compiled)
+            add(callee, compiled)
 
     _kernels.append(kernel._compiler)
-    _FunctionCompiler._customize_flags, CPUContext.get_executable = without_wrapper, executable
-    CPUCodeLibrary._finalize_final_module, Dispatcher.add_overload = finalize, add_overload
+    compilers._customize_flags, _context.get_executable = without_wrapper, executable
+    _code._finalize_final_module, dispatchers.add_overload = finalize, add_overload
     try:
         yield
     finally:
         _kernels.clear()
-        _FunctionCompiler._customize_flags, CPUContext.get_executable = customize, make_executable
-        CPUCodeLibrary._finalize_final_module, Dispatcher.add_overload = emit, add
+        compilers._customize_flags, _context.get_executable = customize, make_executable
+        _code._finalize_final_module, dispatchers.add_overload = emit, add
