@@ -143,11 +143,6 @@ def covariance(total: Floats) -> Floats:
     return (vectors * inverse[..., None, :]) @ np.swapaxes(vectors, -1, -2)
 
 
-def expected_distance(covariance_: Floats) -> Floats:
-    """Return the root mean square distance of joints from the truth, metres, (...)."""
-    return np.sqrt(np.trace(covariance_, axis1=-2, axis2=-1))
-
-
 def _independent(detector: DetectorSection) -> DetectorSection:
     """Return a profile without correlation in time, because the scenes are far apart."""
     lives = {"life": 0.0, "scatter_life": 0.0}

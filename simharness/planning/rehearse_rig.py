@@ -28,7 +28,6 @@ from simharness.planning.scene_results import Condition, SceneResult, interval_o
 from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
 from simharness.planning.tolerance import fault_conditions, tolerances
 from simharness.reality.validation.subsets import camera_subsets
-from simharness.statistics.intervals import Interval
 from simharness.world.rigs.extra_camera import cameras_on_walls
 
 T = TypeVar("T")
@@ -37,7 +36,6 @@ _SPACING = 0.5  # metres between the places of the maps
 _COARSE = 1.0  # metres between places where sets of cameras are compared
 _COARSE_TURNS = 12  # directions in which people stand there
 _VARIANT = "full"  # of the method
-_UNKNOWN = Interval(np.nan, np.nan, np.nan, 0)
 
 
 @dataclass(frozen=True)
@@ -256,13 +254,8 @@ class _Rehearsing:
 
     def _estimated(self, scenes: Sequence[SceneResult], cameras: tuple[int, ...], prediction: Prediction) -> Estimated:
         summary, condition = prediction.summary(), Condition(cameras)
-        return Estimated(
-            summary["pcp"].mean,
-            summary["mpjpe_mm"].mean,
-            interval_of(scenes, condition, "pcp"),
-            interval_of(scenes, condition, "mpjpe_mm"),
-            interval_of(scenes, condition, "recall"),
-        )
+        simulated = (interval_of(scenes, condition, score) for score in ("pcp", "mpjpe_mm", "recall"))
+        return Estimated(summary["pcp"].mean, summary["mpjpe_mm"].mean, *simulated)
 
     def _worth(self, k: int, sees: float, scenes: Sequence[SceneResult], compared: _Compared) -> CameraWorth:
         rest, base = Condition(self._without(k)), Condition(self.whole)
@@ -294,19 +287,12 @@ class _Rehearsing:
 
     def _crowds(self, simulated: Mapping[int, Sequence[SceneResult]], compared: _Compared) -> tuple[Crowd, ...]:
         """Return the figures by number of people."""
-        crowds = []
+        crowds, whole = [], Condition(self.whole)
         for number, prediction in compared.crowds.items():
-            summary, of = prediction.summary(), simulated.get(number)
-            crowds.append(
-                Crowd(
-                    number,
-                    summary["pcp"].mean,
-                    summary["mpjpe_mm"].mean,
-                    _mean(prediction.risk),
-                    None if of is None else interval_of(of, Condition(self.whole), "pcp"),
-                    None if of is None else interval_of(of, Condition(self.whole), "mixed"),
-                )
-            )
+            summary, scenes = prediction.summary(), simulated.get(number)
+            pcp, mixed = (None if scenes is None else interval_of(scenes, whole, key) for key in ("pcp", "mixed"))
+            risk = _mean(prediction.risk)
+            crowds.append(Crowd(number, summary["pcp"].mean, summary["mpjpe_mm"].mean, risk, pcp, mixed))
         return tuple(crowds)
 
 

@@ -84,7 +84,7 @@ class SightingOdds:
                 np.add.at(count, cells, chosen[here])
         return cls(_shrunk(counts[0], counts[2]), _shrunk(counts[1], counts[2]), layer.detector, int(counts[0].sum()))
 
-    def of(self, views: Views, camera: Camera) -> tuple[Floats, Floats, Floats]:
+    def in_camera(self, views: Views, camera: Camera) -> tuple[Floats, Floats, Floats]:
         """Return the odds of right and of false reports, and the deviation of right ones, pixels, all (S, Q, 17)."""
         state, bins, joints = views.visibility[:, 0], _bins(views), np.arange(17)
         keypoints = self.detector.keypoints
@@ -123,7 +123,7 @@ class Correction:
     power: float = 1.0
     error: float = 1.0
 
-    def of(self, maps: Maps) -> Maps:
+    def corrected(self, maps: Maps) -> Maps:
         """Return corrected figures."""
         lost = np.minimum(self.gain * np.maximum(100.0 - maps.pcp, 0.0) ** self.power, 100.0)
         return Maps(100.0 - lost, self.error * maps.error_mm, maps.seen)
@@ -162,7 +162,7 @@ class RigValue:
         """
         views = see(camera, self.layer.scenes, self.layer.obstacles)
         right, false, deviation = (
-            each.reshape(-1, 17)[self._present][:, _JOINTS] for each in self.odds.of(views, camera)
+            each.reshape(-1, 17)[self._present][:, _JOINTS] for each in self.odds.in_camera(views, camera)
         )
         ways = self._joints - camera.center
         distance = np.linalg.norm(ways, axis=-1)
@@ -221,7 +221,7 @@ class RigValue:
         error = np.divide(1000.0 * sums[:, 1], sums[:, 2], out=np.full(len(sums), np.nan), where=sums[:, 2] > 0)
         known = sums[:, 4] > 0
         maps = Maps((100.0 * sums[:, 0] / people)[known], error[known], (sums[:, 3] / people)[known])
-        return self._correction.of(maps)
+        return self._correction.corrected(maps)
 
     def _valued(self, maps: Maps) -> float:
         """Return the objective, 0 to 100, and a little of what guides the search where it is flat."""

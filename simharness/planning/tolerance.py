@@ -1,7 +1,7 @@
 """Tolerance of a rig: what errors of its calibration and its clocks cost, and where its cliff is.
 
 Errors of cameras are independent: a level is the standard deviation of the error of orientations about each axis, of
-positions along each axis, or of the clocks. The method is not told of them.
+positions along each axis, or of the clocks. The method does not know them.
 """
 
 from __future__ import annotations
