@@ -18,8 +18,8 @@ from simharness.detector.bias import world_offsets
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationModel
 from simharness.reality.detector_fit.fit import DetectorFit
+from simharness.reality.filmed_recording import Film, cut_takes, film
 from simharness.reality.people_tracks import actors_of
-from simharness.reality.reenactment import Film, cut_takes, film
 from simharness.scenario.sections.detector_section import DetectorSection
 
 MOST_FILMS = 3

@@ -34,8 +34,8 @@ from simharness.reality.detector_fit.detector_measurement import (
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.profile import as_toml, settings
 from simharness.reality.detector_fit.sample import Sample, sample_of
+from simharness.reality.filmed_recording import Film, film
 from simharness.reality.people_tracks import LIMB_JOINTS, track_people
-from simharness.reality.reenactment import Film, film
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
 
 _TWINS = 2  # simulated in each round of the calibration

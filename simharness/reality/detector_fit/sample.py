@@ -13,8 +13,8 @@ from mvpose.checks import as_array
 from mvpose.recording import People
 from simharness.detector.viewing_conditions import Conditions
 from simharness.reality.annotated_recording import AnnotatedRecording, DetectorKind
+from simharness.reality.filmed_recording import Film
 from simharness.reality.people_tracks import LIMB_JOINTS, annotated
-from simharness.reality.reenactment import Film
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import pytest
 from filmed_people import FilmedPeople, Reenacted, film_people
 
 from mvpose.recording import People
-from simharness.reality.reenactment import film
+from simharness.reality.filmed_recording import film
 
 
 @pytest.fixture(scope="session")

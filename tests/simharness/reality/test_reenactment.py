@@ -9,8 +9,8 @@ from turning_people import walkers
 
 from mvpose import Rig
 from mvpose.recording import People
+from simharness.reality.filmed_recording import cut_takes, film, floor_height
 from simharness.reality.people_tracks import LIMB_JOINTS, present
-from simharness.reality.reenactment import cut_takes, film, floor_height
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.views import Visibility
 
