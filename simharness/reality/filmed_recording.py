@@ -54,7 +54,7 @@ class Take:
 
 
 @dataclass(frozen=True)
-class Film:
+class FilmedRecording:
     """Simulated recording before any detector.
 
     People who are absent in a frame are outside of all pictures there.
@@ -92,7 +92,7 @@ class Film:
 
 def film(
     recording: AnnotatedRecording, people: People, *, seed: int, advance: Callable[[int], None] = lambda _: None
-) -> Film:
+) -> FilmedRecording:
     """Simulate and film a recording.
 
     Args:
@@ -129,7 +129,7 @@ def film(
         advance(1)
     source = np.broadcast_to(np.arange(frames)[:, None], (frames, views))
     sequence = Sequence(_waiting(landmarks, present), np.arange(count), np.arange(frames) / recording.rate, present)
-    return Film(sequence, Views(pixels, visibility, boxes, area, source), rig, floor)
+    return FilmedRecording(sequence, Views(pixels, visibility, boxes, area, source), rig, floor)
 
 
 def _waiting(landmarks: Floats, present: Bools) -> Floats:

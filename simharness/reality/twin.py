@@ -18,7 +18,7 @@ from simharness.detector.bias import world_offsets
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationModel
 from simharness.reality.detector_fit.fit import DetectorFit
-from simharness.reality.filmed_recording import Film, cut_takes, film
+from simharness.reality.filmed_recording import FilmedRecording, cut_takes, film
 from simharness.reality.people_tracks import actors_of
 from simharness.scenario.sections.detector_section import DetectorSection
 
@@ -43,7 +43,7 @@ class TwinModel:
     people: People
     detector: DetectorSection
     annotation: AnnotationModel
-    films: tuple[Film, ...] = ()
+    films: tuple[FilmedRecording, ...] = ()
 
     @classmethod
     def of(cls, recording: AnnotatedRecording, fitted: DetectorFit) -> Self:
@@ -70,7 +70,7 @@ def simulate_twins(model: TwinModel, *, count: int, reporter: Reporter | None = 
     return [detected_twin(model, films[seed % shown], seed=seed) for seed in range(count)]
 
 
-def detected_twin(model: TwinModel, filmed: Film, *, seed: int) -> AnnotatedRecording:
+def detected_twin(model: TwinModel, filmed: FilmedRecording, *, seed: int) -> AnnotatedRecording:
     """Return the twin of a recording from its film: detections and annotation are drawn from the seed."""
     recording = model.recording
     joints = np.full((len(recording), recording.people, len(COCO17), 3), np.nan)

@@ -34,7 +34,7 @@ from simharness.reality.detector_fit.detector_measurement import (
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.profile import as_toml, settings
 from simharness.reality.detector_fit.sample import Sample, sample_of
-from simharness.reality.filmed_recording import Film, film
+from simharness.reality.filmed_recording import FilmedRecording, film
 from simharness.reality.people_tracks import LIMB_JOINTS, track_people
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
 
@@ -76,7 +76,7 @@ class DetectorFit:
     real: MeasuredDetector
     annotation: AnnotationFit
     people: People
-    film: Film
+    film: FilmedRecording
     profile: DetectorSection
     text: str
 

@@ -13,7 +13,7 @@ from mvpose.checks import as_array
 from mvpose.recording import People
 from simharness.detector.viewing_conditions import Conditions
 from simharness.reality.annotated_recording import AnnotatedRecording, DetectorKind
-from simharness.reality.filmed_recording import Film
+from simharness.reality.filmed_recording import FilmedRecording
 from simharness.reality.people_tracks import LIMB_JOINTS, annotated
 
 
@@ -81,7 +81,7 @@ class Sample:
         return float(np.min(np.diff(self.time), initial=np.inf)) if len(self.time) > 1 else 1.0
 
 
-def sample_of(recording: AnnotatedRecording, people: People, film: Film | None = None) -> Sample:
+def sample_of(recording: AnnotatedRecording, people: People, film: FilmedRecording | None = None) -> Sample:
     """Return the sample of a recording: the joints of everyone in it, and its detections.
 
     The detections of people who are annotated are measured; where nobody is, those of everyone.

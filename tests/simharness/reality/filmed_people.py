@@ -12,7 +12,7 @@ from simharness.detector.detect import detect
 from simharness.detector.viewing_conditions import Conditions
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.sample import Sample
-from simharness.reality.filmed_recording import Film
+from simharness.reality.filmed_recording import FilmedRecording
 from simharness.scenario.load import load
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.trial.stages.build_trial import build_trial
@@ -63,7 +63,7 @@ class Reenacted:
 
     recording: AnnotatedRecording
     people: People
-    film: Film
+    film: FilmedRecording
 
 
 def film_people(*changes: str, duration: float = 8.0, seed: int = 0) -> FilmedPeople:
