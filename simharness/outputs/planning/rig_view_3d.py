@@ -37,13 +37,14 @@ def rig_view_3d(rehearsal: Rehearsal) -> View3D:
     if rehearsal.extra is not None:
         frusta.append(Piece3D(camera_pyramid(rehearsal.extra.camera, _REACH), PYRAMID, _EXTRA))
     room = _at(walls, 0.0)
+    floor = _floor(points)
     scene = Scene3D(
         label="The rig in 3D: frusta of the cameras, the volume, and the part of it that meets the target in green",
         center=np.array([*(points.min(axis=0) + points.max(axis=0)) / 2, height / 2]),
-        fitted=np.concatenate([rig.centers, _at(volume, 0.0), _at(volume, height), room]),
+        fitted=np.concatenate([rig.centers, _at(volume, height), *floor]),
         fixed=[
             *_tiles(rehearsal),
-            Piece3D.of_lines(_floor(points), _GRID),
+            Piece3D.of_lines(floor, _GRID),
             Piece3D(room, Shape3D(lines=loop(len(room))), _ROOM),
             *(Piece3D(each.corners[[0, 4, 6, 2, 1, 5, 7, 3]], prism(4), _OBSTACLE) for each in setup.obstacles),
             Piece3D(np.concatenate([_at(volume, 0.0), _at(volume, height)]), prism(len(volume)), _VOLUME),
