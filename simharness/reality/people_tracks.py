@@ -85,7 +85,7 @@ def track_people(recording: AnnotatedRecording) -> People:
     joints = np.stack([_filled(track, recording) for track, _ in merged], axis=1)
     others = itertools.count(recording.people)
     ids = [actor if actor >= 0 else next(others) for _, actor in merged]
-    return People(recording.time, ids, joints, numbers=recording.frames)
+    return People(recording.time, np.array(ids, np.int64), joints, numbers=recording.frames)
 
 
 def _complete_enough(joints: Floats, truth: Floats) -> Floats:

@@ -139,7 +139,8 @@ def _read_file(path: Path, files: PeopleFiles) -> People:
     ids, names, joints = _by_person(path, labels, markers @ axes.T)
     try:
         times = files.times(numbers - 1, rate=rate)
-        return People(times, ids, joints, skeleton=skeleton_of(JointNames(path.name, names)), numbers=numbers)
+        people = np.array(ids), joints
+        return People(times, *people, skeleton=skeleton_of(JointNames(path.name, names)), numbers=numbers)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 

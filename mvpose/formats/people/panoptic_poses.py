@@ -107,7 +107,7 @@ def read(files: PeopleFiles) -> People:
     try:
         return People(
             files.times(np.array(numbers), times),
-            ids,
+            np.array(ids, np.int64),
             values[..., :3],
             np.clip(np.nan_to_num(values[..., 3]), 0.0, 1.0),
             skeleton=skeleton_of(skeleton),

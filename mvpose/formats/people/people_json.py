@@ -90,7 +90,7 @@ def _people(content: dict[str, Any], files: PeopleFiles) -> People:
     numbers = np.array([frame["frame"] for frame in frames], np.int64)
     return People(
         files.times(numbers, [frame["time"] for frame in frames], rate=float(content["rate"])),
-        ids,
+        np.array(ids, np.int64),
         values[..., :3] @ AXES[content["up"]],
         np.nan_to_num(values[..., 3]),
         skeleton=skeleton,

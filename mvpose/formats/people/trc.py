@@ -100,7 +100,7 @@ def _read_person(path: Path, files: PeopleFiles) -> People:
     try:
         return People(
             files.times(np.array(numbers), times, rate=rate),
-            [identity_of(path)],
+            np.array([identity_of(path)]),
             (markers @ files.axes("y").T)[:, None],
             skeleton=skeleton_of(JointNames(path.name, names)),
             numbers=np.array(numbers),
