@@ -16,7 +16,9 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # Kernels compile on first use, and machines are noisy: a deadline would time those, not the code.
 settings.register_profile("usual", deadline=None, max_examples=15, derandomize=True)  # the same draws everywhere
-settings.register_profile("nightly", deadline=None, max_examples=200)  # others every time: SIMHARNESS_HYPOTHESIS=nightly
+settings.register_profile(
+    "nightly", deadline=None, max_examples=200
+)  # others every time: SIMHARNESS_HYPOTHESIS=nightly
 settings.load_profile(os.environ.get("SIMHARNESS_HYPOTHESIS", "usual"))
 
 

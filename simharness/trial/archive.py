@@ -32,7 +32,7 @@ from simharness.trial.arrays import (
     whole_arrays,
     whole_of,
 )
-from simharness.trial.stages.simulation import DetectedSequence
+from simharness.trial.stages.detected_sequence import DetectedSequence
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,9 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.stage_blame import with_labels
 from simharness.trial.stages.build_trial import Trial, exposures_of
 from simharness.trial.stages.capture import CaptureFrames
+from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.trial.stages.estimation import track_frames
-from simharness.trial.stages.simulation import DetectedSequence, Simulation, detect_trial
+from simharness.trial.stages.simulation import Simulation, detect_trial
 from simharness.types.views import Views, Visibility
 from simharness.world.rigs.exposure_schedule import ExposureSchedule
 from simharness.world.scene.playback import simulate

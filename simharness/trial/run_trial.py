@@ -31,8 +31,9 @@ from simharness.trial.audit import audit
 from simharness.trial.kernel_compilation import Compilation
 from simharness.trial.needs import require_memory
 from simharness.trial.stages.build_trial import Trial, build_trial, build_variants
+from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.trial.stages.estimation import EstimateFrames, estimate_variants
-from simharness.trial.stages.simulation import DetectedSequence, Simulation, capture_trial, detect_trial
+from simharness.trial.stages.simulation import Simulation, capture_trial, detect_trial
 from simharness.trial.variant_result import VariantResult
 from simharness.types.recording import Recording
 

@@ -1,10 +1,10 @@
-"""Renderer interface: colour, depth and mesh index of every pixel from a camera and meshes; renderers by name."""
+"""Renderer interface: colour, depth and mesh index of every pixel from a camera and meshes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from mvpose.camera import Camera
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
-
-RendererName = Literal["auto", "raster", "gl"]
 
 NEAR = 0.05  # metres in front of the camera centre: near plane of all renderers
 DAYLIGHT = Lighting()
@@ -86,30 +84,3 @@ def check_count(meshes: Sequence[Mesh], *, most: int) -> None:
     """Raise ``ValueError`` for more than ``most`` meshes."""
     if len(meshes) > most:
         raise ValueError(f"this renderer distinguishes at most {most} meshes, got {len(meshes)}: merge some")
-
-
-def make_renderer(name: RendererName = "raster") -> Renderer:
-    """Return the renderer of this name.
-
-    Args:
-        name: ``"raster"`` (numba, runs everywhere), ``"gl"`` (pyrender on EGL), or ``"auto"``: gl where it works, else
-            raster.
-
-    Raises:
-        Unavailable: ``"gl"`` was requested and no context can be created.
-        ValueError: an unknown name.
-    """
-    if name not in ("raster", "gl", "auto"):
-        raise ValueError(f"renderer must be 'raster', 'gl' or 'auto', got {name!r}")
-    from simharness.capture.rendering.raster import RasterRenderer
-
-    if name == "raster":
-        return RasterRenderer()
-    from simharness.capture.rendering.gl import GlRenderer  # needs OpenGL, which not every machine has
-
-    try:
-        return GlRenderer()
-    except Unavailable:
-        if name == "gl":
-            raise
-        return RasterRenderer()

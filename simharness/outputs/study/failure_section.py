@@ -71,9 +71,6 @@ def _typical(failures: pl.DataFrame, variant: str) -> str:
     return f"{share:.0f} % of the failures of {variant} are people with {joints} of 17 (median) and all others right"
 
 
-NOT_BLAMED = "not determined"
-"""Stage of a failure whose stage to blame was not determined."""
-
 Ends = list[float | None]
 
 
@@ -81,7 +78,7 @@ def failure_rates(results: Results, variant: str) -> dict[str, Any]:
     """Return the failure rates of a variant, JSON-ready.
 
     Returns:
-        ``kinds`` and ``stages``: failures per 100 frames by kind and by stage (:data:`NOT_BLAMED` for failures whose
+        ``kinds`` and ``stages``: failures per 100 frames by kind and by stage (:data:`~simharness.outputs.study.tables.NOT_BLAMED` for failures whose
         stage was not determined). ``matching_alone``: share of the blamed failures, percent, that the true matching of
         the real detections repairs; None where no failure was blamed. ``intervals``: the same keys, each with the two
         ends of the 95 % interval over seeds; the ends are None for a single seed.
@@ -93,7 +90,7 @@ def failure_rates(results: Results, variant: str) -> dict[str, Any]:
     rates: dict[str, Any] = {}
     ends: dict[str, Any] = {}
     for column in ("kind", "stage"):
-        classes = failures.with_columns(pl.col(column).fill_null(NOT_BLAMED))
+        classes = failures.with_columns(pl.col(column).fill_null(tables.NOT_BLAMED))
         counts = {
             str(key): _by_seed(classes.filter(pl.col(column) == key), seeds) for key in sorted(set(classes[column]))
         }

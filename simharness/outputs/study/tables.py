@@ -10,7 +10,6 @@ import polars as pl
 
 from mvpose.report.tables import NOTHING, Cell
 from simharness.outputs.study.curves import FactorBreakingPoint
-from simharness.outputs.study.failure_section import NOT_BLAMED
 from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES, ScoreInfo
 from simharness.statistics.intervals import Interval, mean_interval
@@ -20,6 +19,9 @@ COLUMNS: tuple[ScoreInfo, ...] = tuple(
     SCORES[key] for key in ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts", "time_ms")
 )
 """Scores of the headline table."""
+
+NOT_BLAMED = "not determined"
+"""Stage of a failure whose stage to blame was not determined."""
 
 OVER_TIME = ("hota", "idf1", "switches_per_minute", "jerk_ratio")
 """Scores over time with curves, of studies with a variant that tracks people."""
@@ -174,7 +176,7 @@ def failures_per_100_frames(
         failures: table of failures of the study.
         frames: scored frames of each variant.
         variants: variants in the order of the result.
-        column: ``kind`` or ``stage``; null becomes :data:`simharness.outputs.study.failure_section.NOT_BLAMED`.
+        column: ``kind`` or ``stage``; null becomes :data:`NOT_BLAMED`.
     """
     rates: dict[str, dict[str, float]] = {}
     for variant in variants:

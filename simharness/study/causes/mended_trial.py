@@ -17,8 +17,8 @@ from simharness.trial.audit import audit
 from simharness.trial.conditioned_trial import ConditionedTrial, estimate_frames, takes_labels
 from simharness.trial.run_trial import with_variants
 from simharness.trial.stages.build_trial import build_trial
+from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.trial.stages.estimation import EstimateFrames
-from simharness.trial.stages.simulation import DetectedSequence
 from simharness.world.rigs.extra_camera import with_camera_in_gap
 from simharness.world.scene.camera_clearance import WALL_MARGIN
 from simharness.world.scene.objects.solids import Solid

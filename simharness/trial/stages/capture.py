@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from simharness.capture.filming import Observer
     from simharness.capture.outer_views import OuterJointFilm
     from simharness.capture.picture import ScenePictures
-    from simharness.capture.rendering.renderer import Renderer, RendererName
+    from simharness.capture.rendering.renderer import Renderer
+    from simharness.capture.rendering.renderer_names import RendererName
     from simharness.scenario.sections.scenario import Scenario
     from simharness.types.outer_joints import OuterViews
     from simharness.types.views import Views
@@ -120,6 +121,6 @@ def renderer_of(name: RendererName) -> Renderer:
 
     Each renderer is made once, because two GL contexts cannot share a scene, and shaders need to be loaded only once.
     """
-    from simharness.capture.rendering.renderer import make_renderer
+    from simharness.capture.rendering.renderer_names import make_renderer
 
     return make_renderer(name)

@@ -21,7 +21,7 @@ from simharness.runtime.frame_pool import chunks_of, map_jobs
 
 if TYPE_CHECKING:
     from simharness.detector.detect import Detected
-    from simharness.trial.stages.simulation import DetectedSequence
+    from simharness.trial.stages.detected_sequence import DetectedSequence
 
 
 @dataclass(frozen=True)

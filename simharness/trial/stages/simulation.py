@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from functools import cached_property
 
-from mvpose import Rig
-from mvpose.arrays import Floats
 from mvpose.commands.progress import Stages
 from mvpose.skeleton import COCO17
 from mvpose.wholebody import skeleton_by_name
-from simharness.detector.detect import Detected, detect
+from simharness.detector.detect import detect
 from simharness.runtime.frame_pool import map_frames
 from simharness.trial.stages.build_trial import Trial
 from simharness.trial.stages.capture import CaptureFrames, FilmOuterJoints
+from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.trial.stages.networks import ReadFrames
 from simharness.types.outer_joints import OuterTruth, OuterViews
-from simharness.types.recording import Recording
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views
 from simharness.world.scene.playback import simulate
@@ -38,31 +35,6 @@ class Simulation:
     sequence: Sequence
     views: Views
     outer: OuterTruth | None = None
-
-
-@dataclass(frozen=True)
-class DetectedSequence:
-    """Detections and truth of T frames, and the believed cameras: the input of estimation and scoring.
-
-    Attributes:
-        time: time of each frame, (T,), seconds.
-        rig: the believed cameras.
-        frames: detections, truth and heat map peaks of each frame, T.
-    """
-
-    time: Floats
-    rig: Rig
-    frames: tuple[Detected, ...]
-
-    @cached_property
-    def recording(self) -> Recording:
-        """The input of scoring."""
-        return Recording(
-            self.time,
-            self.rig,
-            tuple(each.detections for each in self.frames),
-            tuple(each.truth for each in self.frames),
-        )
 
 
 def capture_trial(trial: Trial, stages: Stages, *, workers: int = 1, previews: Collection[int] = ()) -> Simulation:

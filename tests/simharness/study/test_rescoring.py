@@ -20,7 +20,7 @@ from simharness.study.trial_store import EntryState, Store
 from simharness.trial import identity, run_trial
 from simharness.trial.archive import pack_detected, pack_estimates, unpack_detected, unpack_estimates
 from simharness.trial.stages import estimation
-from simharness.trial.stages.simulation import DetectedSequence
+from simharness.trial.stages.detected_sequence import DetectedSequence
 
 QUICKSTART = Path(__file__).parents[3] / "scenarios" / "quickstart.toml"
 CHEAP = ("rendering.renderer=rays", "duration=0.6", "rate=5", "people.count=2", "cameras.count=3")

@@ -1,0 +1,36 @@
+"""Detections of a trial, which the method is given, with their truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from mvpose import Rig
+from mvpose.arrays import Floats
+from simharness.detector.detect import Detected
+from simharness.types.recording import Recording
+
+
+@dataclass(frozen=True)
+class DetectedSequence:
+    """Detections and truth of T frames, and the believed cameras: the input of estimation and scoring.
+
+    Attributes:
+        time: time of each frame, (T,), seconds.
+        rig: the believed cameras.
+        frames: detections, truth and heat map peaks of each frame, T.
+    """
+
+    time: Floats
+    rig: Rig
+    frames: tuple[Detected, ...]
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The input of scoring."""
+        return Recording(
+            self.time,
+            self.rig,
+            tuple(each.detections for each in self.frames),
+            tuple(each.truth for each in self.frames),
+        )
