@@ -79,9 +79,9 @@ def failure_rates(results: Results, variant: str) -> dict[str, Any]:
 
     Returns:
         ``kinds`` and ``stages``: failures per 100 frames by kind and by stage (:data:`.tables.NOT_BLAMED` for failures
-        whose stage was not determined). ``matching_alone``: share of the blamed failures, percent, that the true matching of
-        the real detections repairs; None where no failure was blamed. ``intervals``: the same keys, each with the two
-        ends of the 95 % interval over seeds; the ends are None for a single seed.
+        whose stage was not determined). ``matching_alone``: share of the blamed failures, percent, that the true
+        matching of the real detections repairs; None where no failure was blamed. ``intervals``: the same keys,
+        each with the two ends of the 95 % interval over seeds; the ends are None for a single seed.
     """
     seed_of = results.trials.select("trial", "seed").unique()
     seeds = sorted(seed_of["seed"].unique())
