@@ -47,7 +47,7 @@ def find_sources(paths: Sequence[Path]) -> list[Source]:
     sources = [source for path in paths for source in _below(path)]
     seen: dict[Path, Source] = {}
     for source in sources:
-        place = source.path.resolve()
+        place = Path(os.path.realpath(source.path))  # resolve() fails on loops of links
         if place in seen:
             raise ValueError(f"{one_line(str(source.path), 200)}: is given twice; give the detections of a camera once")
         seen[place] = source

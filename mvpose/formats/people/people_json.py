@@ -91,7 +91,7 @@ def _people(content: dict[str, Any], files: PeopleFiles) -> People:
     return People(
         files.times(numbers, [frame["time"] for frame in frames], rate=float(content["rate"])),
         np.array(ids, np.int64),
-        values[..., :3] @ AXES[content["up"]],
+        np.where(np.isfinite(values[..., :3]), values[..., :3], np.nan) @ AXES[content["up"]],
         np.nan_to_num(values[..., 3]),
         skeleton=skeleton,
         numbers=files.renumbered(numbers, counted=bool(len(numbers)) and numbers[0] == 0),

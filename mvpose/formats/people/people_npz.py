@@ -65,6 +65,7 @@ def read(files: PeopleFiles) -> People:
 
 def _people(path: Path, arrays: dict[str, Any], files: PeopleFiles) -> People:
     joints = as_array(arrays["joints"], ("T", "P", "J", 3), "joints")
+    joints = np.where(np.isfinite(joints), joints, np.nan)
     frames, rate = arrays.get("frames"), arrays.get("rate")
     if rate is not None and (rate.dtype.kind not in "fiu" or rate.size != 1 or not 0 < rate.item() < np.inf):
         raise ValueError(f"rate must be one positive number of frames per second, got {rate}: correct it")

@@ -106,13 +106,13 @@ def read(files: PeopleFiles) -> People:
         read = [name for name in (*_COLUMNS, *covariances) if name != "joint" and name in table.columns]
         values = {name: table[name].cast(pl.Float64).to_numpy() for name in read}
         names = table["joint"].cast(pl.String).to_list()
-    except (pl.exceptions.PolarsError, OSError, ValueError) as error:
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, ValueError) as error:  # panics on damage
         raise ValueError(one_line(f"{file}: {error}")) from None
     skeleton = _skeleton(file, names)
     columns = {name: column for column, name in enumerate(skeleton.joints)}
     joint = np.array([columns[name] for name in names], np.int64)
     for name in ("frame", "person"):
-        if not (np.isfinite(values[name]).all() and (values[name] == np.round(values[name])).all()):
+        if not ((np.abs(values[name]) < 2.0**53) & (values[name] == np.round(values[name]))).all():
             raise ValueError(f"{file}: column {name} must hold whole numbers")
     rows = values["frame"].astype(np.int64)
     if len(rows) and not 0 <= rows.min() <= rows.max() < _MOST_FRAMES:
@@ -123,7 +123,8 @@ def read(files: PeopleFiles) -> People:
     if len(np.unique(flat)) < len(flat):
         raise ValueError(f"{file}: has two rows for one joint of a person in a frame; expected one")
     joints, scores, covariance = np.full((*shape, 3), np.nan), np.zeros(shape), None
-    joints[rows, who, joint] = np.stack([values[axis] for axis in "xyz"], axis=1) @ files.axes("z").T
+    places = np.stack([values[axis] for axis in "xyz"], axis=1)
+    joints[rows, who, joint] = np.where(np.isfinite(places), places, np.nan) @ files.axes("z").T
     scores[rows, who, joint] = values["score"]
     if len(rows) and all(name in values and np.isfinite(values[name]).all() for name in covariances):
         covariance = np.full((*shape, 3, 3), np.nan)

@@ -97,6 +97,7 @@ def _read_person(path: Path, files: PeopleFiles) -> People:
     if not values:
         raise ValueError(f"{path}: has no frames; expected {_WHAT}")
     markers = metres * np.array(values).reshape(-1, len(names), 3)
+    markers[~np.isfinite(markers).all(axis=-1)] = np.nan
     try:
         return People(
             files.times(np.array(numbers), times, rate=rate),
