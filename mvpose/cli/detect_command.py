@@ -131,8 +131,7 @@ def _detect(sources: Sequence[PictureSource], out: Path, networks: Networks) -> 
     """Write the detections of videos of one rate."""
     from mvpose.cli.camera_pictures import common_rate
     from mvpose.cli.video_detection import detect_videos, networks_text
-    from mvpose.networks.detector import PersonDetector
-    from mvpose.networks.pose import open_head
+    from mvpose.networks.detector import PersonDetector, open_head
 
     common_rate(sources)
     detector, pose, least = networks.detector, networks.pose, networks.min_score

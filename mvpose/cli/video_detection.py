@@ -15,8 +15,8 @@ from mvpose.commands.progress import single_stage
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import parse_json, read_bytes
 from mvpose.formats.pictures import PictureSource
-from mvpose.networks.detector import PeopleInPicture, PersonDetector
-from mvpose.networks.pose import PoseHead, detect_people
+from mvpose.networks.detector import PeopleInPicture, PersonDetector, detect_people
+from mvpose.networks.pose import PoseHead
 
 MARK = ".mvpose-detections"
 """File by which a folder of detections is recognised."""

@@ -13,7 +13,7 @@ Class 0 is people, as in COCO.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -24,7 +24,10 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 from mvpose.networks.card import Card
 from mvpose.networks.crops import Pixels, Placement, crop_images
+from mvpose.networks.pose import PoseHead
 from mvpose.networks.session import Provider, Session
+from mvpose.skeleton import COCO17, Skeleton
+from mvpose.wholebody import SKELETONS, skeleton_by_name
 
 Kind = Literal["yolox", "rtmdet", "rtmo", "yolo"]
 
@@ -225,3 +228,45 @@ def _cells(size: tuple[int, int]) -> int:
 
 def _blank(size: tuple[int, int]) -> Pixels:
     return np.full((1, size[1], size[0], 3), _FILL[0], np.uint8)
+
+
+def detect_people(
+    pictures: Iterable[Pixels], detector: PersonDetector, head: PoseHead | None
+) -> Iterator[PeopleInPicture]:
+    """Yield the people of every picture with their keypoints.
+
+    Args:
+        pictures: (h, w, 3) uint8, red green blue.
+        detector: gives their boxes, and if it is one-stage their keypoints.
+        head: pose head; None with a one-stage detector.
+
+    Raises:
+        ValueError: no head with a detector that gives boxes alone.
+    """
+    if head is None and not detector.one_stage:
+        raise ValueError("a detector that gives boxes alone needs a pose head")
+    for picture in pictures:
+        found = detector.find(picture)
+        if head is None or not len(found.scores):
+            yield found if found.keypoints is not None else _nobody(head)
+            continue
+        posed = head.detect([picture], np.zeros(len(found.boxes), np.int64), found.boxes, box_scores=found.scores)
+        yield replace(found, keypoints=posed.keypoints, keypoint_scores=posed.scores)
+
+
+def open_head(path: str | Path, *, provider: Provider = "cpu", threads: int = 1) -> PoseHead:
+    """Open a pose head, on COCO-17 or on the skeleton of :mod:`mvpose.wholebody` with its number of joints.
+
+    Raises:
+        ValueError: as :class:`mvpose.networks.PoseHead`, or another number of joints.
+    """
+    session = Session(path, provider=provider, threads=threads)
+    known: list[Skeleton] = [COCO17, *map(skeleton_by_name, SKELETONS)]
+    counts = {extent for shape in session.shapes for extent in (shape[0], shape[-1])}
+    skeleton = next((each for each in known if len(each) in counts), COCO17)
+    return PoseHead(session, skeleton=skeleton, likelihoods=False)
+
+
+def _nobody(head: PoseHead | None) -> PeopleInPicture:
+    joints = len(COCO17 if head is None else head.skeleton)
+    return PeopleInPicture(np.zeros((0, 4)), np.zeros(0), np.zeros((0, joints, 2)), np.zeros((0, joints)))

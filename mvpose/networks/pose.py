@@ -6,7 +6,6 @@ Heads are trained with one of three conventions for the input pixel of an output
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn
@@ -18,11 +17,9 @@ from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from mvpose.detections import Detections
 from mvpose.heatmaps import Heatmaps
-from mvpose.networks.crops import Images, Pixels, Placement, check_images, crop_images, in_view, padded, stretched
-from mvpose.networks.detector import PeopleInPicture, PersonDetector
-from mvpose.networks.session import Provider, Session, as_session
+from mvpose.networks.crops import Images, Placement, check_images, crop_images, in_view, padded, stretched
+from mvpose.networks.session import Session, as_session
 from mvpose.skeleton import COCO17, Skeleton
-from mvpose.wholebody import SKELETONS, skeleton_by_name
 
 _HIGHEST = 2.0  # heat maps above this have another scale
 _BLACK = (0, 0, 0)  # fill outside the image, as in the training of all heads named below
@@ -256,45 +253,3 @@ def outer_product(x: Values, y: Values, placement: Placement, columns: Cells, ro
         Cells(rows.first, rows.step * every_y, y.shape[2]),
     )
     return placed_heatmaps(product, placement, *thinned)
-
-
-def detect_people(
-    pictures: Iterable[Pixels], detector: PersonDetector, head: PoseHead | None
-) -> Iterator[PeopleInPicture]:
-    """Yield the people of every picture with their keypoints.
-
-    Args:
-        pictures: (h, w, 3) uint8, red green blue.
-        detector: gives their boxes, and if it is one-stage their keypoints.
-        head: pose head; None with a one-stage detector.
-
-    Raises:
-        ValueError: no head with a detector that gives boxes alone.
-    """
-    if head is None and not detector.one_stage:
-        raise ValueError("a detector that gives boxes alone needs a pose head")
-    for picture in pictures:
-        found = detector.find(picture)
-        if head is None or not len(found.scores):
-            yield found if found.keypoints is not None else _nobody(head)
-            continue
-        posed = head.detect([picture], np.zeros(len(found.boxes), np.int64), found.boxes, box_scores=found.scores)
-        yield replace(found, keypoints=posed.keypoints, keypoint_scores=posed.scores)
-
-
-def open_head(path: str | Path, *, provider: Provider = "cpu", threads: int = 1) -> PoseHead:
-    """Open a pose head, on COCO-17 or on the skeleton of :mod:`mvpose.wholebody` with its number of joints.
-
-    Raises:
-        ValueError: as :class:`mvpose.networks.PoseHead`, or another number of joints.
-    """
-    session = Session(path, provider=provider, threads=threads)
-    known: list[Skeleton] = [COCO17, *map(skeleton_by_name, SKELETONS)]
-    counts = {extent for shape in session.shapes for extent in (shape[0], shape[-1])}
-    skeleton = next((each for each in known if len(each) in counts), COCO17)
-    return PoseHead(session, skeleton=skeleton, likelihoods=False)
-
-
-def _nobody(head: PoseHead | None) -> PeopleInPicture:
-    joints = len(COCO17 if head is None else head.skeleton)
-    return PeopleInPicture(np.zeros((0, 4)), np.zeros(0), np.zeros((0, joints, 2)), np.zeros((0, joints)))

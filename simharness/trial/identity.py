@@ -49,12 +49,15 @@ PACKAGES = ("mujoco", "numpy", "scipy", "numba", "opencv-python-headless", "onnx
 SIMULATION = ("types", "scenario/sections", "assets", "world", "capture", "detector", "trial/stages")
 """Folders of ``simharness`` that make detections and estimates. Scenarios count as resolved, not how they are read."""
 
+BESIDE_THE_SIMULATION = ("scenario/sections/gate_section.py",)
+"""Modules in :data:`SIMULATION` that make neither: what the gate allows."""
+
 BORROWED = ("formats/calibration", "formats/joint_names.py", "formats/people", "recording.py", "wholebody")
 """Folders and modules of ``mvpose`` that simulations use: readers of rigs and of people to re-enact, skeletons with
 feet and hands and their estimates."""
 
 BESIDE_THE_METHOD = (
-    "cli", "commands", "files", "formats", "networks/detector.py", "networks/people.py", "recording.py", "report",
+    "cli", "commands", "files", "formats", "networks/detector.py", "recording.py", "report",
     "skeleton_fit", "wholebody",
 )  # fmt: skip
 """Folders and modules of ``mvpose`` that make no estimates of bodies in trials: readers, writers, detection in videos,
@@ -97,7 +100,9 @@ def code() -> Code:
     """Return the digests of the code on disk at the first call in this process."""
     ours, its = Path(simharness.__file__).parent, Path(mvpose.__file__).parent
     return Code(
-        simulation=_digest([digest_of_folders(ours, SIMULATION), digest_of_folders(its, BORROWED)]),
+        simulation=_digest(
+            [digest_of_folders(ours, SIMULATION, without=BESIDE_THE_SIMULATION), digest_of_folders(its, BORROWED)]
+        ),
         method=digest_of_folders(its, ("",), without=BESIDE_THE_METHOD),
         scores=digest_of_folders(ours, SCORES, without=FAILURES_ALONE),
         failures=digest_of_folders(ours, FAILURES),

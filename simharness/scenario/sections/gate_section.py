@@ -6,7 +6,7 @@ Its tables of limits have the gated scores of the catalogue, :data:`simharness.s
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from pydantic import Field, create_model
 
@@ -32,7 +32,8 @@ def _limits(name: str, about: str, defaults: Mapping[str, float | None]) -> Any:
 
 
 if TYPE_CHECKING:
-    Tolerances = Improvements = Section
+    Tolerances: TypeAlias = Section
+    Improvements: TypeAlias = Section
 else:
     Tolerances = _limits(
         "Tolerances",
