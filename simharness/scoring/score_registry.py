@@ -12,7 +12,7 @@ How to add a score:
 Several scores that share work are registered together: ``@scores(info, info, ...)`` on a function that returns their
 values by key.
 
-Tables, reports, thresholds of ``simharness report`` and :func:`simharness.api.assert_robust` take all scores from
+Tables of studies, thresholds of ``simharness report`` and :func:`simharness.api.assert_robust` take all scores from
 :data:`simharness.scoring.catalogue.SCORES`, which contains the registered ones. A score that does not apply is None,
 never zero. Keys end in ``_mm``, ``_px`` or ``_ms`` where that is the unit.
 """
