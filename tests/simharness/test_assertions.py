@@ -108,12 +108,12 @@ def test_kept_trials_are_not_run_again(small, tmp_path, monkeypatch):
 
 def test_the_traceback_ends_at_the_callers_line(tmp_path):
     (tmp_path / "test_users.py").write_text(
-        "from simharness import testing\n"
-        "testing._run_unstored = lambda study, workers: (_ for _ in ()).throw(AssertionError('PCP is 1'))\n"
+        "from simharness import api\n"
+        "api._run_unstored = lambda study, workers: (_ for _ in ()).throw(AssertionError('PCP is 1'))\n"
         "def test_it():\n"
-        "    testing.assert_robust('quickstart', pcp=90)\n"
+        "    api.assert_robust('quickstart', pcp=90)\n"
     )
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_users.py"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert "testing.assert_robust('quickstart', pcp=90)" in done.stdout
+    assert "api.assert_robust('quickstart', pcp=90)" in done.stdout
     assert "_check(thresholds)" not in done.stdout

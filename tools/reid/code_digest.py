@@ -12,6 +12,8 @@ from pathlib import Path
 import mvpose
 import simharness
 from simharness.scenario.layers import SENSORS
+from simharness.scoring.score_registry import MODULES
+from simharness.world.scene.objects.object_files import ASSETS
 
 START = "tools.reid.rendering"
 """Module that renders crops; its imports, direct and indirect, belong to the digest."""
@@ -40,14 +42,15 @@ def digest() -> str:
 def files() -> dict[str, Path]:
     """Return, by name, the files of all modules that :data:`START` imports at any level, and the data that they read.
 
-    The data are in folders beside the modules, and the sensor profiles of the shipped scenarios.
+    The data are in folders beside the modules, the objects of furnished rooms, and the sensor profiles of the shipped
+    scenarios.
 
     This includes modules that are not needed for rendering, such as those that the ``__init__`` of a package imports.
     A change in them causes an unnecessary rendering, which takes minutes. A missing module would be worse: a card could
     have scores of crops that cannot be rendered again.
     """
     modules: dict[str, Path] = {}
-    pending = [START]
+    pending = [START, *(f"simharness.scoring.{name}" for name in MODULES)]  # the catalogue imports these by name
     while pending:
         name = pending.pop()
         file = _file(name)
@@ -56,6 +59,7 @@ def files() -> dict[str, Path]:
         modules[name] = file
         pending += _imported(file)
     data = {_name(each): each for file in modules.values() for each in _data_beside(file)}
+    data |= {_name(each): each for each in sorted(ASSETS.rglob("*")) if each.is_file()}
     profiles = {f"{SENSORS.folder}/{file.name}": file for file in SENSORS.shipped.glob("*.toml")}
     return {_name(file): file for file in modules.values()} | data | profiles
 

@@ -234,7 +234,7 @@ def _renderer() -> Any:
             program.set_uniform("light", np.array(lighting.direction))
             program.set_uniform("strengths", np.array([lighting.key, lighting.sky, lighting.fill]))
             program.set_uniform("tint", np.array(lighting.tint))
-            for name, row in zip(("light_x", "light_y", "light_w"), shadows.light.P, strict=True):
+            for name, row in zip(("light_x", "light_y", "light_w"), shadows.light.projection, strict=True):
                 program.set_uniform(name, row)
             program.set_uniform("shadow_map", _SHADOW_UNIT)
             program.set_uniform("bias", float(shadows.light.bias))

@@ -160,7 +160,7 @@ def _lit(background: Background, geometry: SceneGeometry, view: PixelRays, light
         drawn = DrawnPixels(background.triangle, background.inverse_depth, background.corners)
         rgb = np.empty((*drawn.triangle.shape, 3), np.uint8)
         fill_empty(rgb, drawn.triangle < 0, lighting, view.to_rays)
-        places = shadow_places(drawn.triangle, drawn.inverse_depth, view, maps.light.P, SHADOW_SIZE)
+        places = shadow_places(drawn.triangle, drawn.inverse_depth, view, maps.light.projection, SHADOW_SIZE)
         if len(geometry.topology.faces):
             light = _distant(lighting, maps.light)
             shade(drawn, geometry.faces, view, light, (maps.still, NO_SHADOW), places, 0, rgb)
@@ -174,6 +174,6 @@ def _distant(lighting: Lighting, seen: LightView) -> DistantLight:
         np.array(lighting.direction),
         np.array([lighting.key, lighting.sky, lighting.fill]),
         255 * np.sqrt(lighting.tint),  # sRGB is about the square root of linear light
-        seen.P,
+        seen.projection,
         seen.bias,
     )

@@ -60,14 +60,14 @@ class DistantLight(NamedTuple):
         direction: unit direction to the key light, (3,).
         strengths: strengths of key, sky and fill light, (3,).
         gains: 255 times the factor of the light colour on the albedo, sRGB, (3,).
-        P: projection into the shadow maps, (3, 4).
+        projection: projection into the shadow maps, (3, 4).
         bias: least lead in inverse depth of what shades a surface that faces the light.
     """
 
     direction: NDArray[np.float64]
     strengths: NDArray[np.float64]
     gains: NDArray[np.float64]
-    P: NDArray[np.float64]
+    projection: NDArray[np.float64]
     bias: float
 
 
@@ -98,7 +98,7 @@ def shade(
     """
     triangle, inverse_depth, corners = drawn
     center, rays = view
-    light_P, gains, (shadow_place, shadow_depth) = light.P, light.gains, places
+    light_P, gains, (shadow_place, shadow_depth) = light.projection, light.gains, places
     height, width = triangle.shape
     # Shadow map position of a pixel times its inverse depth: away * inverse depth + seen @ (x, y, 1), homogeneous.
     seen, away = np.zeros((3, 3)), np.zeros(3)

@@ -47,7 +47,7 @@ class LightView:
         return cls(direction, tuple(((low + high) / 2).tolist()), radius)
 
     @cached_property
-    def P(self) -> NDArray[np.float64]:
+    def projection(self) -> NDArray[np.float64]:
         """Projection into the shadow map, (3, 4)."""
         direction, half = np.array(self.direction), SHADOW_SIZE / 2
         R = facing(direction)
@@ -105,7 +105,7 @@ def shadow_map(light: LightView, vertices: Floats, faces: NDArray[np.uint32]) ->
     if not len(faces):
         return NO_SHADOW
     unused = np.empty(nearest.shape, np.int32)  # which face it is
-    corners = rasterise(vertices, faces, light.P, light.radius, nearest, unused)
+    corners = rasterise(vertices, faces, light.projection, light.radius, nearest, unused)
     rows = corners[:, 1] / corners[:, 2]
     return ShadowMap(nearest, nearest_blocks(nearest, max(int(rows.min()) - 1, 0), int(rows.max()) + 2))
 

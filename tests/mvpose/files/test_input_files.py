@@ -116,12 +116,14 @@ AROUND = {
     "simharness/scenario/load.py": "digests of regular files",
     "simharness/gate/suite.py": "digests of regular files",
     "simharness/outputs/benchmark/panoptic_sequence.py": "a file that was just written",
+    "simharness/outputs/benchmark/mjcf_scene.py": "files that were just written",
     "simharness/cli/run_command.py": "a file that was just written",
     "simharness/outputs/study/page.py": "a file of a result folder, if regular",
 }
 SHIPPED = {
     "simharness/world/rigs/published_rigs.py", "simharness/world/humans/body.py", "simharness/detector/guesses.py",
-    "simharness/world/humans/outer_landmarks.py", "simharness/trial/kernel_compilation.py",
+    "simharness/world/humans/outer_landmarks.py", "simharness/world/scene/rooms/kinds.py",
+    "simharness/trial/kernel_compilation.py",
 }  # fmt: skip
 CALLS = re.compile(
     r"(?:^|\.)(?:read_text|read_bytes|loadmat|read_parquet|scan_parquet|FileStorage|imread)$|^(?:np\.load|json\.loads?|"

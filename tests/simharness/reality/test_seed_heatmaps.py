@@ -33,5 +33,4 @@ def test_seeds_are_scored_on_the_estimates_of_a_trial():
     evaluation = seed_evaluation.evaluate_seeds(scenario, 1)
     scores = evaluation.variant_scores("full")[0]
     expected = seed_evaluation.score_estimates(seed_evaluation.annotate(result), result.estimates)
-    for one, other in zip(scores.frames, expected.variants["full"].frames, strict=True):
-        assert np.array_equal(one.parts, other.parts)
+    np.testing.assert_array_equal(scores.frames.parts, expected.variants["full"].frames.parts)

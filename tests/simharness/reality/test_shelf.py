@@ -120,7 +120,7 @@ def test_a_copy_of_two_frames_reads_the_same(copied, shelf):
     [
         ("actorsGT.mat", "the truth of Shelf or Campus"),
         ("calibration_shelf.json", "calibration.file"),
-        ("openpose/3/3_000000000001_keypoints.json", "OpenPose output"),
+        ("openpose/3/3_000000000001_keypoints.json", "OpenPose"),
     ],
 )
 @pytest.mark.parametrize("kept", [None, 0, 0.1, 0.5])
@@ -131,7 +131,7 @@ def test_missing_and_truncated_files_are_named(copied, name, expected, kept):
     if kept is not None:
         path.write_bytes(content[: int(kept * len(content))])
     if kept is None and name.startswith("openpose"):
-        path, reason, expected = path.parent, "has 1 files", "frame 301 is requested"
+        path, reason, expected = path.parent, "has 1 pictures", "frame 301 is requested"
     else:
         empty = "not a known calibration" if name.startswith("calibration") else "cut off"
         reason = "no such file" if kept is None else "cut off" if kept else empty

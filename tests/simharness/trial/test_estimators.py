@@ -40,6 +40,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import mvpose
 from mvpose import Estimate, Pipeline
 
 

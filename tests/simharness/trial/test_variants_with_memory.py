@@ -20,7 +20,7 @@ import time
 
 import numpy as np
 
-from mvpose import Estimate, Pipeline
+from mvpose import Estimate, preset
 
 
 class Counting:

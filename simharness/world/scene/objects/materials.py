@@ -90,7 +90,7 @@ class Sheet:
         return self.uv(material, place + start)
 
     @classmethod
-    def packed(cls, pictures: Mapping[str, Floats]) -> Sheet:
+    def pack(cls, pictures: Mapping[str, Floats]) -> Sheet:
         """Return the sheet of pictures (h, w, 3) with values from 0 to 1.
 
         They are packed on shelves, the highest ones first, each with a border that repeats its edge.
@@ -118,7 +118,7 @@ class Sheet:
 def draw_sheet(seed: int) -> Sheet:
     """Draw the sheet of a scene; every patch is drawn by its own stream, so one more changes no other."""
     pictures = {name: draw(stream(seed, "room", "sheet", name)) for name, draw in {**_MATERIALS, **PRINTS}.items()}
-    return Sheet.packed(pictures)
+    return Sheet.pack(pictures)
 
 
 def _plain(rng: np.random.Generator) -> Floats:

@@ -89,7 +89,7 @@ class ObjectFile:
         """
         names = sorted({part.texture for part in self.parts} - {""})
         if names and sheet is None:
-            sheet = Sheet.packed({"plain": np.ones((8, 8, 3)), **{name: self.textures[name] / 255 for name in names}})
+            sheet = Sheet.pack({"plain": np.ones((8, 8, 3)), **{name: self.textures[name] / 255 for name in names}})
         meshes, uv = [], []
         for number, part in enumerate(self.parts):
             vertices = part.mesh.vertices @ part.turn.T + part.place + self.offset

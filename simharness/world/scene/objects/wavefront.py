@@ -93,7 +93,8 @@ def _add_group(
         place = np.zeros((len(points), 2))
         place[: len(corners)] = places[corners[:, 1]] * [1, -1] + [0, 1]
         mesh.usertexcoord = place.ravel()
-        content = cv2.imread(str(picture), cv2.IMREAD_COLOR)
+        encoded = np.frombuffer(read_bytes(picture, what="a texture (map_Kd of the MTL file)"), np.uint8)
+        content = cv2.imdecode(encoded, cv2.IMREAD_COLOR) if len(encoded) else None
         if content is None:
             raise ValueError(f"picture {picture} cannot be read: expected a PNG or JPEG file (map_Kd of its MTL file)")
         spec.assets[f"{name}.png"] = cv2.imencode(".png", content)[1].tobytes()
