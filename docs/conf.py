@@ -64,13 +64,20 @@ nitpick_ignore_regex = [
         r"(?!(simharness|mvpose)\.).*",
     ),  # types in signatures: of other projects, and aliases by short names
     ("py:(class|obj)", r".*\.(_\w+|\w+_co|Result|Perform|Move|Terms)"),  # private aliases and type variables
+    ("py:class", r".*\w+ByJoint\[.*|.*\.ByJoint\[.*"),  # values of generics, which are written as pydantic names them
     ("py:exc", r"(tomllib\.)?[A-Z]\w+"),  # exceptions of Python
 ]
 suppress_warnings = ["ref.python"]  # a short name in a signature that two modules have
 
 
 def _skip_namesakes(app: Any, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:
-    """Leave a function out of its package where its module has the same name: the section of the module has it."""
+    """Leave out what has a section already.
+
+    That is a function in its package where its module has the same name, and a generic with values, which pydantic adds
+    to the module.
+    """
+    if "[" in name:
+        return True
     module = app.env.temp_data.get("autodoc:module")
     origin = getattr(obj, "__module__", None)
     return True if module != origin and origin == f"{module}.{name}" else None

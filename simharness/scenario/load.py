@@ -223,7 +223,7 @@ def load_study(
         overrides: as in :func:`simharness.scenario.load.load`; also ``"sweep.cameras.count=[2, 3]"``.
         seeds: replaces the file's seeds: their number, or a list of them.
         variants: replaces the file's variants.
-        limit: largest number of trials; None: :data:`~simharness.scenario.checks.MOST_TRIALS`.
+        limit: largest number of trials; None: :data:`~simharness.scenario.file_model.MOST_TRIALS`.
         folder: folder to which files named in the scenario file are relative; by default that of the file.
 
     Raises:

@@ -89,7 +89,7 @@ def of_pictures():
 
 compile_pictures()
 compiled = of_pictures()
-for kernel in ("shade_lit", "finish", "cast", "dim", "runs_below", "moving_light", "probe_light", "expose"):
+for kernel in ("shade_lit", "cast", "dim", "runs_below", "moving_light", "probe_light", "expose"):
     assert compiled[kernel], kernel
 run_trial(load("quickstart", overrides=["duration=0.1"]), until="detect", previews=[0])
 assert compiled == of_pictures(), "pictures need other kernels, or for other arguments"
