@@ -41,7 +41,7 @@ def prose(file: str) -> list[tuple[int, str]]:
     return found + list(comments)
 
 
-def told(file: str, pattern: re.Pattern[str]) -> list[str]:
+def places_in(file: str, pattern: re.Pattern[str]) -> list[str]:
     """Return the places at which a pattern occurs in the prose of a file."""
     parts = prose(file) if file.endswith(".py") else [(1, (ROOT / file).read_text(encoding="utf-8"))]
     return [
@@ -59,12 +59,12 @@ def test_there_are_texts_and_modules():
 
 @pytest.mark.parametrize("pattern", [MAKING, RIDDLES], ids=["making", "riddles"])
 def test_no_text_has_them(pattern):
-    assert [place for file in TEXTS for place in told(file, pattern)] == []
+    assert [place for file in TEXTS for place in places_in(file, pattern)] == []
 
 
 @pytest.mark.parametrize("pattern", [MAKING, RIDDLES], ids=["making", "riddles"])
 def test_no_docstring_or_comment_has_them(pattern):
-    assert [place for file in MODULES for place in told(file, pattern)] == []
+    assert [place for file in MODULES for place in places_in(file, pattern)] == []
 
 
 @pytest.mark.parametrize(

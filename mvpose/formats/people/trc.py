@@ -59,7 +59,7 @@ def write(export: Export) -> Iterator[tuple[str, bytes]]:
 
 
 def read(files: PeopleFiles) -> People:
-    """Read the markers of one person from each file; y up unless the files are said to have z up.
+    """Read the markers of one person from each file; y up unless the declared axis is z.
 
     Raises:
         ValueError: a file is missing or of another layout, has a marker in an unknown unit, or other markers than the
