@@ -121,10 +121,10 @@ def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: N
 
 
 def _check_folder(folder: Path) -> None:
-    from mvpose.cli.video_detection import MARK
+    from mvpose.cli.video_detection import DETECT
     from mvpose.commands.output_files import check_writable
 
-    check_writable(folder, holds=MARK)
+    check_writable(folder, DETECT)
 
 
 def _detect(sources: Sequence[PictureSource], out: Path, networks: Networks) -> None:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from mvpose.calibration import Diagnosis
     from mvpose.cli.inputs import Inputs
 
+_DOCTOR = "mvpose doctor"  # in the manifest of its folder
 _MARKS = {"alarm": "!", "unknown": "?", "note": "-"}
 
 
@@ -45,7 +46,7 @@ def doctor(
         from mvpose.commands.output_files import check_writable
 
         if out is not None:
-            check_writable(out, holds="doctor.json")
+            check_writable(out, _DOCTOR)
         from mvpose.calibration import diagnose
         from mvpose.commands.errors import failing
 
@@ -70,7 +71,7 @@ def _write_page(folder: Path, inputs: Inputs, diagnosis: Diagnosis, files: tuple
 
         with failing("the repair"):
             repaired = repair(inputs.rig, inputs.frames, period=inputs.period)
-    with atomic_folder(folder) as partial, failing("the page"):
+    with atomic_folder(folder, _DOCTOR) as partial, failing("the page"):
         write_doctor_page(
             partial,
             name=folder.absolute().name,

@@ -84,10 +84,10 @@ class Wanted:
         Raises:
             ValueError: an option that cannot be, or a folder that cannot be written.
         """
-        from mvpose.cli.results import formats_of, options_of
+        from mvpose.cli.results import ESTIMATE, formats_of, options_of
         from mvpose.commands.output_files import check_writable
 
-        check_writable(self.out)
+        check_writable(self.out, ESTIMATE)
         formats_of(self.formats)
         options_of(self.files_up, together=self.together)
         from mvpose.cli.estimation import check_method

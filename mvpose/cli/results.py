@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 from mvpose.cli.inputs import Inputs
 from mvpose.commands.errors import failing
-from mvpose.commands.output_files import RESULTS
 from mvpose.commands.progress import single_stage
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.formats.people import Options, check_formats, write_people
+from mvpose.formats.people.people_tables import INPUTS
 from mvpose.recording import People
 
 if TYPE_CHECKING:
     from mvpose.calibration.findings import Diagnosis
     from mvpose.formats.pictures import PictureSource
+
+ESTIMATE = "mvpose estimate"
+"""What the manifest of a folder of results says."""
 
 ALWAYS = ("parquet", "json")
 """Formats that every folder of results holds."""
@@ -78,7 +81,7 @@ def write_results(
     Raises:
         OSError: the folder cannot be written; nothing is left of it.
     """
-    with atomic_folder(folder) as partial:
+    with atomic_folder(folder, ESTIMATE) as partial:
         write_people(people, partial, formats=ALWAYS)  # in the axes of the cameras, which pages and commands expect
         write_people(people, partial, formats=[each for each in formats if each not in ALWAYS], options=options)
         about = {
@@ -87,7 +90,7 @@ def write_results(
             "fps": round(people.rate, 6),
             "numbers": inputs.numbers.tolist(),  # of the frames in the files of detections; ours count from 0
         }
-        (partial / RESULTS).write_text(json.dumps(about) + "\n", encoding="utf-8")
+        (partial / INPUTS).write_text(json.dumps(about) + "\n", encoding="utf-8")
         if page:
             _write_page(partial, folder.absolute().name, people, inputs, views, films=films, diagnosis=diagnosis)
 

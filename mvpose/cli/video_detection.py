@@ -12,14 +12,14 @@ import numpy as np
 
 from mvpose.commands.errors import failing
 from mvpose.commands.progress import single_stage
-from mvpose.files.atomic_files import write_atomic
+from mvpose.files.atomic_files import open_manifest, write_atomic
 from mvpose.files.input_files import parse_json, read_bytes
 from mvpose.formats.pictures import PictureSource
 from mvpose.networks.detector import PeopleInPicture, PersonDetector, detect_people
 from mvpose.networks.pose import PoseHead
 
-MARK = ".mvpose-detections"
-"""File by which a folder of detections is recognised."""
+DETECT = "mvpose detect"
+"""What the manifest of a folder of detections says."""
 
 _LARGEST = 2**32  # bytes of a network
 _DECIMALS = 3  # thousandths of a pixel
@@ -42,8 +42,7 @@ def detect_videos(
         RunError: a network failed.
         OSError: the folder cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / MARK).write_text("mvpose detect\n", encoding="utf-8")
+    open_manifest(folder, DETECT)
     files = []
     with single_stage("detect", sum(source.count for source in sources)) as advance:
         for source in sources:

@@ -9,32 +9,39 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from mvpose.files.atomic_files import write_atomic
+from mvpose.files.atomic_files import check_replaceable, files_of_user, write_atomic
+from mvpose.files.input_files import read_bytes
+from mvpose.files.message_text import listed
 
-RESULTS = "inputs.json"
-"""A file that every folder of results holds, and by which one is recognised."""
+HTML = b'<meta name="generator" content="'
+"""Text by which :func:`check_place` recognises a page of these programs."""
+
+PROVENANCE = b'"digests"'
+"""Text by which it recognises JSON with the provenance of a result."""
 
 
-def check_writable(folder: Path, *, option: str = "--out", holds: str = RESULTS) -> None:
-    """Check that a folder can be made or replaced, by making a file where it will be.
+def check_writable(folder: Path, what: str, *, option: str = "--out") -> None:
+    """Check before a run that a folder can be made or replaced, and print which files of the user in it stay.
 
     Args:
         folder: the folder.
+        what: the command, as for :func:`mvpose.files.atomic_files.atomic_folder`.
         option: its option, for messages.
-        holds: a file by which earlier results of the command are recognised.
 
     Raises:
-        ValueError: it cannot, is a file, or holds something other than results.
+        ValueError: it cannot, is a file, or holds something other than results of this command.
     """
-    if folder.exists() and not folder.is_dir():
-        raise ValueError(f"{option} {folder}: is a file; expected a folder for the results")
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / holds).exists():
-        raise ValueError(
-            f"{option} {folder}: has files, and is no earlier result (no {holds}); give a new folder, or empty it"
-        )
+    try:
+        check_replaceable(folder, what)
+    except ValueError as error:
+        raise ValueError(f"{option} {error}".strip()) from None
     _check_above(folder, option)
     if folder.is_dir() and not os.access(folder, os.W_OK):
         raise ValueError(f"{option} {folder}: cannot be written: permission denied")
+    from mvpose.commands.programs import note
+
+    if own := [name for name in files_of_user(folder) if not name.startswith(".")]:
+        note(f"{folder}: {listed(own)} not of the earlier result, or changed since: kept")
 
 
 def check_new(path: Path, *, option: str = "--out") -> None:
@@ -60,13 +67,22 @@ def make_folder(folder: Path, *, option: str = "--out") -> None:
         raise ValueError(f"{option} {folder}: cannot be created: {error.strerror}") from None
 
 
-def check_place(path: Path, *, option: str) -> None:
+def check_place(path: Path | None, *, option: str, mark: bytes) -> None:
     """Check before a run that :func:`write_text` can write a file; create its folder.
 
+    Args:
+        path: the file; None: nothing is written.
+        option: its option, for messages.
+        mark: what every file of this kind holds. An existing file without it is of another origin, and not replaced.
+
     Raises:
-        ValueError: the file cannot be written.
+        ValueError: the file cannot be written, or is of another origin.
     """
+    if path is None:
+        return
     try:
+        if path.is_file() and path.stat().st_size and mark not in read_bytes(path, what="an earlier result"):
+            raise ValueError(f"{option} {path}: exists, and this command did not write it; give another name")
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path.parent):
             pass

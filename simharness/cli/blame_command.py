@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from mvpose.commands.output_files import write_json
+from mvpose.commands.output_files import check_place, write_json
 from simharness.cli.options import JsonFile, Overrides, ScenarioFile, Seed
 from simharness.cli.program import PROGRAM
 
@@ -54,6 +54,7 @@ def blame(
     clocks, matching, and one camera too few. Each gets its share of the loss.
     """
     with PROGRAM.exit_on_error():
+        check_place(json_file, option="--json", mark=b'"shares"')
         from mvpose.commands.progress import reporter
         from simharness.scenario.load import load
 

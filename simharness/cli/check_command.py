@@ -21,6 +21,11 @@ if TYPE_CHECKING:
     from simharness.scenario.load import Study
 
 _LISTED = 8  # changes of each kind: a bug that breaks everything breaks a hundred scores
+_MARKS = {
+    "--baseline": b'"fingerprint"',
+    "--junit": b'"simharness check"',
+    "--summary": b", compared with the baseline",
+}
 _STYLES: dict[Verdict, str] = {"worse": "red", "unexpected": "yellow", "better": "green"}
 
 
@@ -81,7 +86,7 @@ def check(
         if update and accept_better:
             raise ValueError("--accept-better: --update-baseline accepts every change; remove one of them")
         for option, path in ({"--baseline": baseline} if update else reports).items():
-            check_place(path, option=option)
+            check_place(path, option=option, mark=_MARKS[option])
         study = load_study(suite)
         if update:
             _update(study, baseline, workers)

@@ -13,7 +13,7 @@ from rich.console import Console
 from typer.core import TyperGroup
 
 from mvpose.commands.errors import failing
-from mvpose.commands.output_files import write_json
+from mvpose.commands.output_files import PROVENANCE, check_place, write_json
 from simharness.cli.options import JsonFile, Overrides, RecordingFile, RecordingFolder, ScenarioFile
 from simharness.cli.program import PROGRAM
 
@@ -89,6 +89,7 @@ def evaluate_recording(
     """Score methods on a recording; the word [cyan]recording[/] may be left out."""
     with PROGRAM.exit_on_error():
         start = perf_counter()
+        check_place(json_file, option="--json", mark=PROVENANCE)
         from mvpose.commands.progress import reporter
         from mvpose.presets import NEED_DESCRIPTORS, without_repair
         from simharness.cli.evaluation_tables import print_evaluation
@@ -142,6 +143,7 @@ def evaluate_poses(
     """Score the results of [cyan]mvpose estimate[/] or [cyan]mvpose run[/] against the truth of a recording."""
     with PROGRAM.exit_on_error():
         start = perf_counter()
+        check_place(json_file, option="--json", mark=PROVENANCE)
         from mvpose import COCO17
         from mvpose.formats.joint_names import KNOWN, to_skeleton
         from mvpose.formats.people import read_people
@@ -171,6 +173,7 @@ def twin(
     """Compare a recording with simulated copies of it (twins): PCP of four variants, with intervals."""
     with PROGRAM.exit_on_error():
         start = perf_counter()
+        check_place(json_file, option="--json", mark=PROVENANCE)
         from mvpose.commands.progress import reporter
         from simharness.cli.evaluation_tables import print_twin_comparison
         from simharness.reality.detector_fit.fit import fit
@@ -198,6 +201,7 @@ def evaluate_seeds(
     """Score a scenario at many seeds by the protocol of the data sets: PCP of all people and of each person."""
     with PROGRAM.exit_on_error():
         start = perf_counter()
+        check_place(json_file, option="--json", mark=PROVENANCE)
         from mvpose.commands.progress import reporter
         from simharness.cli.evaluation_tables import print_seed_evaluation
         from simharness.reality.seed_evaluation import evaluate_seeds as evaluate_at_seeds

@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 
 from mvpose.commands.errors import failing
-from mvpose.commands.output_files import write_json
+from mvpose.commands.output_files import check_place, write_json
 from simharness.cli.options import RecordingFile, RecordingFolder
 from simharness.cli.program import PROGRAM
 
@@ -38,6 +38,9 @@ def fit_detector(
 ) -> None:
     """Measure the errors of the detector of a recording, and write a detector profile with them."""
     with PROGRAM.exit_on_error():
+        check_place(out, option="--out", mark=b"# Made by: simharness")
+        check_place(figure, option="--figure", mark=b"Matplotlib")
+        check_place(json_file, option="--json", mark=b'"annotation"')
         from mvpose.commands.progress import reporter
         from simharness.reality.detector_fit.fit import fit, write_profile
         from simharness.reality.detector_fit.fit_plot import plot_comparison

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from simharness.planning.plan_result import RigPlan
 
 INTERRUPTED = 130
+_PLAN = "simharness plan"
 
 
 def add_to(app: typer.Typer) -> None:
@@ -102,6 +103,11 @@ def plan(
 
         loaded = read_room(room, changes=options.changes())
         folder = out / (Path(loaded.file).stem or loaded.name)
+        from mvpose.commands.output_files import check_writable
+        from mvpose.files.atomic_files import open_manifest
+
+        check_writable(folder, _PLAN)
+        open_manifest(folder, _PLAN)
         if preview:
             from simharness.outputs.planning.plan_page import write_preview
 

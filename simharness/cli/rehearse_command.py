@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 
 from mvpose.commands.option_groups import grouped
-from mvpose.commands.output_files import make_folder, write_json, write_text
+from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
 from simharness.cli.program import PROGRAM
 
 if TYPE_CHECKING:
@@ -121,7 +121,8 @@ def rehearse(
         setup = _setup(rig, room, surroundings)
         name = calibration.stem or calibration.resolve().name
         place = out or Path("results/rehearsal") / name
-        make_folder(place)
+        check_place(place / "rehearsal.html", option="--out", mark=HTML)
+        check_place(place / "rehearsal.json", option="--out", mark=PROVENANCE)
         effort = RehearsalEffort(
             scenes=scenes, crowd_scenes=min(_CROWD, scenes), workers=workers or os.cpu_count() or 1
         )

@@ -74,6 +74,10 @@ def report(
             raise ValueError("--rerun and --digest: each is written instead of the report; give one of them")
         if blame and (rerun is not None or digest is not None):
             raise ValueError("--blame: is part of the report, which --rerun and --digest replace; give one of them")
+        from mvpose.commands.output_files import HTML, check_place
+
+        check_place(out, option="--out", mark=HTML)
+        check_place(rerun, option="--rerun", mark=b"RRF2")
         thresholds = _thresholds(threshold or [])
         from simharness.study.study_folder import read_study
         from simharness.trial.run_folder import is_run

@@ -97,15 +97,14 @@ def schema(
 ) -> None:
     """Print the JSON schema of scenario files, with which editors complete and validate them."""
     with PROGRAM.exit_on_error():
+        from mvpose.commands.output_files import check_place, write_text
         from simharness.scenario.schema import dumps
 
         if out is None:
             typer.echo(dumps(), nl=False)
             return
-        try:
-            out.write_text(dumps(), encoding="utf-8")
-        except OSError as error:
-            raise ValueError(f"--out {out}: cannot be written: {error.strerror}") from None
+        check_place(out, option="--out", mark=b'"$schema"')
+        write_text(dumps(), out)
 
 
 def mjcf(
@@ -126,12 +125,14 @@ def mjcf(
     MuJoCo's viewer opens it: python -m mujoco.viewer --mjcf=FOLDER/NAME/scene.xml
     """
     with PROGRAM.exit_on_error():
-        from simharness.outputs.benchmark.mjcf_scene import write_mjcf
+        from mvpose.commands.output_files import check_writable
+        from simharness.outputs.benchmark.mjcf_scene import MJCF, write_mjcf
         from simharness.scenario.load import load
         from simharness.trial.stages.build_trial import true_rig
         from simharness.world.scene.build import build
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)
+        check_writable(out / loaded.name, MJCF)
         rig = true_rig(loaded)
         file = write_mjcf(build(loaded, rig), rig, out / loaded.name)
     typer.echo(f"python -m mujoco.viewer --mjcf={file}")

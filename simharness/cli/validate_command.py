@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from mvpose.commands.errors import failing
-from mvpose.commands.output_files import make_folder, write_json, write_text
+from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
 from mvpose.commands.programs import FOUND
 from simharness.cli.options import JsonFile, RecordingFile, RecordingFolder
 from simharness.cli.program import PROGRAM
@@ -69,13 +69,16 @@ def validate(
     """
     with PROGRAM.exit_on_error():
         start = perf_counter()
+        check_place(json_file, option="--json", mark=PROVENANCE)
+        if out is not None:  # before a recording is read
+            _check(out)
         from mvpose.commands.progress import reporter
         from simharness.reality.recording_file import read_recording
 
         recorded = read_recording(recording, folder)
         other = None if fit_on is None else read_recording(fit_on)
         place = out or Path("results/validation") / recorded.name
-        make_folder(place)
+        _check(place)
         from simharness.outputs.validation.page import render_validation
         from simharness.reality.validation.unseen_prediction import predict_halves, simulate_predictions
         from simharness.reality.validation.validation import QUICK, ValidationPlan
@@ -112,6 +115,11 @@ def validate(
     console.print(f"report: {place / 'validation.html'}", soft_wrap=True, highlight=False, markup=False)
     if validation.failed:
         raise typer.Exit(FOUND)
+
+
+def _check(folder: Path) -> None:
+    check_place(folder / "validation.html", option="--out", mark=HTML)
+    check_place(folder / "validation.json", option="--out", mark=PROVENANCE)
 
 
 def _print_verdicts(verdicts: Sequence[BoundVerdict], name: str, console: Console) -> None:

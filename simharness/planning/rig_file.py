@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import numpy as np
 from mvpose import Rig
 from mvpose.camera import Camera
 from mvpose.files.atomic_files import write_atomic
+from mvpose.files.input_files import read_bytes
 from mvpose.files.message_text import one_line
 from mvpose.formats.calibration.pose2sim import write_calibration
 from simharness.planning.planned_room import Room
@@ -76,7 +78,10 @@ def write_rig(rig: Rig, room: Room, path: Path, *, comments: Sequence[str] = ())
             "distortion": first.distortion.tolist(),
         }
     else:
-        write_calibration(path.parent / CALIBRATION, rig)
+        with tempfile.TemporaryDirectory() as folder:
+            written = Path(folder, CALIBRATION)
+            write_calibration(written, rig)
+            write_atomic(path.parent / CALIBRATION, read_bytes(written, what="the calibration"))
         keys = {"layout": "file", "file": CALIBRATION}
     lines = head + [f"{key} = {toml(value)}" for key, value in keys.items()]
     write_atomic(path, ("\n".join(lines) + "\n").encode())

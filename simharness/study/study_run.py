@@ -9,6 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from mvpose.commands.output_files import check_writable, make_folder
 from mvpose.commands.progress import Reporter, Silence
 from mvpose.files.atomic_files import atomic_folder
 from simharness.scenario.load import Study, Value
@@ -24,6 +25,8 @@ from simharness.trial.archive import TrialArchive
 from simharness.trial.identity import code, provenance
 from simharness.trial.needs import require_memory
 from simharness.trial.stages.estimators import estimators_of
+
+_STUDY = "simharness study"
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,7 @@ def run_study(
     rows = [(each, entry) for each in ordered for entry in _entries(opened, each, failed=each.trial in failed)]
     info = _info(study, tally, command)
     try:
-        with atomic_folder(folder) as partial:
+        with atomic_folder(folder, _STUDY) as partial:
             write_study(partial, info, tables(rows, study.factors), document(study))
     except OSError as error:
         raise StoreError(
@@ -302,12 +305,5 @@ def _check_place(folder: Path, store: Path) -> None:
     """Check before the run that the result folder can be written and replaces nothing but a study."""
     if folder.resolve() in (store.resolve(), *store.resolve().parents):
         raise ValueError(f"the results would replace the store {store}: choose another folder with --store")
-    if folder.exists() and not (folder / "study.json").is_file() and (not folder.is_dir() or any(folder.iterdir())):
-        raise ValueError(
-            f"{folder} exists and is not the result folder of a study: choose another folder with --out, or rename the "
-            "study"
-        )
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ValueError(f"--out {folder.parent}: cannot create this folder: {error.strerror}") from None
+    make_folder(folder.parent)
+    check_writable(folder, _STUDY)

@@ -52,14 +52,15 @@ def test_pictures_may_be_left_out(call, tmp_path):
         ((QUICKSTART, "bench", "--every", "0"), "--every must be 1 or more, got 0"),
         ((QUICKSTART, "bench", "--set", "people.cuont=2"), "did you mean people.count?"),
         ((QUICKSTART, "bench", *TINY, "--set", "cameras.radius=4.5"), "cameras.radius"),
-        ((QUICKSTART, "file"), "file/quickstart: this folder cannot be created"),
-        ((QUICKSTART, "existing"), "existing/quickstart: already exists and is no export"),
+        ((QUICKSTART, "file"), "file/quickstart: cannot be written: Not a directory"),
+        ((QUICKSTART, "existing"), "existing/quickstart: has files, and is no result of simharness export"),
         (("nothing.toml", "bench"), "nothing.toml: no such file"),
     ],
 )
 def test_bad_input_gives_one_message(call, tmp_path, arguments, message):
     (tmp_path / "file").touch()
     (tmp_path / "existing" / "quickstart").mkdir(parents=True)
+    (tmp_path / "existing" / "quickstart" / "thesis").touch()
     result = call(*arguments)
     assert result.exit_code == 2
     assert result.stderr.startswith("error: ")

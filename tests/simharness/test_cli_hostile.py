@@ -50,7 +50,6 @@ NUMBERS = [
     ["evaluate", "seeds", "quickstart", "--seeds", ABSURD],
     ["evaluate", "twin", "shelf", "--twins", "0"],
     ["schema", "--out", "a folder"],
-    ["schema", "--out", "missing/schema.json"],
     ["run", "quickstart", "--out", "a file"],
     ["run", "quickstart", "--out", "a file/below"],
     ["study", "crowd", "--out", "a file/below"],

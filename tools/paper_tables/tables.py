@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mvpose.files.atomic_files import atomic_folder
+from mvpose.commands.output_files import write_text
 from mvpose.presets import NEED_DESCRIPTORS
 from simharness.reality.published_scores import ABLATION, COMPARISON
 from simharness.trial.identity import PROVENANCE
@@ -134,7 +134,7 @@ def write_tables(tables: Mapping[str, Any], folder: Path) -> None:
 
     Args:
         tables: from :func:`paper_tables`.
-        folder: replaced as a whole where it holds older tables.
+        folder: a new folder, or one with older tables, which are replaced.
 
     Raises:
         ValueError: the folder holds something else, or cannot be written.
@@ -143,12 +143,8 @@ def write_tables(tables: Mapping[str, Any], folder: Path) -> None:
     if folder.exists() and not has_tables and (not folder.is_dir() or any(folder.iterdir())):
         raise ValueError(f"--out {folder}: exists and holds no tables of the paper; name another folder")
     text = json.dumps(tables, indent=1, ensure_ascii=False, allow_nan=False)
-    try:
-        with atomic_folder(folder) as partial:
-            (partial / "tables.json").write_text(text + "\n", encoding="utf-8")
-            (partial / "tables.md").write_text(markdown(tables), encoding="utf-8")
-    except OSError as error:
-        raise ValueError(f"--out {folder}: cannot be written: {error.strerror}") from None
+    write_text(markdown(tables), folder / "tables.md")
+    write_text(text + "\n", folder / "tables.json")
 
 
 def _comparison(data: str, inputs: Mapping[str, Mapping[str, Any]]) -> Iterator[dict[str, Any]]:

@@ -12,12 +12,9 @@ toolbox's layout (https://github.com/CMU-Perceptual-Computing-Lab/panoptic-toolb
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-
-from mvpose.files.input_files import TABLE, read_json
 
 FORMAT = "simharness export"
 """Value of ``format`` in the manifest of an export."""
@@ -88,27 +85,3 @@ class Layout:
             self.people(camera, 0).parent.mkdir(parents=True)
             if pictures:
                 self.picture(camera, 0).parent.mkdir(parents=True)
-
-
-def check_place(folder: Path) -> None:
-    """Check that an export can be written to ``folder``.
-
-    Raises:
-        ValueError: the folder exists and is no export, or cannot be created.
-    """
-    if folder.exists() and not _is_export(folder):
-        raise ValueError(
-            f"{folder}: already exists and is no export of simharness; expected a new folder, or an earlier export to "
-            "replace. Choose another FOLDER, or move this one away"
-        )
-    first = next(parent for parent in folder.absolute().parents if parent.exists())
-    if not first.is_dir() or not os.access(first, os.W_OK):
-        raise ValueError(f"{folder}: this folder cannot be created, because {first} is no writable folder")
-
-
-def _is_export(folder: Path) -> bool:
-    try:
-        content = read_json(folder / "manifest.json", what="the manifest of an export", most=TABLE)
-    except ValueError:
-        return False
-    return isinstance(content, dict) and content.get("format") == FORMAT

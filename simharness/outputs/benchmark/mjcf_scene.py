@@ -25,6 +25,8 @@ from simharness.types.mesh import Mesh
 from simharness.world.scene.build import Scene
 from simharness.world.scene.playback import Playback
 
+MJCF = "simharness mjcf"
+"""What the manifest of the folder says."""
 SHOWN_GROUP, HIDDEN_GROUP = 1, 3
 """Groups of the geoms that show the meshes, and of those for rays and contacts, which the viewer hides at first."""
 _COLOR_STEPS = 32, 8, 4  # per channel: colours of textured meshes are rounded, the more coarsely the more there are
@@ -37,7 +39,7 @@ def write_mjcf(scene: Scene, rig: Rig, folder: Path) -> Path:
     Args:
         scene: built scene.
         rig: true cameras.
-        folder: folder to write; it must not exist, or is replaced.
+        folder: folder to write; it must not exist, or hold an earlier export, which is replaced.
 
     Returns:
         The file ``scene.xml`` in it.
@@ -54,7 +56,7 @@ def write_mjcf(scene: Scene, rig: Rig, folder: Path) -> Path:
     spec.worldbody.add_light(
         name="key", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, dir=-towards, pos=[0, 0, 10], castshadow=False
     )
-    with atomic_folder(folder) as place:
+    with atomic_folder(folder, MJCF) as place:
         (place / "assets").mkdir()
         for name, mesh in zip(_names(scene), meshes_at(scene, state), strict=True):
             _add_shown(spec, name, mesh, place / "assets")

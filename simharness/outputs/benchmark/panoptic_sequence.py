@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from mvpose import SHELF14, Detections, Rig
 from mvpose.arrays import Floats
+from mvpose.commands.output_files import check_writable
 from mvpose.commands.progress import Reporter, Silence, Stages
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.formats.calibration.panoptic import write_calibration
@@ -29,7 +30,7 @@ from mvpose.formats.people.panoptic_poses import body_scene
 from mvpose.recording import People
 from mvpose.skeleton import PANOPTIC19
 from simharness.outputs.benchmark.joint_confidences import confidences
-from simharness.outputs.benchmark.layout import Layout, check_place
+from simharness.outputs.benchmark.layout import FORMAT, Layout
 from simharness.outputs.benchmark.manifest import manifest
 from simharness.reality.annotation_errors import annotate_simulation
 from simharness.scenario.sections.scenario import Scenario
@@ -67,7 +68,7 @@ class ExportPlan:
     def __post_init__(self) -> None:
         if self.every < 1:
             raise ValueError(f"--every must be 1 or more, got {self.every}")
-        check_place(self.folder)
+        check_writable(self.folder, FORMAT, option="")
 
 
 def export_sequence(
@@ -101,7 +102,7 @@ def export_sequence(
     joints = sequence.of_skeleton(PANOPTIC19)
     picture_source = picture_source_of(scenario, Playback(trial.scene)) if plan.pictures else None
     frames = range(0, scenario.frames, plan.every)
-    with Stages(reporter).stage("write", len(frames)) as advance, atomic_folder(plan.folder) as partial:
+    with Stages(reporter).stage("write", len(frames)) as advance, atomic_folder(plan.folder, FORMAT) as partial:
         layout = Layout(partial, scenario.name)
         layout.make_folders(names, pictures=plan.pictures)
         layout.scenario.write_text(dumps(scenario), encoding="utf-8")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import Detections, Estimate
+from mvpose.commands.output_files import check_writable
 from mvpose.commands.progress import Reporter, Silence
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.report.film_file import FilmFile
@@ -33,6 +34,7 @@ LAYERS = ("truth", "detections", "estimates")
 CHANNELS = ("depth", "ids", "parts")
 """Images that can be written beside the pictures."""
 
+_RENDER = "simharness render"
 _FILM_QUALITY = 24  # constant rate factor of VP9: finer than on pages
 _MOSAIC_WIDTH = 1920  # largest width, pixels
 
@@ -87,15 +89,20 @@ def render(scenario: Scenario, plan: RenderPlan, *, out: Path, reporter: Reporte
         ``mosaic`` like them.
 
     Raises:
-        ValueError: the scenario cannot be built.
+        ValueError: the scenario cannot be built, or the folder holds something else.
     """
     reporter = reporter or Silence()
+    folder = out / scenario.name
+    check_writable(folder, _RENDER)
     trial, layers = _layers(scenario, plan, reporter)
     picture_source = picture_source_of(scenario, Playback(trial.scene))
     frames = range(0, scenario.frames, plan.every)
     names = [*(camera.name for camera in trial.exposures.believed_rig), "mosaic"]
-    folder = out / scenario.name
-    with reporter.stage("render", len(frames)) as advance, atomic_folder(folder) as partial, ExitStack() as stack:
+    with (
+        reporter.stage("render", len(frames)) as advance,
+        atomic_folder(folder, _RENDER) as partial,
+        ExitStack() as stack,
+    ):
         write: Callable[[str, int, Rgb], None] = _PngWriter(partial)
         if plan.video:
             write = stack.enter_context(_VideoWriter(partial, rate=scenario.rate / plan.every))

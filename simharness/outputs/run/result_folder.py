@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from mvpose.commands.output_files import check_writable, make_folder
 from mvpose.commands.progress import Reporter, Silence, Stages
 from mvpose.files.atomic_files import atomic_folder
 from simharness.outputs.run.pictures import draw_pictures, outlines
@@ -27,6 +28,8 @@ from simharness.trial.needs import require_memory
 from simharness.trial.run_folder import Record, write_run
 from simharness.trial.run_trial import TrialResult, run_trial
 
+_RUN = "simharness run"
+
 
 def run(
     scenario: Scenario,
@@ -42,7 +45,7 @@ def run(
     Args:
         scenario: a resolved scenario with its seed.
         out: where the result folder ``<name>-<fingerprint>`` goes. It appears when it is whole and replaces the results
-            of an earlier run of the same scenario.
+            of an earlier run of the same scenario; files of the user in it stay.
         workers: processes that share the frames; the results do not depend on how many.
         reporter: receiver of progress.
         command: the user's command, for the report.
@@ -58,7 +61,9 @@ def run(
     """
     reporter = reporter or Silence()
     require_memory([scenario], workers=min(workers, scenario.frames))
-    _make_folder(out)
+    folder = out / f"{scenario.name}-{fingerprint(scenario)}"
+    make_folder(out)  # before the work, not after it
+    check_writable(folder, _RUN)
     shown = scenario.rendering.color and scenario.rendering.renderer != "rays"
     result = run_trial(
         scenario,
@@ -82,8 +87,7 @@ def run(
         shown_pictures = pictures[1:] if film else pictures  # the film shows typical frames already
         page = render(record, pictures=shown_pictures, things=outlines(trial.scene), film=film, found=found)
         advance(1)
-    folder = out / f"{scenario.name}-{fingerprint(scenario)}"
-    with stages.stage("write", 1), atomic_folder(folder) as partial:
+    with stages.stage("write", 1), atomic_folder(folder, _RUN) as partial:
         write_run(record, partial)
         (partial / "report.html").write_text(page, encoding="utf-8")
         if found:
@@ -157,11 +161,3 @@ def score_table(scores: Mapping[str, VariantScores]) -> pl.DataFrame:
         for variant, each in scores.items()
     ]
     return pl.concat(tables) if tables else pl.DataFrame()
-
-
-def _make_folder(out: Path) -> None:
-    """Before the work, not after it: a disk that cannot be written to is better known at once."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ValueError(f"--out {out}: cannot make this folder: {error.strerror}") from None

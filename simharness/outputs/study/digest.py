@@ -14,7 +14,7 @@ from typing import Any
 
 import polars as pl
 
-from mvpose.files.atomic_files import atomic_folder
+from mvpose.commands.output_files import write_text
 from mvpose.report.svg_plots import plot_sheet
 from simharness.outputs.study import plots, tables
 from simharness.outputs.study.curves import Factor, cases_of, factor_breaking_points, factors, factors_by_case, panels
@@ -39,7 +39,7 @@ def write_digest(results: Results, folder: Path, *, thresholds: Mapping[str, flo
 
     Args:
         results: a study whose trials all finished.
-        folder: replaced as a whole where it holds an older digest.
+        folder: a new folder, or one with an older digest, whose files are replaced.
         thresholds: as in :func:`simharness.outputs.study.page.render_study`.
 
     Raises:
@@ -53,12 +53,12 @@ def write_digest(results: Results, folder: Path, *, thresholds: Mapping[str, flo
     if folder.exists() and not (folder / "digest.json").is_file():
         raise ValueError(f"{folder} exists and holds no digest; name another folder")
     numbers = digest(results, thresholds=thresholds)
-    with atomic_folder(folder) as partial:
-        text = json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False)
-        (partial / "digest.json").write_text(text + "\n", encoding="utf-8")
-        (partial / "table.md").write_text(markdown(numbers), encoding="utf-8")
-        if numbers["factors"]:
-            (partial / "curves.svg").write_text(curves(results, thresholds=thresholds), encoding="utf-8")
+    files = {"table.md": markdown(numbers)}
+    if numbers["factors"]:
+        files["curves.svg"] = curves(results, thresholds=thresholds)
+    files["digest.json"] = json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    for name, text in files.items():  # without a manifest, because people keep these few files with their code
+        write_text(text, folder / name, option="--digest")
 
 
 def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) -> dict[str, Any]:

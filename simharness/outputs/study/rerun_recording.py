@@ -45,9 +45,10 @@ def write_rerun(replay: Replay, path: Path) -> None:
     require_sdk()
     import rerun
 
-    _check_writable(path)
+    partial = path.with_name(f".{path.name}.partial")
+    _check_writable(partial)
     recording = rerun.RecordingStream("simharness", recording_id=f"{replay.trial.scenario.name}-{replay.variant}")
-    recording.save(path)
+    recording.save(partial)
     recording.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     _log_still(recording, replay)
     step = max(1, -(-len(replay.time) * len(replay.trial.exposures.believed_rig) // MOST_PICTURES))
@@ -60,6 +61,7 @@ def write_rerun(replay: Replay, path: Path) -> None:
             _log_pictures(recording, replay, source, frame)
     recording.flush()
     recording.disconnect()
+    partial.replace(path)
 
 
 def require_sdk() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from mvpose.files.atomic_files import write_atomic
 from simharness.reality.detector_fit.detector_measurement import MeasuredDetector
 from simharness.scenario.sections.detector_section import BEARINGS, KINDS
 
@@ -92,7 +94,8 @@ def plot_comparison(measurements: Sequence[MeasuredDetector], path: str | Path) 
             fontsize=8.5,
         )
         try:
-            FigureCanvasAgg(figure).print_png(str(path))
+            FigureCanvasAgg(figure).print_png(content := io.BytesIO())
+            write_atomic(Path(path), content.getvalue())
         except OSError as error:
             raise ValueError(f"--figure {path}: cannot be written: {error.strerror}") from None
 

@@ -65,7 +65,7 @@ class TestEstimate:
         assert table["person"].n_unique() == 2
         assert len(table) == 12 * 2 * 17
         assert np.median(distances(table, joints)) < 0.01
-        files = ["inputs.json", "people.json", "person_0.trc", "person_1.trc", "poses.parquet"]
+        files = [".written", "inputs.json", "people.json", "person_0.trc", "person_1.trc", "poses.parquet"]
         files += [] if page else ["recording.html", "recording.json"]
         assert sorted(each.name for each in (tmp_path / "out").iterdir()) == files
         about = json.loads((tmp_path / "out" / "inputs.json").read_text())
@@ -100,7 +100,7 @@ class TestEstimate:
         assert run(*call, tmp_path / "out").exit_code == 0
         (tmp_path / "thesis").mkdir()
         (tmp_path / "thesis" / "chapter.txt").write_text("years of work")
-        ends(run(*call, tmp_path / "thesis"), 2, "is no earlier result")
+        ends(run(*call, tmp_path / "thesis"), 2, "is no result of mvpose estimate")
 
     def test_sizes_that_no_file_states_are_named(self, lab, tmp_path):
         folder = lab[0]

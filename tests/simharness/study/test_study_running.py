@@ -253,7 +253,7 @@ class TestPlaces:
     def test_only_a_study_is_replaced(self, tmp_path, run):
         (tmp_path / "out" / "views").mkdir(parents=True)
         (tmp_path / "out" / "views" / "thesis.tex").touch()
-        with pytest.raises(ValueError, match="is not the result folder of a study"):
+        with pytest.raises(ValueError, match="has files, and is no result of simharness study"):
             run(study_of(tmp_path))
         assert (tmp_path / "out" / "views" / "thesis.tex").exists()
         assert not called(run.calls)

@@ -336,7 +336,7 @@ class TestAtomicFolder:
         (existing / "thesis.txt").write_text("years of work")
         if content is not None:
             (existing / "manifest.json").write_text(content)
-        with pytest.raises(ValueError, match="tiny: already exists and is no export of simharness"):
+        with pytest.raises(ValueError, match="tiny: has files, and is no result of simharness export"):
             ExportPlan(existing)
         assert (existing / "thesis.txt").read_text() == "years of work"
 
