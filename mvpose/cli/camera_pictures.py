@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mvpose.camera import Camera
+from mvpose.commands.programs import note
 from mvpose.files.message_text import listed
 from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
 from mvpose.formats.detections.sources import Source, assign
-from mvpose.formats.pictures import PictureSource, of_cameras, open_pictures
+from mvpose.formats.pictures import ABOUT, ABOUT_SHARE, PictureSource, of_cameras, open_pictures
 
-_ABOUT, _ABOUT_SHARE = 3, 0.02  # pictures, and share of them, by which headers of videos are often wrong
+_SAME_SHAPE = 0.01  # relative difference of aspect ratios below which pictures are the calibrated ones, scaled
 
 
 def open_videos(paths: Sequence[Path]) -> list[PictureSource]:
@@ -59,6 +60,48 @@ def assigned(cameras: Sequence[Camera], sources: Sequence[PictureSource]) -> lis
     return [by_path[source.path] for source in found.sources]
 
 
+def for_frames(
+    cameras: Sequence[Camera], sources: Sequence[PictureSource], numbers: Sequence[int], *, whole: bool
+) -> list[PictureSource]:
+    """Return pictures for the frames of detections that another program made of them.
+
+    Prints notes about what is not sure: pictures in order, lost ones, smaller ones, more pictures than frames.
+
+    Args:
+        cameras: the cameras.
+        sources: pictures of each camera.
+        numbers: numbers of the frames.
+        whole: whether these are all frames of the detections.
+
+    Raises:
+        ValueError: too few pictures, or pictures of another shape than the camera's.
+    """
+    found = []
+    for camera, source in zip(cameras, sources, strict=True):
+        across, down = (has / calibrated for has, calibrated in zip(source.size, camera.size, strict=True))
+        if abs(across / down - 1.0) > _SAME_SHAPE:
+            raise ValueError(
+                f"{source.path}: pictures of {_text(source.size)} pixels, but camera {camera.name} has "
+                f"{_text(camera.size)}; expected the pictures of this recording. Give those, or leave out --pictures"
+            )
+        if source.size != camera.size:
+            note(f"{source.path}: pictures of {_text(source.size)} pixels are scaled to {_text(camera.size)}")
+        matched, remark = source.numbered_for(numbers)
+        if remark:
+            note(remark)
+        elif whole and source.count > numbers[-1] - numbers[0] + 1 + _slack(source.count):
+            note(
+                f"{source.path}: has {source.count} pictures for frames {numbers[0]} to {numbers[-1]}; check that they "
+                "are of this recording"
+            )
+        found.append(matched)
+    return found
+
+
+def _slack(count: int) -> float:
+    return max(ABOUT, ABOUT_SHARE * count)
+
+
 def check_sizes(cameras: Sequence[Camera], pictures: Sequence[PictureSource]) -> None:
     """Check that pictures have the size for which their cameras are calibrated, where the calibration states it.
 
@@ -84,7 +127,7 @@ def check_lengths(pictures: Sequence[PictureSource]) -> None:
         ValueError: different numbers of pictures.
     """
     counts = [source.count for source in pictures]
-    if max(counts) - min(counts) > max(_ABOUT, _ABOUT_SHARE * max(counts)):
+    if max(counts) - min(counts) > _slack(max(counts)):
         text = listed([f"{source.name} {source.count}" for source in pictures])
         raise ValueError(
             f"the cameras have different numbers of pictures: {text}; cut them to the same time, or, if all begin "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -129,17 +129,18 @@ def estimate_into(
     from mvpose.cli.results import formats_of, options_of, write_results
 
     wanted.check()
-    from mvpose.cli.camera_pictures import assigned, open_videos
+    from mvpose.cli.camera_pictures import assigned, for_frames, open_videos
     from mvpose.cli.estimation import estimate_people, estimator
     from mvpose.cli.examination import examine
 
     own = sources is None and wanted.pictures
     if own:
         sources = open_videos(wanted.pictures or [])
+        choices = _of_pictures(choices, calibration, sources)
     inputs = read_inputs(calibration, detections, choices)
     views = None if sources is None else assigned(inputs.rig.cameras, sources)
-    if views is not None and own:  # detections of another program have the numbers of the pictures
-        views = [view.numbered_for(inputs.numbers.tolist()) for view in views]
+    if views is not None and own:  # detections of another program, perhaps of other pictures
+        views = for_frames(inputs.rig.cameras, views, inputs.numbers.tolist(), whole=choices.frames is None)
     method = estimator(wanted.method, lag=wanted.lag, period=inputs.period)
     people = estimate_people(inputs, method, trust=wanted.trust)
     diagnosis = examine(inputs) if wanted.doctor else None
@@ -156,3 +157,18 @@ def estimate_into(
         diagnosis=diagnosis,
     )
     typer.echo(f"{len(people)} people in {people.frames} frames: {wanted.out}")
+
+
+def _of_pictures(choices: Choices, calibration: Path, sources: Sequence[PictureSource]) -> Choices:
+    """Return options with the rate, and the size, of the pictures, where nothing else states them."""
+    from mvpose.cli.camera_pictures import common_rate
+    from mvpose.formats.calibration.calibration_formats import read_calibration
+    from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
+
+    if choices.times is None:
+        choices = replace(choices, fps=choices.fps or common_rate(sources))
+    rig = read_calibration(calibration, size=UNKNOWN_SIZE, only=choices.only, key="--cameras")
+    sizes = {source.size for source in sources}
+    if choices.size is None and len(sizes) == 1 and UNKNOWN_SIZE in {camera.size for camera in rig}:
+        choices = replace(choices, size="x".join(map(str, sizes.pop())))
+    return choices

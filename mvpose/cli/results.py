@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mvpose.cli.inputs import Inputs
 from mvpose.commands.errors import failing
+from mvpose.commands.programs import note
 from mvpose.commands.progress import single_stage
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.formats.people import Options, check_formats, write_people
@@ -109,11 +110,15 @@ def _write_page(
     from mvpose.report.recording_page import write_page
     from mvpose.report.reprojection import compared_frames
 
+    missing = [0] * len(inputs.rig)
+
     def picture(frame: int, view: int) -> Any:
         return None if views is None else views[view].picture(int(inputs.numbers[frame]))
 
     def moving(view: int, frames: Any) -> Iterator[Any]:
-        return iter(()) if views is None else views[view].some(inputs.numbers[frames].tolist())
+        for each in () if views is None else views[view].some(inputs.numbers[frames].tolist()):
+            missing[view] += each is None
+            yield each
 
     count = 0 if views is None or not films else len(views) * len(compared_frames(people.frames))
     with single_stage("films", count) as advance, failing("the page"):
@@ -128,3 +133,6 @@ def _write_page(
             moving=moving if count else None,
             progress=advance,
         )
+    for camera, lost in zip(inputs.rig, missing, strict=True):
+        if lost:
+            note(f"film of camera {camera.name}: {lost} pictures are missing, damaged or of another size: left plain")

@@ -19,6 +19,9 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm", ".mpg", ".mpeg", ".wmv", ".mts", ".m2ts")
 """Endings of videos in folders that hold those of several cameras."""
 
+ABOUT, ABOUT_SHARE = 3, 0.02
+"""Pictures, and share of them, by which headers of videos are often wrong."""
+
 _COMPLETE = 0.9  # of the frames that a video states: the number in its header is often somewhat wrong
 
 
@@ -42,21 +45,52 @@ class PictureSource:
     size: tuple[int, int]
     numbers: tuple[int, ...] = ()
 
-    def numbered_for(self, frames: Sequence[int]) -> PictureSource:
-        """Return the source with the numbers in the names of a folder's files, if these are the numbers of all frames.
+    def numbered_for(self, frames: Sequence[int]) -> tuple[PictureSource, str]:
+        """Return the source with numbers of pictures that are those of frames, and a remark where that is not sure.
+
+        Frame k of a folder is the file with the number k in its name. Where the names have other numbers, and there are
+        as many pictures as frames, they are taken in order. Frame k of a video is its picture k, from 0 on.
 
         Args:
-            frames: numbers of frames.
+            frames: numbers of all frames, ascending.
+
+        Raises:
+            ValueError: too few pictures for so many frames.
         """
-        numbers = tuple(file_numbers(_files(self.path))) if self.path.is_dir() else ()
-        return replace(self, numbers=numbers) if set(frames) <= set(numbers) else self
+        if not self.path.is_dir():
+            if frames[-1] >= self.count + max(ABOUT, round(ABOUT_SHARE * self.count)):
+                raise ValueError(self._too_few(frames, f"{self.count} pictures"))
+            return self, ""
+        named = tuple(file_numbers(_files(self.path)))
+        found = len(set(frames) & set(named))
+        if found == len(frames):
+            return replace(self, numbers=named), ""
+        numbers = f"{self.count} pictures with the numbers {min(named)} to {max(named)}"
+        which = f"frames {frames[0]} to {frames[-1]}"
+        for wanted in (frames, range(frames[0], frames[-1] + 1)):
+            if len(wanted) == self.count:
+                return replace(self, numbers=tuple(wanted)), f"{self.path}: {numbers} are taken in order for {which}"
+        if found < _COMPLETE * len(frames):
+            raise ValueError(self._too_few(frames, numbers))
+        return replace(self, numbers=named), f"{self.path}: {numbers}; {len(frames) - found} of {which} have none"
+
+    def _too_few(self, frames: Sequence[int], found: str) -> str:
+        return (
+            f"{self.path}: has {found}, and the detections have {len(frames)} frames with the numbers {frames[0]} to "
+            f"{frames[-1]}; expected the pictures of this recording. Give all of them, choose frames with --frames, or "
+            "leave out --pictures"
+        )
 
     def picture(self, number: int) -> NDArray[np.uint8] | None:
         """Return the picture of a number, (h, w, 3) uint8; None where there is none that can be read."""
         return next(self.some([number]), None)
 
     def some(self, numbers: Sequence[int]) -> Iterator[NDArray[np.uint8] | None]:
-        """Yield the pictures of ascending numbers, each read once; None where there is none that can be read."""
+        """Yield the pictures of ascending numbers, each read once; None where none has the size and can be read."""
+        for picture in self._some(numbers):
+            yield picture if picture is not None and picture.shape[1::-1] == self.size else None
+
+    def _some(self, numbers: Sequence[int]) -> Iterator[NDArray[np.uint8] | None]:
         if self.path.is_dir():
             found = _files(self.path)
             files = dict(zip(self.numbers or range(len(found)), found, strict=True))

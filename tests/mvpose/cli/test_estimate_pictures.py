@@ -1,5 +1,7 @@
 """``mvpose estimate --pictures``: pictures and films on the page, with detections of another program."""
 
+import json
+
 import cv2
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from typer.testing import CliRunner
 from mvpose.cli.app import app
 from mvpose.formats.calibration import pose2sim
 from mvpose.formats.pictures import open_pictures
+from mvpose.report.film_file import FilmFile
 
 NAMES = ["cam0", "cam1", "cam2", "cam3"]
 FRAMES = 4
@@ -52,13 +55,80 @@ def test_pictures_have_the_numbers_of_the_frames(lab, tmp_path):
     for row, file in enumerate(sorted((lab / "pictures" / "cam0").iterdir())):
         (tmp_path / f"cam0_{10 + 2 * row}.png").write_bytes(file.read_bytes())
     named = open_pictures(tmp_path)
-    for number, brightness in ((10, 40), (12, 80), (16, 160)):
-        assert np.median(named.numbered_for([10, 12]).picture(number)) == brightness
-    assert named.numbered_for([10]).picture(11) is None
-    assert named.numbered_for([0, 1]) == named
-    assert [np.median(each) for each in named.some([1, 3])] == [80, 160]
-    assert np.median(source.numbered_for([1]).picture(3)) == 160
+    by_name, remark = named.numbered_for([10, 12])
+    assert remark == ""
+    assert [np.median(by_name.picture(number)) for number in (10, 12, 16)] == [40, 80, 160]
+    assert by_name.picture(11) is None
+    in_order, remark = named.numbered_for([300, 301, 302, 303])
+    assert "4 pictures with the numbers 10 to 16 are taken in order for frames 300 to 303" in remark
+    assert [np.median(each) for each in in_order.some([301, 303])] == [80, 160]
+    assert np.median(source.numbered_for([1])[0].picture(3)) == 160
     assert source.picture(4) is None
+
+
+def test_lost_pictures_are_plain_ground_and_counted(tmp_path):
+    for number in (*range(9), 10, 11):
+        cv2.imwrite(str(tmp_path / f"{number}.png"), np.full((96, 128, 3), 5 + number, np.uint8))
+    source, remark = open_pictures(tmp_path).numbered_for(list(range(12)))
+    assert "1 of frames 0 to 11 have none" in remark
+    cv2.imwrite(str(tmp_path / "10.png"), np.zeros((128, 128, 3), np.uint8))  # another camera's
+    found = [None if each is None else np.median(each) for each in source.some([8, 9, 10, 11])]
+    assert found == [13, None, None, 16]
+
+
+class TestPicturesOfAnotherRecording:
+    """Pictures that cannot be those of the detections: people would be drawn into wrong pictures."""
+
+    @pytest.fixture
+    def other(self, tmp_path):
+        def other(count=FRAMES, size=(128, 96), first=0, video=False):
+            for name in NAMES:
+                (tmp_path / "other").mkdir(exist_ok=True)
+                pictures = [np.full((size[1], size[0], 3), 40 + number, np.uint8) for number in range(count)]
+                if video:
+                    film = FilmFile(tmp_path / "other" / f"{name}.mp4", size, 50.0)
+                    for each in pictures:
+                        film.add(each)
+                    film.close()
+                    continue
+                (tmp_path / "other" / name).mkdir(exist_ok=True)
+                for number, each in enumerate(pictures):
+                    cv2.imwrite(str(tmp_path / "other" / name / f"{first + number}.png"), each)
+            return tmp_path / "other"
+
+        return other
+
+    @pytest.mark.parametrize(
+        ("about", "message"),
+        [
+            ({"count": 2}, "has 2 pictures with the numbers 0 to 1, and the detections have 4 frames"),
+            ({"count": 9, "first": 100}, "has 9 pictures with the numbers 100 to 108"),
+            ({"size": (128, 72)}, "pictures of 128 x 72 pixels, but camera cam0 has 1280 x 960"),
+            ({"size": (128, 72), "video": True}, "pictures of 128 x 72 pixels, but camera cam0 has 1280 x 960"),
+        ],
+    )
+    def test_it_is_refused_before_the_estimation(self, lab, tmp_path, other, about, message):
+        result = estimate(lab, tmp_path / "out", "--pictures", other(**about))
+        assert result.exit_code == 2
+        assert message in result.stderr.splitlines()[-1]
+        assert not (tmp_path / "out").exists()
+
+    def test_a_video_that_is_too_short_is_refused(self, tmp_path, other):
+        source = open_pictures(other(count=20, video=True) / "cam0.mp4")
+        assert source.numbered_for(list(range(22)))[0] is source  # headers are often wrong by so much
+        with pytest.raises(ValueError, match="has 20 pictures, and the detections have 601 frames"):
+            source.numbered_for(list(range(601)))
+
+    def test_more_pictures_than_frames_are_noted(self, lab, tmp_path, other):
+        result = estimate(lab, tmp_path / "out", "--pictures", other(count=30), "--no-films")
+        assert result.exit_code == 0
+        assert "cam0: has 30 pictures for frames 0 to 3; check that they are of this recording" in result.stderr
+
+    def test_the_rate_is_that_of_the_videos(self, lab, tmp_path, other):
+        words = ["estimate", lab / "Calib.toml", lab / "openpose", "--out", tmp_path / "out", "--method", "fast"]
+        words += ["--pictures", other(video=True), "--no-films"]
+        assert CliRunner().invoke(app, list(map(str, words))).exit_code == 0
+        assert json.loads((tmp_path / "out" / "inputs.json").read_text())["fps"] == 50
 
 
 def test_films_may_be_left_out(lab, tmp_path):
