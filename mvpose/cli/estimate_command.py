@@ -12,8 +12,10 @@ import typer
 from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
 from mvpose.cli.program import PROGRAM
 from mvpose.commands.option_groups import grouped
+from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
+    from mvpose.formats.people.outliers import Limits
     from mvpose.formats.pictures import PictureSource
 
 
@@ -78,12 +80,35 @@ class Wanted:
         bool, typer.Option("--trust", help="Write people even if calibration and detections contradict each other.")
     ] = False
 
+    max_error: Annotated[
+        float, typer.Option(metavar="M", help="Leave out joints with a larger expected error, metres; inf: none.")
+    ] = 0.25
+    max_speed: Annotated[
+        float,
+        typer.Option(
+            metavar="M/S", help="Leave out arms and legs that are faster, and trunks at half of it; inf: none."
+        ),
+    ] = 24.8
+    min_frames: Annotated[int, typer.Option(metavar="N", help="Leave out people who are there in fewer frames.")] = 5
+
+    @property
+    def limits(self) -> Limits:
+        """Limits of what results hold.
+
+        Raises:
+            ValueError: one that is not above 0.
+        """
+        from mvpose.formats.people.outliers import Limits
+
+        return Limits(self.max_error, self.max_speed, self.min_frames)
+
     def check(self) -> None:
         """Check all of them.
 
         Raises:
             ValueError: an option that cannot be, or a folder that cannot be written.
         """
+        _ = self.limits
         from mvpose.cli.results import ESTIMATE, formats_of, options_of
         from mvpose.commands.output_files import check_writable
 
@@ -132,6 +157,8 @@ def estimate_into(
     from mvpose.cli.camera_pictures import assigned, for_frames, open_videos
     from mvpose.cli.estimation import estimate_people, estimator
     from mvpose.cli.examination import examine
+    from mvpose.estimators import SequenceEstimator
+    from mvpose.formats.people.outliers import within_limits
 
     own = sources is None and wanted.pictures
     if own:
@@ -142,7 +169,10 @@ def estimate_into(
     if views is not None and own:  # detections of another program, perhaps of other pictures
         views = for_frames(inputs.rig.cameras, views, inputs.numbers.tolist(), whole=choices.frames is None)
     method = estimator(wanted.method, lag=wanted.lag, period=inputs.period)
-    people = estimate_people(inputs, method, trust=wanted.trust)
+    found = estimate_people(inputs, method, trust=wanted.trust)
+    people, left_out = within_limits(found, wanted.limits, tracked=isinstance(method, SequenceEstimator))
+    if told := left_out.sentences():
+        note(f"left out: {'; '.join(told)}")
     diagnosis = examine(inputs) if wanted.doctor else None
     write_results(
         wanted.out,
@@ -150,7 +180,7 @@ def estimate_into(
         inputs,
         formats=formats_of(wanted.formats),
         options=options_of(wanted.files_up, together=wanted.together),
-        command=PROGRAM.command_line(),
+        left_out=left_out,
         page=wanted.page,
         views=views,
         films=wanted.films,

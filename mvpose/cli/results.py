@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mvpose.cli.inputs import Inputs
+from mvpose.cli.program import PROGRAM
 from mvpose.commands.errors import failing
 from mvpose.commands.programs import note
 from mvpose.commands.progress import single_stage
@@ -18,6 +19,7 @@ from mvpose.recording import People
 
 if TYPE_CHECKING:
     from mvpose.calibration.findings import Diagnosis
+    from mvpose.formats.people.outliers import LeftOut
     from mvpose.formats.pictures import PictureSource
 
 ESTIMATE = "mvpose estimate"
@@ -59,7 +61,7 @@ def write_results(
     *,
     formats: Sequence[str],
     options: Options,
-    command: str,
+    left_out: LeftOut,
     page: bool = True,
     views: Sequence[PictureSource] | None = None,
     films: bool = True,
@@ -73,7 +75,7 @@ def write_results(
         inputs: what they were estimated from.
         formats: names of formats.
         options: what the files are to be like.
-        command: command of the user.
+        left_out: what was left out of the people.
         page: whether to write the page.
         views: pictures of each camera, for the page; None: there are none.
         films: whether the page gets a film of each camera, where there are pictures.
@@ -86,14 +88,24 @@ def write_results(
         write_people(people, partial, formats=ALWAYS)  # in the axes of the cameras, which pages and commands expect
         write_people(people, partial, formats=[each for each in formats if each not in ALWAYS], options=options)
         about = {
-            "command": command,
+            "command": PROGRAM.command_line(),
             "cameras": [{"name": camera.name, "size": list(camera.size)} for camera in inputs.rig],
             "fps": round(people.rate, 6),
             "numbers": inputs.numbers.tolist(),  # of the frames in the files of detections; ours count from 0
+            "people": [_span(people, row) for row in range(len(people))],
+            "left_out": left_out.to_json(),
         }
         (partial / INPUTS).write_text(json.dumps(about) + "\n", encoding="utf-8")
         if page:
-            _write_page(partial, folder.absolute().name, people, inputs, views, films=films, diagnosis=diagnosis)
+            name = folder.absolute().name
+            _write_page(partial, name, people, inputs, views, films=films, diagnosis=diagnosis, left_out=left_out)
+
+
+def _span(people: People, row: int) -> dict[str, int]:
+    """Return where a person is there: TRC, C3D and BVH files begin at its first frame, which counts from 0."""
+    span = people.span(row)
+    seen = int(people.present[:, row].any(axis=1).sum())
+    return {"id": int(people.ids[row]), "first_frame": span.start, "last_frame": span.stop - 1, "frames": seen}
 
 
 def _write_page(
@@ -105,6 +117,7 @@ def _write_page(
     *,
     films: bool,
     diagnosis: Diagnosis | None,
+    left_out: LeftOut,
 ) -> None:
     """Write the page, with pictures and films where there are any."""
     from mvpose.report.recording_page import write_page
@@ -129,6 +142,7 @@ def _write_page(
             rig=inputs.rig,
             frames=inputs.frames,
             diagnosis=diagnosis,
+            left_out=left_out,
             pictures=None if views is None else picture,
             moving=moving if count else None,
             progress=advance,

@@ -15,6 +15,7 @@ from mvpose.calibration.findings import Diagnosis
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.files.atomic_files import write_atomic
+from mvpose.formats.people.outliers import LeftOut
 from mvpose.recording import People
 from mvpose.report import recording_plots as plots
 from mvpose.report import tables
@@ -42,7 +43,7 @@ def write_page(
     rig: Rig,
     frames: Sequence[Detections],
     diagnosis: Diagnosis | None = None,
-    doctor_page: str = "",
+    left_out: LeftOut | None = None,
     pictures: Pictures | None = None,
     moving: MovingPictures | None = None,
     progress: Callable[[int], None] = lambda _: None,
@@ -56,7 +57,7 @@ def write_page(
         rig: V cameras.
         frames: detections of the T frames.
         diagnosis: what the doctor found, where the recording was examined.
-        doctor_page: address of the doctor's page, relative to the folder.
+        left_out: what was left out of the people.
         pictures: function that returns the picture of a frame and view; by default people are drawn on plain ground.
         moving: pictures for a film of each camera, in a folder beside the page; without them there is none.
         progress: called with the number of pictures that were added to films since the last call.
@@ -79,12 +80,14 @@ def write_page(
         name=name,
         facts=_facts(recording),
         cards=_cards(recording),
-        doctor=_doctor(diagnosis, doctor_page),
+        doctor=_doctor(diagnosis),
+        missing=[] if left_out is None else left_out.sentences(),
         detections=sum(map(len, frames)),
         films=films,
         **_sections(recording, pictures),
     )
     numbers = {"name": name, **recording.numbers(), "doctor": None if diagnosis is None else diagnosis.to_json()}
+    numbers["left_out"] = None if left_out is None else left_out.to_json()
     write_atomic(Path(folder) / NUMBERS, (json.dumps(numbers, indent=1, allow_nan=False) + "\n").encode())
     write_atomic(Path(folder) / PAGE, page.encode())
     return Path(folder) / PAGE
@@ -124,14 +127,14 @@ def _with_unit(value: float, digits: int, unit: str) -> str:
     return f"{value:.{digits}f} {unit}" if math.isfinite(value) else tables.NOTHING
 
 
-def _doctor(diagnosis: Diagnosis | None, page: str) -> dict[str, Any] | None:
+def _doctor(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
     if diagnosis is None:
         return None
     lines = [sentence_of(finding) for finding in diagnosis.alarms[1:]]
     if diagnosis.verdict == "cannot tell":
         lines += [sentence_of(finding) for finding in diagnosis.findings if finding.severity == "unknown"]
     lines = lines or list(diagnosis.evidence[:4])
-    return {"verdict": diagnosis.verdict, "sentence": sentence(diagnosis), "lines": lines, "link": page}
+    return {"verdict": diagnosis.verdict, "sentence": sentence(diagnosis), "lines": lines}
 
 
 def _sections(recording: ExaminedRecording, pictures: Pictures | None) -> dict[str, Any]:

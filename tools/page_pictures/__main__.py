@@ -69,7 +69,6 @@ def _write_pages(folder: Path, result: TrialResult) -> None:
         rig=recording.rig,
         frames=frames,
         diagnosis=fine,
-        doctor_page="doctor.html",
         pictures=picture,
     )
     wrong = _moved(recording.rig)

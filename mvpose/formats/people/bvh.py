@@ -23,13 +23,16 @@ _CHANNELS = " ".join(f"{axis}rotation" for axis in _ORDER)
 
 
 def write(export: Export) -> Iterator[tuple[str, bytes]]:
-    """Yield a file for each person to whom a body can be fitted; all have all frames of the recording."""
+    """Yield a file for each person to whom a body can be fitted, from its first to its last frame.
+
+    Poses in a gap between them are those of the fitted body, which moves smoothly across.
+    """
     for fit in export.bodies:
         nodes = hierarchy(fit, export.uniform).turned(export.axes("y"))
         order = _depth_first(nodes, 0)
-        lines = ["HIERARCHY", *_described(nodes, 0, ""), "MOTION", f"Frames: {len(nodes.root)}"]
+        table = np.concatenate([_UNIT * nodes.root, _angles(nodes.rotations[:, order])], axis=1)[nodes.seen]
+        lines = ["HIERARCHY", *_described(nodes, 0, ""), "MOTION", f"Frames: {len(table)}"]
         lines.append(f"Frame Time: {1.0 / export.uniform.rate:.8f}")
-        table = np.concatenate([_UNIT * nodes.root, _angles(nodes.rotations[:, order])], axis=1)
         lines += [" ".join(f"{value:.5f}" for value in row) for row in table]
         yield f"person_{nodes.identity}.bvh", ("\n".join(lines) + "\n").encode()
 
