@@ -188,6 +188,18 @@ def _bend(points, terms, inverse):
     return result
 
 
+class UnlikelyRigError(ValueError):
+    """Cameras that are each valid, and stand where the cameras of no rig do.
+
+    Attributes:
+        cameras: the cameras.
+    """
+
+    def __init__(self, message: str, cameras: Sequence[Camera]) -> None:
+        super().__init__(message)
+        self.cameras = tuple(cameras)
+
+
 @dataclass(frozen=True)
 class Rig(Sealed):
     """Two or more calibrated cameras in one world, in a fixed order that is the view index of every array.
@@ -215,18 +227,41 @@ class Rig(Sealed):
                 )
         if len(self.cameras) < 2:
             raise ValueError(f"a rig needs at least 2 cameras to triangulate, got {len(self.cameras)}")
+        self._check_places()
+
+    @classmethod
+    def unchecked(cls, cameras: Sequence[Camera]) -> Rig:
+        """Return a rig of cameras that may stand anywhere, for the search of what is wrong with their calibration."""
+        rig = cls.__new__(cls)
+        object.__setattr__(rig, "cameras", tuple(cameras))
+        return rig
+
+    def _check_places(self) -> None:
         with np.errstate(over="ignore", invalid="ignore"):
             extent = np.ptp(self.centers, axis=0).max()
+            away = np.linalg.norm(self.centers - np.median(self.centers, axis=0), axis=1)
         if not extent <= self._LARGEST:
-            raise ValueError(
+            far = [
+                camera.name or f"camera {view}" for view, camera in enumerate(self) if not away[view] <= self._LARGEST
+            ]
+            few = 0 < len(far) <= len(self) // 2
+            raise UnlikelyRigError(
                 f"the cameras stand up to {extent:.0f} apart, which cannot be metres (expected at most "
-                f"{self._LARGEST:g}): the calibration is probably in millimetres or centimetres; divide its "
-                "translations by 1000 or 100"
+                f"{self._LARGEST:g}): "
+                + (
+                    f"the translation of {', '.join(far)} alone is probably in millimetres or centimetres; those of "
+                    "the other cameras are right; "
+                    if few
+                    else "the calibration is probably in millimetres or centimetres; "
+                )
+                + "`mvpose doctor` says what it is, and what mends it",
+                self.cameras,
             )
         if extent < _SAME_POINT:
-            raise ValueError(
+            raise UnlikelyRigError(
                 f"all {len(self)} cameras of the rig stand in one point, {self.centers[0].tolist()}: nothing can be "
-                "triangulated; expected centres (-Rᵀ t, metres) that differ: check the t of each camera"
+                "triangulated; expected centres (-Rᵀ t, metres) that differ: check the t of each camera",
+                self.cameras,
             )
 
     def __len__(self) -> int:

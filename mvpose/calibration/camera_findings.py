@@ -9,21 +9,16 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from mvpose.calibration.cameras import CameraFault, CameraFit
-from mvpose.calibration.findings import Finding, Severity
+from mvpose.calibration.findings import Finding, judged
+from mvpose.calibration.mends import Mend
 from mvpose.camera import Camera, Rig
-
-_DEGREES, _METRES = 0.5, 0.04
-"""Corrections from which a camera has moved: twice those that are estimated for careful, published calibrations (0.16
-to 0.28 degrees and 1 to 2.5 cm on Shelf)."""
-
-_PERCENT, _CENTER, _EDGE = 2.0, 10.0, 6.0  # of the focal length; px; px at the outermost tenth of the people
 
 _SYSTEMATIC = np.array([*[np.radians(0.1)] * 3, *[0.008] * 3, 0.003, 1.0, 1.0, 0.01, 0.002])
 """Standard deviations of the bias of detectors, which place joints differently from different sides (FACTS: hips are
 off by 30 to 50 mm); it does not shrink with the length of a recording."""
 
 _LENSES = ("distortion-ignored", "distortion-model")
-_REPAIR = "mvpose repair CALIBRATION DETECTIONS --out NEW"
+_REPAIR = ("--free", "extrinsics")
 _DRAWS = 4000
 
 
@@ -66,14 +61,15 @@ def _of_all_lenses(findings: list[Finding], rig: Rig) -> list[Finding]:
     calibrated = np.array([rig[each.view].distortion[0] for each in lenses if each.view is not None])
     seen = ", ".join(str(each.camera) for each in lenses)
     k1 = float(np.median(changes))
+    mend = f"k1:{k1:.4f}"
+    advice = "calibrate the lenses; the command is a makeshift until then"
     if kinds == {"distortion-ignored"}:
         text = "the pictures of all cameras are distorted, and the calibration has no distortion"
-        mend = f"calibrate the lenses; until then: for camera in rig: distortion = np.array([{k1:.3f}, 0, 0, 0, 0])"
     elif (np.abs(calibrated + changes) < 0.35 * np.abs(calibrated)).all():
         text = "the keypoints of all cameras are of pictures whose distortion was removed already"
-        mend = "for camera in rig: distortion = np.zeros(5)"
+        mend, advice = "undistorted", ""
     else:
-        text, mend = "the lenses of all cameras have another distortion than calibrated", "calibrate the lenses again"
+        text = "the lenses of all cameras have another distortion than calibrated"
     interval = tuple(float(np.median([each.interval["k1"][side] for each in lenses])) for side in (0, 1))
     whole = Finding(
         lenses[0].kind,
@@ -82,7 +78,8 @@ def _of_all_lenses(findings: list[Finding], rig: Rig) -> list[Finding]:
         size={"k1": k1},
         interval={"k1": (interval[0], interval[1])},
         cost=sum(each.cost for each in lenses),
-        mend=mend,
+        mend=advice,
+        repair=("--mend", mend),
     )
     return [*(each for each in findings if each not in lenses), whole]
 
@@ -99,10 +96,10 @@ def _finding(
     view, kind, change = found.fault.view, found.fault.model.kind, found.change
     name = names[view]
     draws = _draws(change, found.covariance)
-    mend = _REPAIR
+    repair: tuple[str, ...] = _REPAIR
+    judged_by: dict[str, tuple[float, float]] = {}  # size and its lowest value, where it is not one of the finding
     if kind == "moved-camera":
         size, interval = _pose_size(change, draws)
-        alarm = size["degrees"] >= _DEGREES or size["metres"] >= _METRES
         cost = np.radians(size["degrees"]) * depth[view] + size["metres"]
         text = f"{name} is not in its calibrated pose: it is off by {size['degrees']:.1f} degrees and "
         text += f"{100 * size['metres']:.0f} cm"
@@ -114,45 +111,55 @@ def _finding(
             size["since_s"] = float(starts[best])
             interval["since_s"] = float(starts[max(low - 1, 0)]), float(starts[later])
             text += f", since {starts[best]:.1f} s"
+        if undetermined and len(found.fault.model.index) == 3:  # a repair would be refused
+            repair = ("--mend", _turn(change, name))
     elif kind == "focal-length":
         percent = 100 * np.expm1(draws[:, 6])
         size = {"percent": float(100 * np.expm1(change[6]))}
         interval = {"percent": _range(percent)}
-        alarm, cost = abs(size["percent"]) >= _PERCENT, abs(size["percent"]) / 100 * 0.3 * depth[view]
+        judged_by = {"percent": (size["percent"], min(np.abs(interval["percent"])))}
+        cost = abs(size["percent"]) / 100 * 0.3 * depth[view]
         text = f"the focal length of {name} should be {size['percent']:+.1f} %"
-        mend = f"K = rig[{view}].K.copy(); K[:2, :2] *= {np.exp(change[6]):.4f}"
+        repair = ("--mend", str(Mend("focal", f"{np.exp(change[6]):.4f}", (name,))))
     elif kind == "principal-point":
         size = {"x_px": float(change[7]), "y_px": float(change[8])}
         interval = {"x_px": _range(draws[:, 7]), "y_px": _range(draws[:, 8])}
         shift = float(np.hypot(*change[7:9]))
-        alarm, cost = shift >= _CENTER, shift / rig[view].K[0, 0] * depth[view]
-        text = f"the principal point of {name} is off by {shift:.0f} px"
-        mend = f"K = rig[{view}].K.copy(); K[:2, 2] += [{change[7]:.1f}, {change[8]:.1f}]  # cropped pictures?"
+        judged_by = {"px": (shift, _range(np.hypot(draws[:, 7], draws[:, 8]))[0])}
+        cost = shift / rig[view].K[0, 0] * depth[view]
+        text = f"the principal point of {name} is off by {shift:.0f} px (are the pictures cropped?)"
+        repair = ("--mend", str(Mend("center", f"{change[7]:.1f},{change[8]:.1f}", (name,))))
     elif kind == "distortion-ignored":
         camera = rig[view]
-        corner = abs(change[9]) * _outer_radius(fit, camera) ** 3 * camera.K[0, 0]
+        lever = _outer_radius(fit, camera) ** 3 * camera.K[0, 0]
+        corner = abs(change[9]) * lever
         size, interval = {"k1": float(change[9])}, {"k1": _range(draws[:, 9])}
-        alarm, cost = corner >= _EDGE, 0.3 * corner / camera.K[0, 0] * depth[view]
+        judged_by = {"edge_px": (corner, min(np.abs(interval["k1"])) * lever)}
+        cost = 0.3 * corner / camera.K[0, 0] * depth[view]
         text = f"the lens of {name} has another distortion than calibrated: {corner:.0f} px off near the edge"
         kind = "distortion-model" if camera.distortion.any() else kind
-        mend = f"distortion = rig[{view}].distortion + np.array([{change[9]:.3f}, 0, 0, 0, 0])"
+        repair = ("--mend", str(Mend("k1", f"{change[9]:.4f}", (name,))))
     else:  # offsets of clocks are findings of mvpose.calibration.clocks
         return None
-    severity: Severity = "alarm" if alarm else "note"
-    if alarm and undetermined:
-        severity = "unknown"
-    probability = found.probability * found.kind_probability
+    probability = min(found.probability * found.kind_probability, 1.0)
+    judged_by = judged_by or {key: (value, interval[key][0]) for key, value in size.items()}
+    severity = judged(
+        {key: value for key, (value, _) in judged_by.items()},
+        {key: low for key, (_, low) in judged_by.items()},
+        probability=probability,
+        determined=not undetermined,
+    )
     return Finding(
         kind,
         text,
         severity,
-        min(probability, 1.0),
+        probability,
         name,
         view,
         size,
         interval,
         cost=float(probability * cost / len(rig)),
-        mend=mend,
+        repair=repair,
     )
 
 
@@ -174,11 +181,17 @@ def turn_finding(rig: Rig, cameras: Floats, covariance: Floats, view: int, names
     text = f"{names[view]} is not in its calibrated pose: it is off by {size['degrees']:.1f} degrees and "
     text += f"{100 * size['metres']:.0f} cm"
     cost = (np.radians(size["degrees"]) * 3.0 + size["metres"]) / len(rig)
-    return Finding("moved-camera", text, "alarm", 0.99, names[view], view, size, interval, cost, _REPAIR)
+    repair = ("--mend", _turn(change, names[view]), *_REPAIR)
+    return Finding("moved-camera", text, "alarm", 0.99, names[view], view, size, interval, cost, repair=repair)
+
+
+def _turn(change: Floats, name: str) -> str:
+    """Return the mend that turns a camera in its place."""
+    return str(Mend("turn", ",".join(f"{angle:.3f}" for angle in np.degrees(change[:3])), (name,)))
 
 
 def _note(fit: CameraFit, view: int, names: Sequence[str], depth: Floats) -> list[Finding]:
-    """Return a note if the estimated correction is significant but as small as that of good calibrations."""
+    """Return a finding if the correction of a camera that no fault explains is significant."""
     change, covariance = fit.change[view], fit.covariance[view]
     deviation = np.abs(change[:6]) / np.sqrt(np.diagonal(covariance)[:6])
     if deviation.max() < 3.0:
@@ -186,10 +199,12 @@ def _note(fit: CameraFit, view: int, names: Sequence[str], depth: Floats) -> lis
     size, interval = _pose_size(change, _draws(change, covariance))
     if size["degrees"] < 0.1 and size["metres"] < 0.01:
         return []
+    severity = judged(size, {key: low for key, (low, _) in interval.items()}, determined=False)
     text = f"the estimated correction of {names[view]} is {size['degrees']:.2f} degrees and "
-    text += f"{100 * size['metres']:.1f} cm, as small as for good calibrations"
+    text += f"{100 * size['metres']:.1f} cm, "
+    text += "as small as for good calibrations" if severity == "note" else "larger than for good calibrations"
     cost = (np.radians(size["degrees"]) * depth[view] + size["metres"]) / len(names)
-    return [Finding("moved-camera", text, "note", 0.5, names[view], view, size, interval, cost, _REPAIR)]
+    return [Finding("moved-camera", text, severity, 0.5, names[view], view, size, interval, cost, repair=_REPAIR)]
 
 
 def _pose_size(change: Floats, draws: Floats) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:

@@ -53,7 +53,13 @@ def _moved(degrees: float, metres: float) -> Model:
     return Model("moved-camera", 0.05, (0, 1, 2, 3, 4, 5), (*[np.radians(degrees)] * 3, *[metres] * 3))
 
 
+def _turned(degrees: float) -> Model:
+    return Model("moved-camera", 0.05, (0, 1, 2), (np.radians(degrees),) * 3)
+
+
 MODELS = (
+    _turned(1.0),
+    _turned(4.0),
     _moved(0.6, 0.04),
     _moved(2.0, 0.12),
     _moved(6.0, 0.40),
@@ -106,7 +112,7 @@ def candidates(blocks: int, view: int) -> list[tuple[FaultHypothesis, float]]:
     """Return all faults of a camera with their log prior odds to no fault."""
     result = []
     for model in MODELS:
-        courses = _courses(blocks) if model.kind == "moved-camera" else [(ALWAYS, np.ones(blocks), 1.0)]
+        courses = _courses(blocks) if len(model.index) == 6 else [(ALWAYS, np.ones(blocks), 1.0)]
         for course, profile, prior in courses:
             result.append(
                 (FaultHypothesis(model, view, course, profile), float(np.log(model.prior * prior / _NOTHING)))

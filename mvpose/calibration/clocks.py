@@ -19,7 +19,7 @@ from scipy.stats import t as student
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.calibration.clock_adjustment import ClockAdjustment, adjust
 from mvpose.calibration.clock_search import coarse_offsets
-from mvpose.calibration.findings import Finding, camera_names
+from mvpose.calibration.findings import ALARM, NEW_TIMES, Finding, camera_names
 from mvpose.calibration.joint_tracks import ImageTracks
 from mvpose.calibration.picture_order import ClockStep, find_step, joined_steps, repeated_pictures
 from mvpose.calibration.sightings import Sightings, gather
@@ -34,7 +34,6 @@ _SLOW = 0.08  # s between frames, beyond which a parabola does not follow limbs 
 _SLOW_SHARE = 0.12  # error by what frames are longer (simulated people who walk and run at 5 Hz, seeds 2001 to 2003)
 _STILL = 0.2  # least share of the motion that is not noise
 _AGREE = 3.0  # standard deviations within which a camera has the time of the reference
-_HARMLESS = 0.010  # s: people who walk are 1.3 cm elsewhere, less than a keypoint is wrong by
 _TYPICAL_SPEED = 1.3  # m/s, of people who walk (Bohannon, Age and Ageing 1997)
 _MOST_STEPS = 20
 _FLOOR = 0.0018  # s: errors that every stride repeats (hidden joints that are guessed) do not average out; measured on
@@ -103,7 +102,7 @@ class Clocks(Sealed):
             if low <= 0.0 <= high:
                 continue
             deviation = max((high - low) / 2 / norm.ppf((1 + _SHARE) / 2), 1e-6)
-            harmful = 1e3 * _HARMLESS
+            harmful = ALARM["ms"]
             probability = norm.sf((harmful - ms) / deviation) + norm.cdf((-harmful - ms) / deviation)
             alarm = max(low, -high) > harmful
             yield Finding(
@@ -116,7 +115,7 @@ class Clocks(Sealed):
                 size={"ms": float(ms)},
                 interval={"ms": (float(low), float(high))},
                 cost=float(probability * _TYPICAL_SPEED * abs(ms) / 1e3),
-                mend="frames = estimate_clocks(rig, frames).corrected(frames)",
+                repair=(NEW_TIMES, "TIMES"),
             )
 
     def _dropped_findings(self) -> Iterable[Finding]:
@@ -132,7 +131,7 @@ class Clocks(Sealed):
                 view=step.view,
                 size={"pictures": float(count), "since_s": step.time},
                 cost=_TYPICAL_SPEED * count * self.period,
-                mend="frames = estimate_clocks(rig, frames).corrected(frames)",
+                repair=(NEW_TIMES, "TIMES"),
             )
 
     def _repeated_findings(self) -> Iterable[Finding]:
@@ -149,7 +148,7 @@ class Clocks(Sealed):
                 view=view,
                 size={"pictures": float(count), "percent": 100 * share},
                 cost=_TYPICAL_SPEED * self.period * share,
-                mend="frames = estimate_clocks(rig, frames).corrected(frames)",
+                repair=(NEW_TIMES, "TIMES"),
             )
 
 

@@ -4,7 +4,7 @@ A hypothesis says how the files would have to be read if one mistake had been ma
 compared by the same evidence (:mod:`.consistency`) on the same detections, "nothing is wrong" among them. The best one
 is applied, and the search goes on with it, so that several cameras may have mistakes of their own.
 
-The findings name the mistakes and how to mend the files. The unit of all files shows in the size of people alone.
+The findings name the mistakes and how to mend the files.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from scipy.special import logsumexp
 from mvpose.calibration.consistency import Consistency, Reading
 from mvpose.calibration.file_mistakes import CHANGES, SWAPPED, Mistake
 from mvpose.calibration.findings import Finding
+from mvpose.calibration.mends import Mend
 from mvpose.calibration.picture_offsets import EXPLAINED, OffsetSearch
 from mvpose.calibration.reading_changes import Size, changed
 
@@ -37,21 +38,6 @@ _PLAUSIBLE = 4.0  # mean squared move in these, up to which moved cameras are be
 _LARGEST_TURN = float(np.radians(5.0))  # a crop of 6 % of a picture with a field of view of 75 degrees is such a turn
 _LEAST_AGREEMENT = 0.2  # people who are not the same agree less, by chance
 _NOTHING = 0.8  # prior probability that the files are right
-
-_UNITS = {
-    0.001: "divided by 1000 twice (or metres taken for millimetres)",
-    0.01: "divided by 100 (or metres taken for centimetres)",
-    0.1: "divided by 10",
-    0.0254: "metres taken for inches",
-    10.0: "in decimetres",
-    39.37: "in inches",
-    100.0: "in centimetres",
-    1000.0: "in millimetres",
-    3.281: "in feet",
-}
-_SAME_UNIT = 1.3  # factor within which people's size names a unit: adults and children differ by more from other sizes
-_ODD = 1.6  # times as large or as small as adults: an alarm; a child of six has two thirds of an adult's size
-_UNUSUAL = 1.25  # a note
 
 
 @dataclass(frozen=True)
@@ -199,7 +185,11 @@ def _likeliest(
     posterior = gains + prior + np.log1p(-_NOTHING)
     best = int(np.argmax(posterior))
     named = mistakes[best]
-    same = [k for k, each in enumerate(mistakes) if each.kind == named.kind and each.views == named.views]
+    same = [
+        k
+        for k, each in enumerate(mistakes)
+        if (each.kind == named.kind and each.views == named.views) or _alike(readings[k], readings[best])
+    ]
     probability = float(np.exp(logsumexp(posterior[same]) - logsumexp([*posterior, np.log(_NOTHING)])))
     if probability < _CERTAIN or scores[best] - now < _GAIN * scores[best]:
         return None
@@ -211,16 +201,23 @@ def _likeliest(
     return readings[best], FoundMistake(named, probability, float(gains[best]), len(views) == len(after))
 
 
+def _alike(one: Reading, other: Reading) -> bool:
+    """Whether two readings are the same."""
+    return (
+        np.allclose(one.cameras, other.cameras)
+        and np.allclose(one.pixels, other.pixels)
+        and np.array_equal(one.exchanged, other.exchanged)
+    )
+
+
 def mistake_finding(verdict: FoundMistake, names: Sequence[str]) -> Finding:
     """Return the finding of a mistake in the files."""
     mistake = verdict.mistake
     named = [names[view] for view in mistake.views]
     everyone = verdict.whole and len(mistake.views) == len(names)
     who = "all cameras" if everyone else " and ".join(named)
-    one = len(mistake.views) == 1
-    expression = f"rig[{mistake.views[0]}]" if one else "camera"
-    prefix = "for camera in rig: " if everyone and "{camera}" in mistake.mend else ""
-    mend = mistake.mend.replace("{camera}", expression).replace("{who}", who)
+    possible = bool(mistake.mend) and (everyone or mistake.mend != "mirrored")
+    mend = Mend(*mistake.mend.split(":", 1), cameras=() if everyone else tuple(named)) if possible else None
     return Finding(
         mistake.kind,
         mistake.text.replace("{who}", who),
@@ -229,51 +226,6 @@ def mistake_finding(verdict: FoundMistake, names: Sequence[str]) -> Finding:
         view=mistake.views[0] if not everyone else None,
         size=dict(mistake.size),
         cost=verdict.probability * len(mistake.views) / len(names),
-        mend=prefix + mend,
+        mend=mistake.advice.replace("{who}", who),
+        repair=() if mend is None else ("--mend", str(mend)),
     )
-
-
-def unit_findings(reading: Reading, ratio: float) -> tuple[Reading, list[Finding]]:
-    """Return the reading in metres, and what the size of people says about the unit.
-
-    Args:
-        reading: cameras whose scale is to be checked.
-        ratio: how many times as large as adults people are under it; NaN if unknown.
-    """
-    if not np.isfinite(ratio) or 1 / _UNUSUAL < ratio < _UNUSUAL:
-        return reading, []
-    size = {"times_adults": float(ratio)}
-    interval = {"times_adults": (float(ratio / 1.15), float(ratio * 1.15))}
-    if 1 / _ODD < ratio < _ODD:
-        note = Finding(
-            "wrong-unit",
-            f"people are {ratio:.2f} times as large as adults: they are children or very tall, or the scale of the "
-            "calibration (the squares of the board) is wrong",
-            severity="note",
-            probability=0.5,
-            size=size,
-            interval=interval,
-            cost=abs(float(np.log(ratio))) * 0.3,
-            mend="measure a distance between two cameras; multiply every t by the true over the calibrated one",
-        )
-        return reading, [note]
-    factor = min(_UNITS, key=lambda each: abs(np.log(each / ratio)))
-    named = abs(np.log(factor / ratio)) < np.log(_SAME_UNIT)
-    scale = factor if named else float(f"{ratio:.2g}")
-    cameras = reading.cameras.copy()
-    cameras[:, 14:17] /= scale
-    text = (
-        f"the translations of all cameras are {_UNITS[factor]}: "
-        if named
-        else "the translations of all cameras are not in metres: "
-    ) + f"people are {ratio:.3g} times as large as adults"
-    alarm = Finding(
-        "wrong-unit",
-        text,
-        probability=0.99,
-        size=size,
-        interval=interval,
-        cost=1.0,
-        mend=f"for camera in rig: t = camera.t / {scale:g}",
-    )
-    return replace(reading, cameras=cameras), [alarm]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from mvpose.calibration.camera_findings import findings_of_cameras, turn_finding
 from mvpose.calibration.cameras import CameraFit, fit
 from mvpose.calibration.clocks import estimate_clocks
 from mvpose.calibration.consistency import Consistency, Reading
-from mvpose.calibration.conventions import FoundMistake, mistake_finding, search, unit_findings
-from mvpose.calibration.findings import Diagnosis, Finding, camera_names
+from mvpose.calibration.conventions import FoundMistake, mistake_finding, search
+from mvpose.calibration.findings import ALARM, Diagnosis, Finding, camera_names
+from mvpose.calibration.mends import Mend
 from mvpose.calibration.normal_equations import (
     JointViews,
     joint_views,
@@ -29,6 +30,7 @@ from mvpose.calibration.sightings import Sightings, match_over_time, sightings_o
 from mvpose.calibration.sufficiency import (
     DIFFERENT,
     RECORD,
+    SHORT,
     PairAgreement,
     silent_views,
     strangers,
@@ -37,11 +39,12 @@ from mvpose.calibration.sufficiency import (
 )
 from mvpose.calibration.tracklet_matching import PeopleGroups
 from mvpose.calibration.tracklets import Tracklets, link
-from mvpose.camera import Rig
+from mvpose.calibration.unseen_mistakes import size_findings, unit_findings, world_findings
+from mvpose.camera import Camera, Rig
 from mvpose.detections import Detections
 
 
-def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) -> Diagnosis:
+def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up: str | None = None) -> Diagnosis:
     """Return what is wrong with a rig.
 
     First the conventions of its files are checked by the distances of viewing rays, without any reconstruction
@@ -52,6 +55,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
         rig: the cameras as calibrated.
         frames: detections of each frame, all views; ten seconds or more of people who walk.
         period: seconds between frames whose detections carry no time.
+        up: axis of the world that points up, "z", "-y" ...; by default z.
 
     Raises:
         ValueError: frames of different skeletons, a view that the rig does not have, or wrong times.
@@ -62,17 +66,14 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
         empty = Finding("cannot-tell", "cannot tell: there are no detections", "unknown", 1.0, mend=RECORD)
         return Diagnosis.of_findings([empty], evidence=[], cameras=names, residuals=np.full(len(rig), np.nan))
     detections = np.bincount(tracklets.view, minlength=len(rig))
-    findings = silent_views(detections, names)
     consistency = Consistency(cut_into_windows(tracklets))
-    reading, mistakes = _without_mistakes(rig, tracklets, consistency)
-    turned = {each.mistake.views[0] for each in mistakes if each.mistake.kind == "moved-camera"}
-    findings += [mistake_finding(each, names) for each in mistakes if each.mistake.kind != "moved-camera"]
-    ratio, bones = relative_size(consistency, reading, tracklets.skeleton)
-    reading, unit = unit_findings(reading, ratio)
-    findings += unit
+    files = _examine_files(rig, tracklets, consistency, names)
+    reading, turned = files.reading, files.turned
+    findings = [*files.findings, *silent_views(detections, names)]
     mended = reread_rig(rig, reading)
-    if mended is None:  # the cameras of no reading stand in different places within 200 m
-        mended, reading = rig, Reading.as_given(rig.packed)
+    if mended is None:
+        findings.append(_nowhere(rig))
+        return Diagnosis.of_findings(findings, evidence=[], cameras=names, residuals=np.full(len(rig), np.nan))
     tracklets = reread_tracklets(tracklets, reading)
     matched = match_over_time(mended, tracklets)
     sightings, joints, rows, result = _fitted(mended, tracklets, matched)
@@ -101,7 +102,11 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     starts = np.array([times[first][joints.block == block].min(initial=np.inf) for block in range(joints.blocks)])
     undetermined = any(each.camera is None for each in missing)
     of_cameras = findings_of_cameras(result, mended, starts, names, undetermined=undetermined)
+    if undetermined and not any(SHORT in each.text for each in missing):
+        of_cameras = [replace(each, severity="unknown") if each.severity == "alarm" else each for each in of_cameras]
     findings += [each for each in of_cameras if each.view not in turned or each.kind != "moved-camera"]
+    of_world, line = world_findings(mended, sightings, rows, result.equations.joints, joints, up)
+    findings += of_world
     after = _corrected(reading, result).cameras
     findings += [turn_finding(rig, after, result.covariance[view], view, names) for view in sorted(turned - useless)]
     different = any(DIFFERENT in each.text for each in missing)  # then neither files nor clocks can be compared
@@ -110,13 +115,74 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
         findings += [each for each in clocks.findings() if each.view not in useless]
     if undetermined:
         findings = [replace(each, severity="unknown") if _doubtful(each, different) else each for each in findings]
-    residuals = residuals_of_others(mended.packed, joints, scale=result.equations.scale)
+    residuals, usual = residuals_of_others(mended.packed, joints, scale=result.equations.scale)
+    findings += _large_residuals(residuals, usual, findings, names)
     return Diagnosis.of_findings(
         findings,
-        evidence=_evidence(result, times, agreement, ratio, bones, residuals, names),
+        evidence=[*_evidence(result, times, agreement, files.size, (residuals, usual), names), *line],
         cameras=names,
         residuals=residuals,
+        usual=usual,
     )
+
+
+@dataclass(frozen=True)
+class ExaminedFiles:
+    """What the files of a rig say.
+
+    Attributes:
+        reading: the files as they should be read.
+        findings: the mistakes in them, in the order in which they are mended.
+        turned: cameras that are turned far from their calibration.
+        size: how many times as large as adults people are, before the unit was mended, and from how many bones.
+    """
+
+    reading: Reading
+    findings: list[Finding]
+    turned: set[int]
+    size: tuple[float, int]
+
+
+def _examine_files(rig: Rig, tracklets: Tracklets, consistency: Consistency, names: Sequence[str]) -> ExaminedFiles:
+    reading, mistakes = _without_mistakes(rig, tracklets, consistency)
+    turned = {each.mistake.views[0] for each in mistakes if each.mistake.kind == "moved-camera"}
+    findings = [mistake_finding(each, names) for each in mistakes if each.mistake.kind != "moved-camera"]
+    size = relative_size(consistency, reading, tracklets.skeleton)
+    reading, of_unit = unit_findings(reading, size[0])
+    findings += of_unit
+    cameras: Sequence[Camera] = list(rig)
+    for each in findings:
+        if each.repair:
+            cameras = Mend.parsed(each.repair[1]).applied(cameras)
+    return ExaminedFiles(reading, [*findings, *size_findings(cameras, tracklets, names)], turned, size)
+
+
+def _nowhere(rig: Rig) -> Finding:
+    """Return the finding of cameras that make no rig under any reading."""
+    extent = float(np.ptp(rig.centers, axis=0).max())
+    where = f"up to {extent:.3g} m apart" if extent > 1e-3 else "in one point"
+    text = f"cannot tell: the cameras stand {where}, and no known mistake of files explains it"
+    return Finding("cannot-tell", text, "unknown", 0.99, mend="calibrate the cameras again")
+
+
+def _large_residuals(
+    residuals: Floats, usual: Floats, findings: Sequence[Finding], names: Sequence[str]
+) -> list[Finding]:
+    """Return the cameras whose residuals are not those of a right rig, where no alarm explains them."""
+    if any(each.severity == "alarm" for each in findings):
+        return []
+    with np.errstate(invalid="ignore"):
+        times = residuals / usual
+    result = []
+    for view in np.flatnonzero(times >= ALARM["times_usual"]).tolist():
+        text = f"keypoints of {names[view]} are {residuals[view]:.0f} px from the people as seen by the other cameras, "
+        text += f"{usual[view]:.0f} px are usual, and no fault of a camera explains it"
+        advice = (
+            "draw the detections into the pictures of this camera, and compare its pictures with the others' in time"
+        )
+        size = {"times_usual": float(times[view])}
+        result.append(Finding("large-residual", text, "unknown", 0.5, names[view], view, size, cost=0.01, mend=advice))
+    return result
 
 
 def _without_mistakes(rig: Rig, tracklets: Tracklets, consistency: Consistency) -> tuple[Reading, list[FoundMistake]]:
@@ -200,13 +266,12 @@ def _evidence(
     result: CameraFit,
     times: Floats,
     agreement: PairAgreement,
-    ratio: float,
-    bones: int,
-    residuals: Floats,
+    size: tuple[float, int],
+    medians: tuple[Floats, Floats],
     names: Sequence[str],
 ) -> list[str]:
     """Return the numbers on which the verdict rests."""
-    pairs = agreement.pairs[np.isfinite(agreement.pairs)]
+    pairs, (ratio, bones) = agreement.pairs[np.isfinite(agreement.pairs)], size
     known = np.isfinite(result.equations.joints[:, 0])
     lines = [
         f"{int(known.sum())} joints seen by two cameras or more, over {_seconds(times):.1f} s",
@@ -219,7 +284,9 @@ def _evidence(
         lines.append(f"people are {ratio:.2f} times as large as adults ({bones} bones)")
     lines.append(
         "median distance of keypoints from the people as seen by the other cameras: "
-        + ", ".join(f"{value:.1f} px ({name})" for name, value in zip(names, residuals, strict=True))
+        + ", ".join(
+            f"{value:.1f} px ({name}; usual {normal:.0f})" for name, value, normal in zip(names, *medians, strict=True)
+        )
     )
     lines.append(
         f"errors of keypoints are {result.equations.scale:.2f} of the error model, {result.quadratic.temper:.1f} of "

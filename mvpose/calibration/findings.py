@@ -15,7 +15,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.camera import Rig
+from mvpose.camera import Camera, Rig
 from mvpose.checks import Sealed, as_array
 
 Severity = Literal["alarm", "note", "unknown"]
@@ -28,6 +28,8 @@ KINDS: Mapping[str, str] = MappingProxyType(
         "rotation-transposed": "the rotation is transposed; the position of the camera is right",
         "translation-is-center": "the translation holds the position of the camera",
         "wrong-unit": "the translations are in centimetres, millimetres or another unit that is not the metre",
+        "picture-size": "the size of the pictures is not that of the calibration",
+        "world-turned": "another axis of the world points up than the one that should",
         "image-size": "the intrinsics are those of pictures of another resolution",
         "image-cropped": "the intrinsics are those of pictures before they were cropped",
         "axes-swapped": "x and y of the pictures are exchanged (rotated or transposed pictures)",
@@ -48,6 +50,7 @@ KINDS: Mapping[str, str] = MappingProxyType(
         "mirrored-view": "the pictures of a camera are mirrored",
         "left-right-exchanged": "the names of left and right joints of a view are exchanged",
         "other-people": "a camera sees other people than the rest",
+        "large-residual": "keypoints of a camera are farther from the people than is usual",
         "silent-view": "a camera has no or nearly no detections",
         # what the recording does not determine
         "cannot-tell": "the recording does not determine whether the calibration is right",
@@ -55,8 +58,44 @@ KINDS: Mapping[str, str] = MappingProxyType(
 )
 """Kinds of findings, and what each states."""
 
+ALARM: Mapping[str, float] = MappingProxyType(
+    {"degrees": 0.5, "metres": 0.04, "percent": 2.0, "px": 10.0, "edge_px": 6.0, "ms": 10.0, "times_usual": 2.5}
+)
+"""Sizes from which an error is an alarm: turn and shift of a camera, focal length, principal point, lens at the
+outermost tenth of the people, clock, and residual over the usual one. Errors of good rigs are smaller: the corrections
+that are estimated for careful, published calibrations are 0.05 to 0.28 degrees and 1 to 2.5 cm (Shelf)."""
+
+_CLEAR = 2.0  # times the size of an alarm, in a recording that does not determine smaller ones
+_SURE = 0.95
+
 _SEVERITIES, _VERDICTS = get_args(Severity), get_args(Verdict)
+_ABOUT_CAMERAS = ("cannot-tell", "moved-camera", "drifting-camera", "focal-length", "large-residual")
+"""Kinds that leave open whether the cameras are right where they are unknown."""
+
+NEW_TIMES = "--new-times"
 _RANK = {"alarm": 0, "unknown": 1, "note": 2}
+
+
+def judged(
+    size: Mapping[str, float], low: Mapping[str, float], *, probability: float = 1.0, determined: bool = True
+) -> Severity:
+    """Return whether an error is an alarm, unknown or a note: the one rule of the verdict, by size and evidence.
+
+    An error that is as large as an alarm (:data:`ALARM`) is one where the recording determines it. Where it does not,
+    the error is an alarm if it is probable and nine tenths of its probability are beyond twice that size, else unknown.
+    No error of that size is a note.
+
+    Args:
+        size: sizes of the error by the names of :data:`ALARM`; other names do not count.
+        low: lowest values of 90 % of the probability.
+        probability: probability that the error is there.
+        determined: whether the recording determines errors of this size.
+    """
+    limits = {name: ALARM[name] for name in size if name in ALARM}
+    if not any(abs(size[name]) >= limit for name, limit in limits.items()):
+        return "note"
+    clear = any(low.get(name, 0.0) >= _CLEAR * limit for name, limit in limits.items())
+    return "alarm" if determined or (clear and probability >= _SURE) else "unknown"
 
 
 @dataclass(frozen=True)
@@ -74,7 +113,8 @@ class Finding:
         interval: lowest and highest value of 90 % of the probability, for names of ``size``.
         cost: expected loss without a mend: error of joints because of the fault, metres, times its probability.
             Findings are ordered by it.
-        mend: command or lines of Python that mend it, or what to record or to check.
+        mend: what mends it in words, or what to record or to check; empty where ``repair`` says it all.
+        repair: options of ``mvpose repair`` that mend it; empty where no change of calibration or clocks does.
 
     Raises:
         ValueError: an unknown kind or severity, a probability outside of 0..1, a cost below 0, or an interval without a
@@ -91,6 +131,7 @@ class Finding:
     interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     cost: float = 0.0
     mend: str = ""
+    repair: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -118,6 +159,7 @@ class Finding:
             "cost": _number(self.cost),
             "text": self.text,
             "mend": self.mend,
+            "repair": list(self.repair),
         }
 
 
@@ -133,6 +175,9 @@ class Diagnosis(Sealed):
         cameras: names of the cameras, V.
         residuals: median distance of each camera's keypoints from the people that the other cameras see, (V,), pixels;
             NaN where a camera shares nobody with the others.
+        usual: what these distances are where the calibration is right and detectors err as usual, (V,), pixels.
+        repair: options of ``mvpose repair`` that mend all alarms for which there are any, in the order in which they
+            must be applied.
 
     Raises:
         ValueError: another verdict, or residuals of another number of cameras.
@@ -143,6 +188,8 @@ class Diagnosis(Sealed):
     evidence: tuple[str, ...]
     cameras: tuple[str, ...]
     residuals: Floats
+    usual: Floats | None = None
+    repair: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for key in ("findings", "evidence", "cameras"):
@@ -153,16 +200,26 @@ class Diagnosis(Sealed):
 
     @classmethod
     def of_findings(
-        cls, findings: Sequence[Finding], *, evidence: Sequence[str], cameras: Sequence[str], residuals: Floats
+        cls,
+        findings: Sequence[Finding],
+        *,
+        evidence: Sequence[str],
+        cameras: Sequence[str],
+        residuals: Floats,
+        usual: Floats | None = None,
     ) -> Diagnosis:
-        """Return the diagnosis of findings in any order, with the verdict that follows from them."""
+        """Return the diagnosis of findings, with the verdict that follows from them.
+
+        Findings are given in the order in which their mends are applied.
+        """
         ordered = sorted(findings, key=lambda each: (_RANK[each.severity], -each.cost, -each.probability, each.kind))
         verdict: Verdict = "fine"
         if any(each.severity == "alarm" for each in ordered):
             verdict = "faults"
-        elif any(each.severity == "unknown" and each.kind == "cannot-tell" and each.camera is None for each in ordered):
+        elif any(each.severity == "unknown" and each.kind in _ABOUT_CAMERAS for each in ordered):
             verdict = "cannot tell"
-        return cls(tuple(ordered), verdict, tuple(evidence), tuple(cameras), residuals)
+        repair = joined_options([each.repair for each in findings if each.severity == "alarm"])
+        return cls(tuple(ordered), verdict, tuple(evidence), tuple(cameras), residuals, usual, repair)
 
     @property
     def alarms(self) -> tuple[Finding, ...]:
@@ -175,13 +232,30 @@ class Diagnosis(Sealed):
             "verdict": self.verdict,
             "findings": [each.to_json() for each in self.findings],
             "evidence": list(self.evidence),
+            "repair": list(self.repair),
             "residuals_px": {
                 name: _number(value) for name, value in zip(self.cameras, self.residuals.tolist(), strict=True)
             },
         }
 
 
-def camera_names(rig: Rig) -> tuple[str, ...]:
+def joined_options(of_findings: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    """Return the options of ``mvpose repair`` for several findings: all mends in order, then what is estimated."""
+    mends: list[str] = []
+    free: dict[str, None] = {}
+    times = False
+    for options in of_findings:
+        for name, value in zip(options[::2], options[1::2], strict=True):
+            if name == "--mend":
+                mends += [name, value]
+            elif name == "--free":
+                free |= dict.fromkeys(value.split(","))
+            else:
+                times = True
+    return (*mends, *(("--free", ",".join(free)) if free else ()), *((NEW_TIMES, "TIMES") if times else ()))
+
+
+def camera_names(rig: Rig | Sequence[Camera]) -> tuple[str, ...]:
     """Return a name for each camera that no other has: its own, or ``camera 0`` and so on."""
     names = [camera.name for camera in rig]
     return tuple(

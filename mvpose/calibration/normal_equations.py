@@ -40,6 +40,10 @@ FOCAL, CENTER, K1, CLOCK = slice(6, 7), slice(7, 9), slice(9, 10), slice(10, 11)
 FREEDOM = 4.0
 """Degrees of freedom of the Student distribution of keypoints, whose tails are those of real detectors."""
 
+_RAYLEIGH = float(np.sqrt(2.0 * np.log(2.0)))  # median distance of two Gaussian errors of unit variance
+_USUAL_SCALE = 0.5
+"""Standard deviation of keypoints relative to the error model, of simulated detectors in rigs without errors."""
+
 _UNSEEN = 400.0  # squared residual of a keypoint that no joint explains, in standard deviations
 
 _JOINT_SPACING = 0.1  # seconds between frames that are used
@@ -210,8 +214,11 @@ def with_errors(cameras: Floats, change: Floats) -> Floats:
     return result
 
 
-def residuals_of_others(cameras: Floats, sightings: JointViews, *, scale: float) -> Floats:
+def residuals_of_others(cameras: Floats, sightings: JointViews, *, scale: float) -> tuple[Floats, Floats]:
     """Return the median distance of each view's keypoints from the joints that the other views see, (V,), pixels.
+
+    The second result is what these medians are in a rig without errors: that of the error model of keypoints, for
+    people as large in the pictures as these, with the error of the joint by the other views.
 
     Args:
         cameras: packed cameras, (V, 22).
@@ -222,18 +229,21 @@ def residuals_of_others(cameras: Floats, sightings: JointViews, *, scale: float)
     views = len(cameras)
     states = with_errors(cameras, np.zeros((s.blocks, PARAMETERS * views)))
     seen = np.repeat(np.diff(s.start), np.diff(s.start))  # views of the joint of each sighting
-    start, result = np.full((len(s.start) - 1, 3), np.nan), np.full(views, np.nan)
+    start, result, usual = np.full((len(s.start) - 1, 3), np.nan), np.full(views, np.nan), np.full(views, np.nan)
     for view in range(views):
         own = s.view == view
         sigma = np.where(own, 1e4 * s.sigma, s.sigma)
         _, residuals, *_ = triangulate(
             states, s.start, s.block, s.view, s.pixels, s.velocity, sigma, scale, FREEDOM, start
         )
-        distance = np.linalg.norm(residuals[own & (seen > 2)], axis=1)
-        distance = distance[np.isfinite(distance)]
-        if len(distance):
-            result[view] = np.median(distance)
-    return result
+        rows = np.flatnonzero(own & (seen > 2))
+        distance = np.linalg.norm(residuals[rows], axis=1)
+        known = np.isfinite(distance)
+        if known.any():
+            result[view] = np.median(distance[known])
+            others = 1.0 + 2.0 / (seen[rows] - 1.0)  # variance of a joint that so many rays place, and of its keypoint
+            usual[view] = _RAYLEIGH * _USUAL_SCALE * np.median((s.sigma[rows] * np.sqrt(others))[known])
+    return result, usual
 
 
 def joint_views(sightings: Sightings) -> tuple[JointViews, Integers]:

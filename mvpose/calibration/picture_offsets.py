@@ -65,8 +65,12 @@ class OffsetSearch:
                 if max(abs(dx), abs(dy)) < _LEAST_OFFSET:
                     continue
                 width, height = self.sizes[chosen[0]]
-                size = (("x_px", dx * width), ("y_px", dy * height)) if mistake is CROPPED else ()
-                yield replace(mistake, views=chosen, size=size), found
+                if mistake is CROPPED:
+                    size = (("x_px", dx * width), ("y_px", dy * height))
+                    crop = f"crop:{dx * width:.6g},{dy * height:.6g}"
+                    yield replace(mistake, views=chosen, size=size, mend=crop), found
+                else:
+                    yield replace(mistake, views=chosen), found
 
     def _on_grid(self, reading: Reading, views: tuple[int, ...]) -> list[Offset]:
         """Return the likeliest offsets of the grid, shares of the size of the picture, none beside another."""

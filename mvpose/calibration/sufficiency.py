@@ -35,6 +35,9 @@ RECORD = (
 DIFFERENT = "the cameras do not see the same people at the same time and place"
 """Reason of a finding where no calibration explains the detections."""
 
+SHORT = "people were seen by several cameras for"
+"""Reason of a finding where the recording is too short for small errors."""
+
 _SILENT = 0.02  # share of the median number of detections of a view below which it contributes nothing
 _FEW = 0.20  # share of the median number of detections below which all of them may be false
 _STRANGER = 0.68
@@ -92,7 +95,7 @@ def unknowns(
             )
         ]
     if joints < _JOINTS or seconds < _SECONDS:
-        return [_cannot(f"people were seen by several cameras for {seconds:.1f} s only ({joints} joints)", RECORD)]
+        return [_cannot(f"{SHORT} {seconds:.1f} s only ({joints} joints)", RECORD)]
     if moved < _TRAVELLED:
         return [_cannot(f"people stood still (they moved by {moved:.1f} m in all)", RECORD)]
     findings = []

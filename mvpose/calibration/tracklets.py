@@ -33,6 +33,10 @@ _RIVAL = 0.6  # a link must be shorter than this share of the distance to any ot
 _SATURATION = 1.0  # in square roots of the area: greatest distance that one joint counts for
 _WINDOW = 0.12  # seconds before and after, over which velocities are fitted: limbs swing once in a second
 
+_EDGE = 0.01
+"""Share of the picture's longer side from its edge in which keypoints do not count: a detector places joints of people
+who are cut off there, tenths of a metre from where they are."""
+
 _NOISE = Noise()
 _BOX_SHARE = 0.53  # fraction of its box that a person fills (Ronchi & Perona, ICCV 2017)
 _LOWEST_SCORE = 0.2  # a keypoint of a lower score is not less accurate: it is right or grossly wrong
@@ -115,7 +119,7 @@ def link(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) -> Tra
     """Link the detections of each view over time.
 
     Args:
-        rig: cameras, of which only the number is used.
+        rig: cameras, of which only the number and the sizes of pictures are used.
         frames: detections of each frame, all views.
         period: seconds between frames whose detections carry no time.
 
@@ -133,6 +137,9 @@ def link(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) -> Tra
     timed = np.isfinite(times[number, view])
     number, view, keypoints, scores = number[timed], view[timed], keypoints[timed], scores[timed]
     area, sigma = keypoint_sigma(keypoints, scores, skeleton)
+    for each, camera in enumerate(rig):
+        own = np.flatnonzero(view == each)
+        sigma[own] = np.where(_at_edge(keypoints[own], camera.size), np.inf, sigma[own])
     tracklet = np.full(len(view), -1)
     count = 0
     for each in range(len(rig)):
@@ -153,6 +160,24 @@ def link(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) -> Tra
     if all(each.descriptors is not None for each in kept):
         descriptors = np.concatenate([np.asarray(each.descriptors) for each in kept])[timed][order]
     return Tracklets(tracklet, number, view, keypoints, sigma, velocity, times, skeleton, descriptors)
+
+
+def _at_edge(keypoints: Floats, size: tuple[int, int]) -> Bools:
+    """Return which keypoints (n, J) of a view are at the edge of its pictures.
+
+    Where the pictures are larger than the size that the calibration states, they are so many times as large as it
+    takes to hold the keypoints.
+    """
+    known = keypoints[np.isfinite(keypoints[..., 0])]
+    if not len(known):
+        return np.zeros(keypoints.shape[:2], np.bool_)
+    stated = np.array(size, float)
+    reach = np.quantile(known, 0.99, axis=0)
+    larger = (factor * each for factor in (1.0, 4 / 3, 1.5, 2.0, 3.0, 4.0) for each in (stated, stated[::-1]))
+    far = next((each for each in larger if (reach <= 1.02 * each).all()), reach)
+    margin = _EDGE * far.max()
+    with np.errstate(invalid="ignore"):
+        return np.asarray(((keypoints < margin) | (keypoints > far - 1.0 - margin)).any(axis=-1))
 
 
 def _checked(rig: Rig, frames: Sequence[Detections]) -> Skeleton:

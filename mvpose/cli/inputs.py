@@ -130,7 +130,6 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
         ValueError: anything wrong with a file or an option.
     """
     from mvpose.commands.progress import single_stage
-    from mvpose.formats.calibration.calibration_formats import read_calibration
     from mvpose.formats.detections import plausibility
     from mvpose.formats.detections.recorded_frames import read_recording
 
@@ -142,7 +141,7 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
         raise ValueError(f"--fps must be above 0, got {choices.fps}")
     frames, size = _frames(choices.frames), picture_size(choices.size)
     skeleton = _skeleton(choices.skeleton) if choices.skeleton else None
-    rig = read_calibration(calibration, size=plausibility.UNKNOWN_SIZE, only=choices.only, key="--cameras")
+    rig = _read_rig(calibration, choices.only, examined=examined)
     names = [camera.name for camera in rig]
     with single_stage("read", len(rig)) as advance:
         recorded = read_recording(
@@ -164,6 +163,29 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     times, period = _times(choices, recorded.numbers, len(rig))
     paths = tuple(source.path for source in recorded.assignment.sources)
     return Inputs(rig, recorded.detections(times), recorded.numbers, period, paths)
+
+
+def _read_rig(path: Path, only: Sequence[str], *, examined: bool) -> Rig:
+    """Read a calibration; for the doctor also one whose cameras make no rig, such as one in millimetres.
+
+    Raises:
+        ValueError: anything wrong with the file.
+    """
+    from mvpose import Rig
+    from mvpose.camera import UnlikelyRigError
+    from mvpose.formats.calibration.calibration_formats import read_calibration
+    from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
+
+    try:
+        return read_calibration(path, size=UNKNOWN_SIZE, only=only, key="--cameras")
+    except ValueError as error:
+        cause: BaseException | None = error
+        while cause is not None and not isinstance(cause, UnlikelyRigError):
+            cause = cause.__context__
+        if not examined or cause is None:
+            raise
+        note(str(cause))
+        return Rig.unchecked([camera for camera in cause.cameras if not only or camera.name in only])
 
 
 @contextlib.contextmanager

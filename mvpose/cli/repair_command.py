@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +18,7 @@ from mvpose.commands.programs import note
 if TYPE_CHECKING:
     from mvpose import Rig
     from mvpose.calibration import Repair
+    from mvpose.calibration.mends import Mend
     from mvpose.calibration.repair import Freedom, Size
     from mvpose.cli.inputs import Inputs
 
@@ -26,20 +28,35 @@ def add_to(app: typer.Typer) -> None:
     app.command()(repair)
 
 
-@grouped(without=["joints", "up"])
+@grouped(without=["joints"])
 def repair(
     calibration: Calibration,
     detections: DetectionPaths,
-    out: Annotated[Path, typer.Option(metavar="NEW", help="The new calibration, in the format of the old one.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="NEW", help="The new calibration, in the format of the old one.")
+    ] = None,
+    mend: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="A mistake to mend, as `mvpose doctor` prints it: [cyan]inverted[/], [cyan]unit:0.001@cam2[/] ... May "
+            "be repeated; applied in this order.",
+        ),
+    ] = None,
     free: Annotated[
-        str,
-        typer.Option(metavar="NAME,...", help="What may change: extrinsics (position and direction), focal, center."),
-    ] = "extrinsics",
+        str | None,
+        typer.Option(
+            metavar="NAME,...",
+            help="What is estimated from the people: extrinsics (position and direction), focal, center. "
+            "[dim]\\[default: extrinsics; nothing with --mend][/]",
+        ),
+    ] = None,
     new_times: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Also write the times of the pictures with corrected clocks, for --times of other commands.",
+            help="Also write the times of the pictures with corrected clocks, for --times of other commands. Without "
+            "--out, only these.",
         ),
     ] = None,
     rig_size: Annotated[
@@ -53,27 +70,62 @@ def repair(
 ) -> None:
     """Correct a calibration from the people in the pictures, and write it in the format of the old one."""
     with PROGRAM.exit_on_error():
+        from mvpose.calibration import repair as estimated
+        from mvpose.calibration.mends import Mend
+        from mvpose.commands.errors import failing
         from mvpose.commands.output_files import check_new
 
-        check_new(out)
+        if out is None and new_times is None:
+            raise ValueError(
+                "--out: expected the file of the new calibration, or --new-times for corrected times alone"
+            )
+        if out is not None:
+            check_new(out)
+        elif free is not None or mend:
+            raise ValueError("--mend and --free change the calibration: give --out")
         if new_times is not None:
             check_new(new_times, option="--new-times")
-        freedoms, decides = _freedoms(free), _size(rig_size)
-        from mvpose.calibration import repair as mend
-        from mvpose.commands.errors import failing
-
-        inputs = read_inputs(calibration, detections, choices, examined=True)
-        with failing("the repair"):
-            result = mend(inputs.rig, inputs.frames, period=inputs.period, free=freedoms, size=decides)
-        if result.refused:
-            raise ValueError(f"nothing was repaired: {result.refused}")
-        for reason in result.held:
-            note(f"not changed: {reason}")
-        write_new(calibration, out, result.rig)
+        mends = [Mend.parsed(text) for text in mend or []]
+        chosen = free if free is not None else "" if mends or out is None else "extrinsics"
+        freedoms, decides = _freedoms(chosen), _size(rig_size)
+        if not freedoms and decides != "calibration":
+            raise ValueError(
+                "--rig-size: has an effect only where cameras are estimated: give --free extrinsics as well"
+            )
+        if choices.up is not None:
+            note("--up has no effect: the new calibration keeps the axes of the old one")
+        inputs = _mended(read_inputs(calibration, detections, replace(choices, up=None), examined=True), mends)
+        lines = [f"{each}: applied" for each in mends]
+        if freedoms:
+            with failing("the repair"):
+                result = estimated(inputs.rig, inputs.frames, period=inputs.period, free=freedoms, size=decides)
+            if result.refused:
+                raise ValueError(f"nothing was repaired: {result.refused}")
+            for reason in result.held:
+                note(f"not changed: {reason}")
+            inputs = replace(inputs, rig=result.rig)
+            lines += _lines(result)
+        if out is not None:
+            write_new(calibration, out, inputs.rig)
+            lines.append(f"{out}: repaired calibration; `mvpose doctor` examines it")
         if new_times is not None:
-            _write_times(new_times, inputs, result)
-    typer.echo("\n".join(_lines(result)))
-    typer.echo(f"{out}: repaired calibration; `mvpose doctor` examines it")
+            _write_times(new_times, inputs)
+            lines.append(f"{new_times}: corrected times of the pictures, for --times")
+    typer.echo("\n".join(lines))
+
+
+def _mended(inputs: Inputs, mends: list[Mend]) -> Inputs:
+    """Return the recording with a mended rig.
+
+    Raises:
+        ValueError: a camera that is not there, or cameras that make no rig.
+    """
+    from mvpose import Rig
+
+    cameras = list(inputs.rig)
+    for each in mends:
+        cameras = each.applied(cameras)
+    return replace(inputs, rig=Rig(cameras))
 
 
 def _freedoms(given: str) -> tuple[Freedom, ...]:
@@ -111,15 +163,17 @@ def write_new(original: Path, path: Path, rig: Rig) -> None:
             shutil.move(each, path.parent / each.name)
 
 
-def _write_times(path: Path, inputs: Inputs, result: Repair) -> None:
-    import numpy as np
-
+def _write_times(path: Path, inputs: Inputs) -> None:
+    """Write the times of the pictures by corrected clocks, without lost and repeated pictures."""
+    from mvpose.calibration import estimate_clocks
+    from mvpose.commands.errors import failing
     from mvpose.files.atomic_files import write_atomic
 
-    given = [np.zeros(len(inputs.rig)) if frame.time is None else frame.time for frame in inputs.frames]
-    mended = np.stack(given) + result.offsets
-    lines = [",".join(camera.name for camera in inputs.rig)]
-    lines += [",".join(f"{time:.6f}" for time in row) for row in mended.tolist()]
+    with failing("the estimation of clocks"):
+        clocks = estimate_clocks(inputs.rig, inputs.frames, period=inputs.period)
+    lines = [",".join(clocks.names)]
+    lines += [",".join(f"{time:.6f}" for time in row) for row in clocks.times.tolist()]
+    path.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(path, ("\n".join(lines) + "\n").encode())
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,7 @@ def write_doctor_page(
     sightings: Sightings | None = None,
     pictures: Pictures | None = None,
     period: float = PERIOD,
-    files: tuple[str, str] = ("CALIBRATION", "DETECTIONS"),
+    command: Callable[[tuple[str, ...]], str] | None = None,
 ) -> Path:
     """Write what the doctor found, ``doctor.html``, and its numbers, ``doctor.json``.
 
@@ -60,7 +60,8 @@ def write_doctor_page(
             there is one (:func:`mvpose.calibration.gather`).
         pictures: function that returns the picture of a frame and view; by default drawings are on plain ground.
         period: seconds between frames whose detections carry no time.
-        files: calibration and detections as a command names them, for commands that can be copied.
+        command: returns the command with options of ``mvpose repair`` (:attr:`mvpose.calibration.Finding.repair`) that
+            a reader can copy.
 
     Returns:
         Path of the page.
@@ -81,7 +82,7 @@ def write_doctor_page(
         sentence=sentence(diagnosis),
         evidence=diagnosis.evidence[:_EVIDENCE],
         more_evidence=diagnosis.evidence[_EVIDENCE:],
-        findings=[_finding(each, files) for each in diagnosis.findings],
+        findings=[_finding(each, command or _plain_command) for each in diagnosis.findings],
         refused=None if repair is None else repair.refused,
         repaired=case.after is not None,
         above=_above(case),
@@ -144,7 +145,11 @@ class DoctorCase:
         )
 
 
-def _finding(finding: Finding, files: tuple[str, str]) -> dict[str, Any]:
+def _plain_command(options: tuple[str, ...]) -> str:
+    return " ".join(["mvpose repair CALIBRATION DETECTIONS", *options, "--out NEW"]) if options else ""
+
+
+def _finding(finding: Finding, command: Callable[[tuple[str, ...]], str]) -> dict[str, Any]:
     return {
         "kind": finding.kind.replace("-", " "),
         "camera": finding.camera,
@@ -153,7 +158,8 @@ def _finding(finding: Finding, files: tuple[str, str]) -> dict[str, Any]:
         "probability": f"{100 * finding.probability:.0f} %",
         "quantities": quantities(finding),
         "cost": f"{1000 * finding.cost:.0f} mm" if finding.cost >= 0.0005 else "",
-        "mend": finding.mend.replace("CALIBRATION", files[0]).replace("DETECTIONS", files[1]),
+        "mend": finding.mend,
+        "command": command(finding.repair) if finding.severity != "note" else "",
     }
 
 

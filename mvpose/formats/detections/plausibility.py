@@ -49,7 +49,9 @@ def with_sizes(rig: Rig, extents: Floats, *, size: tuple[int, int] | None = None
             f"the calibration does not state the size of the pictures: taken as {width} x {height}, from principal "
             "points and keypoints; --size WIDTHxHEIGHT states it"
         )
-    return Rig([replace(each, size=size) if new else each for each, new in zip(rig, unknown, strict=True)]), note
+    return Rig.unchecked(
+        [replace(each, size=size) if new else each for each, new in zip(rig, unknown, strict=True)]
+    ), note
 
 
 def check_principal_points(rig: Rig) -> None:

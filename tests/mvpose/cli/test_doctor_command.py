@@ -12,7 +12,9 @@ from mvpose.cli.app import app
 from mvpose.formats.calibration import pose2sim
 
 NAMES = ["cam0", "cam1", "cam2", "cam3"]
-MOVED = Finding("moved-camera", "camera cam2 moved", camera="cam2", view=2, mend="mvpose repair\nor calibrate")
+MOVED = Finding(
+    "moved-camera", "camera cam2 moved", camera="cam2", view=2, mend="look at it", repair=("--free", "extrinsics")
+)
 
 
 @pytest.fixture
@@ -24,8 +26,8 @@ def call(tmp_path, monkeypatch):
     got = {}
 
     def run(findings, *options):
-        def diagnose(rig, frames, *, period):
-            got.update(rig=rig, frames=frames, period=period)
+        def diagnose(rig, frames, *, period, up):
+            got.update(rig=rig, frames=frames, period=period, up=up)
             return Diagnosis.of_findings(findings, evidence=["3 frames"], cameras=NAMES, residuals=np.full(4, 2.5))
 
         monkeypatch.setattr("mvpose.calibration.diagnose", diagnose)
@@ -35,11 +37,14 @@ def call(tmp_path, monkeypatch):
     return run
 
 
-def test_faults_are_named_with_what_mends_them(call):
+def test_faults_are_named_with_what_mends_them(call, tmp_path):
+    folder = tmp_path
     result, got = call([MOVED], "--fps", "50")
     assert result.exit_code == 1
     assert result.stdout.splitlines() == [
-        "verdict: faults", "! camera cam2 moved", "    mvpose repair", "    or calibrate", "evidence:", "  3 frames",
+        "verdict: faults", "! camera cam2 moved", "    look at it", "what mends it:",
+        f"  mvpose repair {folder}/Calib.toml {folder}/openpose --fps 50 --free extrinsics --out mended/Calib.toml",
+        "evidence:", "  3 frames",
     ]  # fmt: skip
     assert got["period"] == 0.02
     assert [len(frame) for frame in got["frames"]] == [8, 8, 8]

@@ -1,6 +1,7 @@
 """``mvpose repair``: the new calibration in the format of the old one, or one line that says why there is none."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -34,7 +35,12 @@ def call(tmp_path, monkeypatch):
                 np.full(4, 3.0), 2,
             )  # fmt: skip
 
+        def estimate_clocks(given, frames, *, period):
+            times = period * np.arange(len(frames))[:, None] + np.array([0.0, 0.01, 0.0, 0.0])
+            return SimpleNamespace(names=NAMES, times=times)
+
         monkeypatch.setattr("mvpose.calibration.repair", repair)
+        monkeypatch.setattr("mvpose.calibration.estimate_clocks", estimate_clocks)
         return CliRunner().invoke(app, [str(each) for each in ("repair", *arguments)])
 
     return run, tmp_path, rig, Rig(moved)

@@ -187,7 +187,7 @@ def made_repair(rig, corrections=None, refused=None):
 def finding(**changes):
     given = dict(
         kind="moved-camera", text="camera <2> has moved", camera="cam2", view=2, size={"degrees": 2.0, "metres": 0.05},
-        interval={"metres": (0.04, 0.06)}, cost=0.03, mend="mvpose repair CALIBRATION DETECTIONS --out c.json",
+        interval={"metres": (0.04, 0.06)}, cost=0.03, mend="look at it", repair=("--free", "extrinsics"),
     )  # fmt: skip
     return Finding(**{**given, **changes})
 
@@ -196,7 +196,9 @@ def page_of(folder, rig, sightings, findings, repair=None):
     diagnosis = Diagnosis.of_findings(
         findings, evidence=["a line"], cameras=[c.name for c in rig], residuals=np.zeros(len(rig))
     )
-    given = dict(diagnosis=diagnosis, repair=repair, files=("a.json", "b"))
+    given = dict(
+        diagnosis=diagnosis, repair=repair, command=lambda options: " ".join(["mvpose repair a.json b", *options])
+    )
     path = write_doctor_page(folder, name="a rig", rig=rig, frames=[], sightings=sightings, **given)
     page = path.read_text(encoding="utf-8")
     for svg in re.findall(r"<svg.*?</svg>", page, re.DOTALL):
@@ -220,7 +222,7 @@ class TestPage:
         assert "5.0 cm ± 0.2" in page
         assert 'class="field after"' in page
         assert 'class="line after"' in page
-        assert "mvpose repair a.json b --out c.json" in page
+        assert "mvpose repair a.json b --free extrinsics" in page
         assert numbers["findings"][0]["kind"] == "moved-camera"
         assert "held" in page
         assert numbers["repair"]["refused"] is None
