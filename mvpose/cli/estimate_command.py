@@ -15,7 +15,7 @@ from mvpose.commands.option_groups import grouped
 from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
-    from mvpose.formats.people.outliers import Limits
+    from mvpose.formats.people.outliers import OutputLimits
     from mvpose.formats.pictures import PictureSource
 
 
@@ -92,15 +92,15 @@ class Wanted:
     min_frames: Annotated[int, typer.Option(metavar="N", help="Leave out people who are there in fewer frames.")] = 5
 
     @property
-    def limits(self) -> Limits:
-        """Limits of what results hold.
+    def limits(self) -> OutputLimits:
+        """OutputLimits of what results hold.
 
         Raises:
             ValueError: one that is not above 0.
         """
-        from mvpose.formats.people.outliers import Limits
+        from mvpose.formats.people.outliers import OutputLimits
 
-        return Limits(self.max_error, self.max_speed, self.min_frames)
+        return OutputLimits(self.max_error, self.max_speed, self.min_frames)
 
     def check(self) -> None:
         """Check all of them.

@@ -37,8 +37,8 @@ _WINDOW = 100  # frames in which the earlier place of a joint is looked for
 
 
 @dataclass(frozen=True)
-class Limits:
-    """Limits of what results hold.
+class OutputLimits:
+    """OutputLimits of what results hold.
 
     Attributes:
         max_error: largest expected error of a joint, metres: half of such joints should be nearer to the truth.
@@ -71,7 +71,7 @@ class LeftOut:
         frames: frames in which each person was there before, (n,).
     """
 
-    limits: Limits
+    limits: OutputLimits
     ids: Integers
     counts: Integers
     present: Integers
@@ -123,7 +123,7 @@ class LeftOut:
         }
 
 
-def within_limits(people: People, limits: Limits, *, tracked: bool = True) -> tuple[People, LeftOut]:
+def within_limits(people: People, limits: OutputLimits, *, tracked: bool = True) -> tuple[People, LeftOut]:
     """Return people without what is beyond the limits, and what that was.
 
     Args:

@@ -8,7 +8,7 @@ from lab_files import walk
 from scipy.stats import chi, f
 
 from mvpose import COCO17
-from mvpose.formats.people.outliers import Limits, expected_errors, within_limits
+from mvpose.formats.people.outliers import OutputLimits, expected_errors, within_limits
 from mvpose.recording import People
 from mvpose.report.examined_recording import expected_median
 
@@ -33,7 +33,7 @@ def moved(given, frames, person, joint, by):
 class TestNothingIsWrong:
     def test_people_who_walk_lose_nothing(self):
         given = people()
-        kept, left_out = within_limits(given, Limits())
+        kept, left_out = within_limits(given, OutputLimits())
         assert kept is given
         assert left_out.sentences() == []
         assert left_out.to_json()["by_person"] == {}
@@ -43,7 +43,7 @@ class TestNothingIsWrong:
         swing = 1.5 * np.sin(2 * np.pi * 1.3 * np.arange(50) / RATE)  # up to 12 m/s more
         joints[:, 0, ANKLE, 1] += swing
         given = People(np.arange(50) / RATE, np.array([3, 8]), joints)
-        assert within_limits(given, Limits())[0] is given
+        assert within_limits(given, OutputLimits())[0] is given
 
 
 class TestUncertainJoints:
@@ -51,7 +51,7 @@ class TestUncertainJoints:
         given = people()
         covariance = given.covariance.copy()
         covariance[7:12, 1, ANKLE] *= (0.3 / 0.02) ** 2
-        kept, left_out = within_limits(replace(given, covariance=covariance), Limits())
+        kept, left_out = within_limits(replace(given, covariance=covariance), OutputLimits())
         expected = given.present.copy()
         expected[7:12, 1, ANKLE] = False
         np.testing.assert_array_equal(kept.present, expected)
@@ -63,7 +63,7 @@ class TestUncertainJoints:
         given = people()
         covariance = given.covariance.copy()
         covariance[:, 0, 4:] *= (0.323 / 0.02) ** 2
-        kept, left_out = within_limits(replace(given, covariance=covariance), Limits())
+        kept, left_out = within_limits(replace(given, covariance=covariance), OutputLimits())
         assert kept.ids.tolist() == left_out.ids[1:].tolist() == [8]
         assert left_out.people.tolist() == [3]
         assert kept.covariance.shape == (40, 1, 17, 3, 3)
@@ -90,7 +90,7 @@ class TestSpeeds:
     def test_a_wild_ankle_is_a_gap_and_its_neighbours_stay(self):
         given = people()
         wild = moved(given, [10, 11], 0, ANKLE, [0.0, 0.0, 3.46])  # 87 m/s
-        kept, left_out = within_limits(wild, Limits())
+        kept, left_out = within_limits(wild, OutputLimits())
         expected = given.present.copy()
         expected[[10, 11], 0, ANKLE] = False
         np.testing.assert_array_equal(kept.present, expected)
@@ -99,24 +99,26 @@ class TestSpeeds:
     @pytest.mark.parametrize("joint", [HIP, NOSE])
     def test_trunk_and_head_are_held_to_half_of_it(self, joint):
         step = [0.0, 0.0, 16.0 / RATE]  # m/s
-        assert within_limits(moved(people(), 20, 1, joint, step), Limits())[1].counts[1].tolist() == [0, 1]
-        assert within_limits(moved(people(), 20, 1, ANKLE, step), Limits())[1].counts[1].tolist() == [0, 0]
+        assert within_limits(moved(people(), 20, 1, joint, step), OutputLimits())[1].counts[1].tolist() == [0, 1]
+        assert within_limits(moved(people(), 20, 1, ANKLE, step), OutputLimits())[1].counts[1].tolist() == [0, 0]
 
     def test_the_longer_part_of_a_jump_stays(self):
         wild = moved(people(), slice(0, 9), 0, ANKLE, [0.0, 0.0, 40.0])
-        kept, _ = within_limits(wild, Limits())
+        kept, _ = within_limits(wild, OutputLimits())
         assert np.flatnonzero(~kept.present[:, 0, ANKLE]).tolist() == list(range(9))
 
     def test_speed_is_measured_across_gaps(self):
         given = people()
         scores = given.scores.copy()
         scores[10:30, 0, ANKLE] = 0.0  # 0.84 s, in which it may move by 20 m
-        kept, _ = within_limits(moved(replace(given, scores=scores), slice(30, None), 0, ANKLE, [0, 5.0, 0]), Limits())
+        kept, _ = within_limits(
+            moved(replace(given, scores=scores), slice(30, None), 0, ANKLE, [0, 5.0, 0]), OutputLimits()
+        )
         assert (kept.present == (scores > 0)).all()
 
     def test_identities_that_mean_nothing_are_not_judged(self):
         wild = moved(people(), [10], 0, ANKLE, [0.0, 0.0, 3.46])
-        assert within_limits(wild, Limits(), tracked=False)[0] is wild
+        assert within_limits(wild, OutputLimits(), tracked=False)[0] is wild
 
 
 class TestShortPeople:
@@ -125,9 +127,9 @@ class TestShortPeople:
         given = people()
         scores = given.scores.copy()
         scores[:-frames, 1] = 0.0
-        kept, left_out = within_limits(replace(given, scores=scores), Limits())
+        kept, left_out = within_limits(replace(given, scores=scores), OutputLimits())
         assert kept.ids.tolist() == ([3, 8] if stays else [3])
         assert left_out.people.tolist() == ([] if stays else [8])
 
     def test_a_recording_of_a_moment_keeps_those_who_are_always_there(self):
-        assert len(within_limits(people(2), Limits())[0]) == 2
+        assert len(within_limits(people(2), OutputLimits())[0]) == 2
