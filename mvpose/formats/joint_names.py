@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from mvpose import COCO17, SHELF14
 from mvpose.arrays import Floats
 from mvpose.recording import People
 from mvpose.skeleton import PANOPTIC19, HeadMapping, Skeleton, coco17_to_shelf14
-from mvpose.wholebody import known_names, skeleton_by_name
+from mvpose.wholebody import SKELETONS, known_names, skeleton_by_name
 
 _SIDES = {"l": "left", "r": "right"}
 
@@ -34,43 +34,6 @@ def canonical(name: str) -> str:
     if len(parts) > 1 and parts[-1] in ("left", "right"):
         parts = [parts[-1], *parts[:-1]]
     return "_".join(parts)
-
-
-# fmt: off
-BODY_25 = (
-    "nose", "neck", "right_shoulder", "right_elbow", "right_wrist", "left_shoulder", "left_elbow", "left_wrist",
-    "mid_hip", "right_hip", "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle",
-    "right_eye", "left_eye", "right_ear", "left_ear",
-    "left_big_toe", "left_small_toe", "left_heel", "right_big_toe", "right_small_toe", "right_heel",
-)
-"""OpenPose, --model_pose BODY_25."""
-
-_COCO18 = (
-    "nose", "neck", "right_shoulder", "right_elbow", "right_wrist", "left_shoulder", "left_elbow", "left_wrist",
-    "right_hip", "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle",
-    "right_eye", "left_eye", "right_ear", "left_ear",
-)  # OpenPose, --model_pose COCO
-_HALPE26 = (
-    *COCO17.joints, "head", "neck", "hip", "left_big_toe", "right_big_toe", "left_small_toe", "right_small_toe",
-    "left_heel", "right_heel",
-)  # AlphaPose and RTMPose with feet
-_MPII16 = (
-    "right_ankle", "right_knee", "right_hip", "left_hip", "left_knee", "left_ankle", "pelvis", "thorax",
-    "head_bottom", "head_top", "right_wrist", "right_elbow", "right_shoulder", "left_shoulder", "left_elbow",
-    "left_wrist",
-)  # the file's "upper neck" is the joint that Shelf calls the bottom of the head
-_H36M17 = (
-    "pelvis", "right_hip", "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle", "spine", "thorax",
-    "neck", "head", "left_shoulder", "left_elbow", "left_wrist", "right_shoulder", "right_elbow", "right_wrist",
-)
-_FEET6 = (
-    "left_big_toe", "left_small_toe", "left_heel", "right_big_toe", "right_small_toe", "right_heel",
-)
-_WHOLEBODY133 = (*COCO17.joints, *_FEET6, *(f"face_{k}" for k in range(68)),
-                 *(f"left_hand_{k}" for k in range(21)), *(f"right_hand_{k}" for k in range(21)))
-_HALPE136 = (*_HALPE26, *(f"face_{k}" for k in range(68)),
-             *(f"left_hand_{k}" for k in range(21)), *(f"right_hand_{k}" for k in range(21)))  # AlphaPose, whole body
-# fmt: on
 
 
 @dataclass(frozen=True)
@@ -129,32 +92,69 @@ class JointNames:
         return np.array([self._rows.get(canonical(joint), -1) for joint in wanted])
 
 
-KNOWN = {
-    each.name: each
-    for each in (
-        JointNames("coco17", COCO17.joints),
-        JointNames("body25", BODY_25),
-        JointNames("coco18", _COCO18),
-        JointNames("halpe26", _HALPE26),
-        JointNames("wholebody133", _WHOLEBODY133),
-        JointNames("halpe136", _HALPE136),
-        JointNames("mpii16", _MPII16),
-        JointNames("h36m17", _H36M17),
-        JointNames("shelf14", SHELF14.joints),
-        JointNames("panoptic19", PANOPTIC19.joints),
-        JointNames("panoptic15", PANOPTIC19.joints[:15]),
-    )
+# fmt: off
+_ORDERS = {
+    "coco17": COCO17.joints,
+    "mpii16": (
+        "right_ankle", "right_knee", "right_hip", "left_hip", "left_knee", "left_ankle", "pelvis", "thorax",
+        "head_bottom", "head_top", "right_wrist", "right_elbow", "right_shoulder", "left_shoulder", "left_elbow",
+        "left_wrist",
+    ),  # the file's "upper neck" is the joint that Shelf calls the bottom of the head
+    "h36m17": (
+        "pelvis", "right_hip", "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle", "spine", "thorax",
+        "neck", "head", "left_shoulder", "left_elbow", "left_wrist", "right_shoulder", "right_elbow", "right_wrist",
+    ),
+    "aic14": (
+        "right_shoulder", "right_elbow", "right_wrist", "left_shoulder", "left_elbow", "left_wrist", "right_hip",
+        "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle", "head_top", "head_bottom",
+    ),
+    "crowdpose14": (
+        "left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hip",
+        "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle", "head_top", "head_bottom",
+    ),
+    "shelf14": SHELF14.joints, "panoptic19": PANOPTIC19.joints, "panoptic15": PANOPTIC19.joints[:15],
 }
+_OTHER_NAMES = {
+    "coco": "coco18", "mpii": "mpii15", "lsp": "shelf14", "blazepose": "blazepose33",
+    "coco133": "wholebody133", "coco133wrist": "wholebody133", "halpe26lower": "halpe26",
+    "body": "coco17", "bodywithfeet": "halpe26", "lowerbody": "halpe26",
+    "wholebody": "wholebody133", "wholebodywrist": "wholebody133",
+}  # of Pose2Sim's models
+# fmt: on
+
+
+@cache
+def _named(name: str) -> JointNames:
+    return JointNames(name, _ORDERS.get(name) or skeleton_by_name(name).joints)
+
+
+class _Known(Mapping[str, JointNames]):
+    """Skeletons by name; those of files are read when they are first looked up."""
+
+    def __getitem__(self, name: str) -> JointNames:
+        if name not in (*_ORDERS, *SKELETONS):
+            raise KeyError(name)
+        return _named(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*_ORDERS, *SKELETONS))
+
+    def __len__(self) -> int:
+        return len(_ORDERS) + len(SKELETONS)
+
+
+KNOWN = _Known()
 """Skeletons that are known by name."""
 
 
 def known_skeleton(name: str) -> JointNames:
-    """Return a known skeleton; "BODY_25" and "body25" are the same name.
+    """Return a known skeleton; "BODY_25" and "body25" are the same name, and models of Pose2Sim are known as well.
 
     Raises:
         ValueError: an unknown name; the message lists the known ones.
     """
     plain = re.sub(r"[^a-z0-9]", "", name.lower())
+    plain = _OTHER_NAMES.get(plain, plain)
     if plain not in KNOWN:
         raise ValueError(f"no skeleton {name!r} is known; {_nearest(plain, KNOWN)}")
     return KNOWN[plain]

@@ -27,7 +27,10 @@ _DATA = Path(__file__).parent / "data"
 _WHAT = "a skeleton: a name, and a table of joints { parent, sigma, mirror }"
 _KEYS = {"parent", "sigma", "mirror"}
 
-SKELETONS = ("body25", "halpe26", "openpose137", "wholebody133")
+SKELETONS = (
+    "body25", "halpe26", "openpose137", "wholebody133",
+    "body25b", "body135", "halpe68", "halpe136", "coco18", "mpii15", "blazepose33",
+)  # fmt: skip
 """Names of the shipped skeletons."""
 
 _REGISTERED: dict[str, Skeleton] = {}

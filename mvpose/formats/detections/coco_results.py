@@ -21,8 +21,8 @@ from mvpose.formats.detections.detection_file import (
     DetectionFile,
     DetectionFormat,
     PicturePeople,
+    nameless_skeleton,
     picture_people,
-    usual_skeleton,
 )
 from mvpose.formats.joint_names import KNOWN, JointNames
 
@@ -36,11 +36,17 @@ def _read(file: DetectionFile, skeleton: JointNames | None) -> dict[int, Picture
     rows: dict[int, list[tuple[Floats, Any, Any]]] = {}
     for index, entry in enumerate(content):
         frame, (box, score) = _frame(path, index, entry), _box(path, index, entry)
+        if entry.get("keypoints") == []:  # not detected
+            rows.setdefault(frame, [])
+            continue
         if skeleton is None and "keypoints" in entry:
-            skeleton = usual_skeleton(path, np.size(np.asarray(entry["keypoints"], object)) // 3)
+            skeleton = nameless_skeleton(max(np.size(np.asarray(entry["keypoints"], object)) // 3, 1))
         rows.setdefault(frame, []).append((_keypoints(path, index, entry, skeleton or KNOWN["coco17"]), box, score))
     pictures = {}
     for frame in sorted(rows):
+        if not rows[frame]:
+            pictures[frame] = PicturePeople.nobody()
+            continue
         values = np.stack([each for each, _, _ in rows[frame]])
         boxes = [np.full(4, np.nan) if box is None else box for _, box, _ in rows[frame]]
         scores = [np.nan if score is None else min(max(score, 0.0), 1.0) for _, _, score in rows[frame]]
@@ -48,9 +54,11 @@ def _read(file: DetectionFile, skeleton: JointNames | None) -> dict[int, Picture
     return pictures
 
 
-FORMAT = DetectionFormat(
-    "COCO", lambda file: bool(file.entries) and "image_id" in file.entries[0], _read, complete=False
-)
+def _recognises(file: DetectionFile) -> bool:
+    return file.json == [] or (bool(file.entries) and "image_id" in file.entries[0])  # of a camera that saw nobody
+
+
+FORMAT = DetectionFormat("COCO", _recognises, _read, complete=False)
 
 
 def _frame(path: Path, index: int, entry: Mapping[str, Any]) -> int:

@@ -17,11 +17,6 @@ from mvpose.files.input_files import read_bytes, read_json
 from mvpose.files.message_text import listed, shown
 from mvpose.formats.joint_names import KNOWN, JointNames
 
-USUAL = {
-    len(KNOWN[name]): KNOWN[name] for name in ("coco17", "coco18", "body25", "halpe26", "wholebody133", "halpe136")
-}
-"""Skeleton by its number of joints, where none is declared."""
-
 WHAT = "detections of one camera: OpenPose, COCO or AlphaPose results, MMPose predictions or RTMLib arrays"
 """Expected content of a file, for messages."""
 
@@ -134,12 +129,12 @@ def picture_people(
         where: file and place in it, for messages.
         keypoints: (n, J, 2), pixels.
         scores: (n, J).
-        skeleton: the J joints; None: by their number.
+        skeleton: the J joints; None: the file does not name them.
         boxes: (n, 4), pixels; None: none has a box.
         box_scores: (n,); None: none has one.
 
     Raises:
-        ValueError: no numbers, other shapes, an unknown number of joints, or scores that are not about 0 to 1.
+        ValueError: no numbers, other shapes, or scores that are not about 0 to 1.
     """
     try:
         keypoints, scores = np.asarray(keypoints, float), np.asarray(scores, float)
@@ -151,7 +146,7 @@ def picture_people(
         raise ValueError(
             f"{where}: keypoints must be (n, J, 2) and scores (n, J), got {keypoints.shape} and {scores.shape}"
         )
-    names = skeleton or usual_skeleton(where, keypoints.shape[1])
+    names = skeleton or nameless_skeleton(keypoints.shape[1])
     if len(names) != keypoints.shape[1]:
         raise ValueError(f"{where}: has {keypoints.shape[1]} joints, but skeleton {names.name} has {len(names)}")
     if np.nanmax(scores) > _GREATEST_SCORE:  # those slightly above 1 are clipped later
@@ -165,16 +160,9 @@ def picture_people(
     return PicturePeople(keypoints, scores, np.where(bad[:, None], np.nan, boxes), box_scores, names)
 
 
-def usual_skeleton(where: object, joints: int) -> JointNames:
-    """Return the skeleton with a number of joints.
-
-    Raises:
-        ValueError: none is known.
-    """
-    if joints not in USUAL:
-        known = listed([f"{name.name} ({count})" for count, name in USUAL.items()])
-        raise ValueError(f"{where}: has {joints} joints a person; expected {known}, or a --skeleton by its name")
-    return USUAL[joints]
+def nameless_skeleton(joints: int) -> JointNames:
+    """Return a skeleton of nameless joints, of files that do not name theirs; :mod:`.skeleton_choice` names them."""
+    return JointNames(f"{joints} joints", tuple(f"joint {row}" for row in range(joints)))
 
 
 def summary(content: Any) -> str:

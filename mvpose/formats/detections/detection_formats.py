@@ -38,10 +38,6 @@ def format_of(file: DetectionFile) -> DetectionFormat:
     for each in FORMATS.values():
         if file.path.suffix.lower() in each.suffixes and each.recognises(file):
             return each
-    if file.json == []:
-        raise ValueError(
-            f"{file.path}: an empty list, of a camera without any detection; leave the camera out (--cameras)"
-        )
     if "annotations" in file.object:
         raise ValueError(
             f"{file.path}: COCO annotations; expected COCO results, a list of {{image_id, keypoints, score}}"

@@ -20,7 +20,7 @@ from mvpose.formats.detections.detection_file import (
     picture_people,
     summary,
 )
-from mvpose.formats.joint_names import JointNames
+from mvpose.formats.joint_names import KNOWN, JointNames, canonical
 
 
 def _recognises(file: DetectionFile) -> bool:
@@ -59,6 +59,7 @@ def _frames(path: Path, frames: Any, skeleton: JointNames | None) -> dict[int, P
 
 def _people(path: Path, instances: Sequence[Any], skeleton: JointNames | None) -> PicturePeople:
     """Return the people of one picture; ``bbox`` holds corners, in a list of one."""
+    instances = [each for each in instances if not (isinstance(each, dict) and each.get("keypoints") == [])]
     if not all(isinstance(each, dict) and {"keypoints", "keypoint_scores"} <= each.keys() for each in instances):
         raise ValueError(f"{path}: instances must have keypoints and keypoint_scores; got {summary(list(instances))}")
     boxes = []
@@ -84,7 +85,16 @@ def _named_joints(path: Path, content: Mapping[str, Any]) -> JointNames | None:
     names = about.get("keypoint_id2name") if isinstance(about, dict) else None
     if not isinstance(names, dict) or not all(str(k) in names for k in range(len(names))) or not names:
         return None
-    return JointNames(path.stem, tuple(str(names[str(k)]) for k in range(len(names))))
+    own = JointNames(path.stem, tuple(str(names[str(k)]) for k in range(len(names))))
+    return next((each for each in KNOWN.values() if _is_same(own, each)), own)
+
+
+def _is_same(own: JointNames, known: JointNames) -> bool:
+    """Return whether a skeleton is a known one; MMPose has other names for the points of hands and faces."""
+    return len(own) == len(known) and all(
+        canonical(name) == joint or joint.startswith(("face_", "left_hand_", "right_hand_"))
+        for name, joint in zip(own.joints, known.joints, strict=True)
+    )
 
 
 FORMAT = DetectionFormat("MMPose", _recognises, _read, _is_of_picture)

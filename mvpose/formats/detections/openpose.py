@@ -24,10 +24,10 @@ from mvpose.formats.detections.detection_file import (
     DetectionFile,
     DetectionFormat,
     PicturePeople,
+    nameless_skeleton,
     picture_people,
-    usual_skeleton,
 )
-from mvpose.formats.joint_names import BODY_25, KNOWN, JointNames, to_coco17
+from mvpose.formats.joint_names import KNOWN, JointNames, to_coco17
 from mvpose.skeleton import Skeleton
 
 _WHAT = "OpenPose output of one image: {'people': [{'pose_keypoints_2d': [25 x (x, y, score)]}, ...]}"
@@ -63,7 +63,8 @@ def read_people(path: str | Path, *, skeleton: JointNames = _BODY25) -> tuple[Fl
 
 def _values(path: Path, people: Sequence[Any], skeleton: JointNames) -> tuple[Floats, Floats]:
     """Return the keypoints (n, J, 2) and scores (n, J) of ``people`` in a file, on its own skeleton."""
-    body = np.array([_keypoints(path, index, person, skeleton) for index, person in enumerate(people)])
+    detected = [(index, person) for index, person in enumerate(people) if not _is_empty(person)]
+    body = np.array([_keypoints(path, index, person, skeleton) for index, person in detected])
     body = body.reshape(-1, len(skeleton), 3)
     return body[..., :2], body[..., 2]
 
@@ -73,9 +74,10 @@ def _read(file: DetectionFile, skeleton: JointNames | None) -> dict[int, Picture
     people = file.object.get("people")
     if not isinstance(people, list):
         raise ValueError(f"{file.path}: people must be a list, got {shown(people)}")
-    if skeleton is None and people and isinstance(people[0], dict):
-        values = people[0].get("pose_keypoints_2d")
-        skeleton = usual_skeleton(file.path, len(values) // 3 if isinstance(values, list) else 0)
+    first = next((each for each in people if not _is_empty(each)), None)
+    if skeleton is None and isinstance(first, dict):
+        values = first.get("pose_keypoints_2d")
+        skeleton = nameless_skeleton(len(values) // 3) if isinstance(values, list) and len(values) > 2 else None
     return {0: picture_people(file.path, *_values(file.path, people, skeleton or _BODY25), skeleton or _BODY25)}
 
 
@@ -116,8 +118,8 @@ def people_file(keypoints: ArrayLike, scores: ArrayLike, *, skeleton: Skeleton =
     """
     keypoints, scores = np.asarray(keypoints, float), np.asarray(scores, float)
     triples = np.where(scores[..., None] > 0, np.concatenate([keypoints, scores[..., None]], axis=-1), 0.0)
-    body = np.zeros((len(scores), len(BODY_25), 3))
-    for row, joint in enumerate(BODY_25):
+    body = np.zeros((len(scores), len(_BODY25), 3))
+    for row, joint in enumerate(_BODY25.joints):
         if joint in skeleton.joints:
             body[:, row] = triples[:, skeleton.index(joint)]
     for joint, end in _MIDDLES.items():
@@ -125,7 +127,7 @@ def people_file(keypoints: ArrayLike, scores: ArrayLike, *, skeleton: Skeleton =
             continue
         ends = triples[:, [skeleton.index(f"left_{end}"), skeleton.index(f"right_{end}")]]
         middle = np.concatenate([ends[..., :2].mean(axis=1), ends[..., 2:].min(axis=1)], axis=-1)
-        body[:, BODY_25.index(joint)] = np.where(middle[:, 2:] > 0, middle, 0.0)
+        body[:, _BODY25.joints.index(joint)] = np.where(middle[:, 2:] > 0, middle, 0.0)
     return {"version": _VERSION, "people": [_person(each) for each in body[(scores > 0).any(axis=1)]]}
 
 
@@ -133,6 +135,11 @@ def _person(body: Floats) -> dict[str, Any]:
     person: dict[str, Any] = {"person_id": [-1], "pose_keypoints_2d": body.ravel().tolist()}
     person |= {f"{part}_keypoints_2d": [] for part in _OTHERS}
     return person | {f"{part}_keypoints_3d": [] for part in ("pose", *_OTHERS)}
+
+
+def _is_empty(person: Any) -> bool:
+    """Return whether a person was not detected: Pose2Sim leaves empty lists where it removes one."""
+    return isinstance(person, dict) and person.get("pose_keypoints_2d") == []
 
 
 def _keypoints(path: Path, index: int, person: Any, skeleton: JointNames) -> Floats:

@@ -1,7 +1,7 @@
 """Detections of a whole recording: read camera by camera in any registered format, and joined frame by frame.
 
-The skeleton of files is that which is declared, or else the usual one with this number of joints. Everything becomes
-COCO-17, or stays on its skeleton where all joints are requested and :mod:`mvpose.wholebody` knows it.
+The skeleton of files is that which is declared, or else the one with this number of joints that fits. Everything
+becomes COCO-17, or stays on its skeleton where all joints are requested and :mod:`mvpose.wholebody` knows it.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ from mvpose.arrays import Floats, Integers
 from mvpose.detections import Detections
 from mvpose.files.input_files import file_numbers, natural_order
 from mvpose.files.message_text import listed
-from mvpose.formats.detections.detection_file import USUAL, DetectionFile, DetectionFormat, PicturePeople, summary
+from mvpose.formats.detections.detection_file import DetectionFile, DetectionFormat, PicturePeople, summary
 from mvpose.formats.detections.detection_formats import FORMATS, format_of, suffixes
+from mvpose.formats.detections.skeleton_choice import SkeletonChoice, choose_skeletons
 from mvpose.formats.detections.sources import Assignment, Source, assign, find_sources
 from mvpose.formats.joint_names import KNOWN, JointNames, to_coco17
 from mvpose.skeleton import COCO17, Skeleton
@@ -57,6 +58,7 @@ class RecordedFrames:
         assignment: which source belongs to which camera.
         kinds: layout of the files of each camera.
         skeleton: joints of the detections.
+        notes: what was decided about the skeleton of the files, for the user.
     """
 
     numbers: Integers
@@ -64,6 +66,7 @@ class RecordedFrames:
     assignment: Assignment
     kinds: tuple[str, ...]
     skeleton: Skeleton = COCO17
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -98,6 +101,7 @@ def read_recording(
     paths: Sequence[Path],
     *,
     skeleton: JointNames | None = None,
+    origin: str = "",
     all_joints: bool = False,
     frames: tuple[int, int] | None = None,
     progress: Callable[[int], None] = lambda _: None,
@@ -107,7 +111,8 @@ def read_recording(
     Args:
         cameras: names of the V cameras, in the order of the rig.
         paths: see :func:`mvpose.formats.detections.sources.find_sources`.
-        skeleton: joints of the files; None: by their number.
+        skeleton: joints of the files; None: those that fit (:mod:`.skeleton_choice`).
+        origin: where the skeleton is stated, for messages; "": by the option.
         all_joints: keep the joints beyond COCO-17, on a skeleton of :mod:`mvpose.wholebody`.
         frames: first and last frame to take, by the numbers in the files; None: all.
         progress: called with the number of cameras that were read since the last call.
@@ -119,8 +124,10 @@ def read_recording(
     assignment = assign(cameras, find_sources(paths))
     views = []
     for source in assignment.sources:
-        views.append(read_view(source, skeleton=skeleton, all_joints=all_joints))
+        views.append(read_view(source, skeleton=skeleton))
         progress(1)
+    choice = choose_skeletons(_all_pictures(views), declared=skeleton, origin=origin)
+    views = [_converted(view, choice, all_joints=all_joints) for view in views]
     numbers = _frame_numbers(cameras, views, frames)
     joints = _joints(cameras, views)
     kept = set(numbers.tolist())
@@ -136,7 +143,8 @@ def read_recording(
         which = f"of the camera {listed(empty)}" if others else "of any camera"
         mend = f", or leave it out: --cameras {','.join(others)}" if len(others) > 1 else ""
         raise ValueError(f"nobody is detected in any frame {which}; check the files of detections{mend}")
-    return RecordedFrames(numbers, tuple(pictures), assignment, tuple(view.kind for view in views), joints)
+    kinds = tuple(view.kind for view in views)
+    return RecordedFrames(numbers, tuple(pictures), assignment, kinds, joints, choice.notes)
 
 
 def read_frames(
@@ -160,7 +168,7 @@ def read_frames(
         frames: numbers of the requested frames, (F,), increasing.
         first: number of the frame of the first picture of each camera.
         format: name of a registered format; None: by the content of the files.
-        skeleton: joints of the files; None: by their number.
+        skeleton: joints of the files; None: those that fit (:mod:`.skeleton_choice`).
 
     Raises:
         ValueError: files that are missing or faulty, a camera without files, or requested frames without a picture.
@@ -185,6 +193,8 @@ def read_frames(
                 f"{source.path}: has frames {min(own)} to {max(own)}, none of the requested frames {frames[0]} to "
                 f"{frames[-1]}; expected the numbers of the frames"
             )
+    choice = choose_skeletons(_all_pictures(views), declared=skeleton, option="detections.skeleton")
+    views = [_converted(view, choice, all_joints=False) for view in views]
     nobody = PicturePeople.nobody()
     return tuple(
         _joined([view.pictures.get(number, nobody) for view in views], None, COCO17) for number in frames.tolist()
@@ -216,22 +226,20 @@ def read_view(
     source: Source,
     *,
     skeleton: JointNames | None = None,
-    all_joints: bool = False,
     format: str | None = None,
     numbering: Numbering = lambda numbers: dict(zip(numbers, numbers, strict=True)),
 ) -> ViewPeople:
-    """Read the people of one camera, without those of whom no joint of COCO-17 was detected.
+    """Read the people of one camera, on the skeleton of its files.
 
     Args:
         source: its folder or file.
-        skeleton: joints of the files; None: by their number.
-        all_joints: keep the joints beyond COCO-17.
+        skeleton: joints of the files; None: they have no names yet.
         format: name of a registered format; None: by the content of the files.
         numbering: frames of the pictures; of formats whose files state the frames, not called.
 
     Raises:
-        ValueError: a file that cannot be read, is of no known format, has an unknown number of joints, or scores that
-            are not 0..1; no picture at all; or all joints are requested of a skeleton that is not shipped.
+        ValueError: a file that cannot be read, is of no known format, or has scores that are not 0..1; or no picture
+            at all.
     """
     chosen = None if format is None else FORMATS[format]
     kinds = []
@@ -252,9 +260,26 @@ def read_view(
         read = dict(sorted(kinds[0].read(file, skeleton).items()))
         frames = numbering(list(read)) if kinds[0].complete else dict(zip(read, read, strict=True))
         pictures = {frame: read[number] for number, frame in frames.items()}
-    convert = _whole if all_joints else _body
-    shown = {number: convert(source.path, each) for number, each in sorted(pictures.items())}
+    shown = dict(sorted(pictures.items()))
     return ViewPeople(source, shown, all(each.complete for each in kinds), kinds[-1].title)
+
+
+def _all_pictures(views: Sequence[ViewPeople]) -> list[PicturePeople]:
+    return [each for view in views for each in view.pictures.values()]
+
+
+def _converted(view: ViewPeople, choice: SkeletonChoice, *, all_joints: bool) -> ViewPeople:
+    """Return a view without people of whom no joint of COCO-17 was detected, on COCO-17 or with all joints.
+
+    Raises:
+        ValueError: all joints are requested of a skeleton that is not known.
+    """
+    convert = _whole if all_joints else _body
+    pictures = {
+        number: convert(view.source.path, replace(each, joints=choice.named(each))) if len(each) else each
+        for number, each in view.pictures.items()
+    }
+    return replace(view, pictures=pictures)
 
 
 def _of_picture(
@@ -279,8 +304,6 @@ def _body(_: Path, picture: PicturePeople) -> PicturePeople:
 def _whole(path: Path, picture: PicturePeople) -> PicturePeople:
     """Return a picture on its own skeleton."""
     joints = picture.joints
-    if joints.name not in KNOWN and joints.joints[:17] == COCO17.joints:
-        joints = USUAL.get(len(joints), joints)  # MMPose has other names for the points of hands and faces
     if joints.name not in (*known_names(), "coco17"):
         raise ValueError(
             f"{path}: all joints of the skeleton {joints.name} are requested; expected one of "

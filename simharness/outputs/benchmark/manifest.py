@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mvpose.formats.joint_names import BODY_25
+from mvpose.formats.joint_names import KNOWN
 from mvpose.skeleton import COCO17, PANOPTIC19
 from mvpose.wholebody import skeleton_by_name
 from simharness.outputs.benchmark.joint_confidences import CONFIDENCES
@@ -93,7 +93,11 @@ def manifest(
             "none": "hidden in all pictures, which show other joints of the person",
             "nobody": "no picture shows any joint of the person",
         },
-        "skeletons": {"joints19": PANOPTIC19.joints, "pose_keypoints_2d": BODY_25, "made": _made(scenario)},
+        "skeletons": {
+            "joints19": PANOPTIC19.joints,
+            "pose_keypoints_2d": KNOWN["body25"].joints,
+            "made": _made(scenario),
+        },
         "rolling_shutter": trial.exposures.readout,
         "cameras": [_camera(trial.exposures, trial.scene.time, frames, view, name) for view, name in enumerate(names)],
         "people": _people(trial),

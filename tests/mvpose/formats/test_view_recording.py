@@ -89,7 +89,7 @@ class TestLayouts:
         frames = [{"keypoints": [[[1.0, 2.0]] * 11], "scores": [[0.5] * 11]}]
         for name in NAMES:
             (tmp_path / f"{name}.json").write_text(json.dumps(frames))
-        with pytest.raises(ValueError, match=r"cam0\.json: frame 0: has 11 joints a person; expected coco17 \(17\)"):
+        with pytest.raises(ValueError, match=r"have 11 joints a person; expected .*coco17 \(17\)"):
             read_recording(NAMES, [tmp_path])
 
     def test_a_lost_picture_has_no_time_and_nobody(self, tmp_path):

@@ -11,7 +11,6 @@ from whole_people import seen, standing
 import mvpose
 from mvpose import COCO17, SHELF14, Detections, Estimate, Skeleton
 from mvpose.estimators import SequenceEstimator
-from mvpose.formats.joint_names import KNOWN
 from mvpose.skeleton import Skeleton as _Skeleton
 from mvpose.wholebody import SKELETONS, body_part, read_skeleton, skeleton_by_name, whole_body, with_body_boxes
 
@@ -43,10 +42,37 @@ def on_body(estimate, skeleton):
     )
 
 
+# Rows in Pose2Sim's skeletons.py: right and left shoulder, elbow, wrist, hip, knee, ankle; toes and heels; others.
+# Hands of BODY_135 are from poseParameters.cpp of OpenPose: 20 points each, from row 25 and 45, then the face.
+PUBLISHED = [
+    ("body25", "2 3 4 9 10 11 5 6 7 12 13 14", "22 23 24 19 20 21", {"nose": 0, "neck": 1, "mid_hip": 8}),
+    ("body25b", "6 8 10 12 14 16 5 7 9 11 13 15", "22 23 24 19 20 21", {"nose": 0, "neck": 17, "head": 18}),
+    ("body135", "6 8 10 12 14 16 5 7 9 11 13 15", "22 23 24 19 20 21",
+     {"neck": 17, "head": 18, "left_hand_1": 25, "right_hand_1": 45, "face_0": 65, "face_69": 134}),
+    ("halpe26", "6 8 10 12 14 16 5 7 9 11 13 15", "21 23 25 20 22 24", {"head": 17, "neck": 18, "hip": 19}),
+    ("halpe68", "6 8 10 12 14 16 5 7 9 11 13 15", "21 23 25 20 22 24",
+     {"left_hand_2": 28, "left_hand_5": 31, "left_hand_17": 43, "right_hand_2": 49, "right_hand_17": 64}),
+    ("halpe136", "6 8 10 12 14 16 5 7 9 11 13 15", "21 23 25 20 22 24",
+     {"left_hand_2": 96, "left_hand_5": 99, "left_hand_17": 111, "right_hand_2": 117, "right_hand_17": 132}),
+    ("wholebody133", "6 8 10 12 14 16 5 7 9 11 13 15", "20 21 22 17 18 19",
+     {"face_0": 23, "left_hand_2": 93, "left_hand_17": 108, "right_hand_5": 117, "right_hand_17": 129}),
+    ("blazepose33", "12 14 16 24 26 28 11 13 15 23 25 27", "30 29",
+     {"nose": 0, "right_eye": 5, "left_pinky": 17, "right_index": 20, "left_foot_index": 31}),
+    ("coco18", "2 3 4 8 9 10 5 6 7 11 12 13", "", {"nose": 0, "neck": 1}),
+    ("mpii15", "2 3 4 8 9 10 5 6 7 11 12 13", "", {"head_bottom": 1, "chest": 14}),
+]  # fmt: skip
+
+
 class TestSkeletons:
-    @pytest.mark.parametrize("name", ["wholebody133", "halpe26", "body25"])
-    def test_joints_are_in_the_order_of_the_detectors(self, name):
-        assert skeleton_by_name(name).joints == KNOWN[name].joints
+    @pytest.mark.parametrize(("name", "limbs", "feet", "others"), PUBLISHED)
+    def test_joints_are_in_the_order_of_the_detectors(self, name, limbs, feet, others):
+        skeleton = skeleton_by_name(name)
+        ends = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+        found = [skeleton.index(f"{side}_{end}") for side in ("right", "left") for end in ends]
+        assert found == [int(each) for each in limbs.split()]
+        toes = [f"{side}_{end}" for side in ("right", "left") for end in ("big_toe", "small_toe", "heel")]
+        assert [skeleton.index(joint) for joint in toes if joint in skeleton.joints] == [int(k) for k in feet.split()]
+        assert {joint: skeleton.index(joint) for joint in others} == others
 
     @pytest.mark.parametrize("name", SKELETONS)
     def test_sides_mirror_each_other_and_every_joint_hangs_on_its_own_side(self, name):
@@ -61,7 +87,7 @@ class TestSkeletons:
 
     def test_sizes_and_sigmas_as_published(self):
         whole = skeleton_by_name("wholebody133")
-        assert [len(skeleton_by_name(name)) for name in SKELETONS] == [25, 26, 137, 133]
+        assert [len(skeleton_by_name(name)) for name in SKELETONS] == [25, 26, 137, 133, 25, 135, 68, 136, 18, 15, 33]
         assert whole.sigmas[:17] == COCO17.sigmas
         # Sums of myeval_wholebody.py of COCO-WholeBody: feet, face, a hand.
         sums = [sum(whole.sigmas[a:b]) for a, b in ((17, 23), (23, 91), (91, 112), (112, 133))]

@@ -8,7 +8,7 @@ import pytest
 from mvpose import COCO17, SHELF14, Camera, Rig
 from mvpose.formats.calibration.panoptic import write_calibration as write_panoptic
 from mvpose.formats.calibration.voxelpose import write_calibration as write_voxelpose
-from mvpose.formats.joint_names import BODY_25
+from mvpose.formats.joint_names import KNOWN
 from mvpose.formats.people import Options, write_people
 from mvpose.recording import People
 from mvpose.skeleton import coco17_to_shelf14
@@ -19,7 +19,11 @@ CAMERAS = ("00_00", "00_01", "00_02")
 FRAMES = (10, 11, 12, 20, 21)
 RNG = np.random.default_rng(11)
 TRUTH = RNG.normal(size=(5, 2, 14, 3))  # of the five frames
-PIXELS = RNG.uniform(0, 400, (5, 3, 17, 2))  # one person in each frame and view
+BODY = np.array([
+    [0, 0], [4, -3], [-4, -3], [9, 0], [-9, 0], [20, 24], [-20, 24], [28, 60], [-28, 60], [30, 89], [-30, 89],
+    [14, 81], [-14, 81], [15, 130], [-15, 130], [15, 179], [-15, 179],
+])  # fmt: skip
+PIXELS = BODY + RNG.uniform(100, 300, (5, 3, 1, 2)) + RNG.uniform(0, 3, (5, 3, 17, 2))  # a person in each picture
 
 
 def keys(**changes):
@@ -54,7 +58,7 @@ def folder(tmp_path):
             body = np.zeros((25, 3))
             if number + 10 in FRAMES:
                 for joint, name in enumerate(COCO17.joints):
-                    body[BODY_25.index(name)] = *PIXELS[FRAMES.index(number + 10), view, joint], 0.7
+                    body[KNOWN["body25"].joints.index(name)] = *PIXELS[FRAMES.index(number + 10), view, joint], 0.7
             people = [{"pose_keypoints_2d": body.ravel().tolist()}]
             file = tmp_path / "openpose" / camera / f"image_{number}.json"
             file.write_text(json.dumps({"people": people}))
@@ -186,7 +190,10 @@ class TestDetections:
     def test_a_declared_skeleton(self, folder):
         names = [f"j{k}" for k in range(25)]
         declared = {
-            "skeleton": {"joints": names, "map": {joint: names[BODY_25.index(joint)] for joint in COCO17.joints}}
+            "skeleton": {
+                "joints": names,
+                "map": {joint: names[KNOWN["body25"].joints.index(joint)] for joint in COCO17.joints},
+            }
         }
         assert_detections(read_recording(described(folder, detections=declared)))
         declared["skeleton"]["map"].pop("nose")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mvpose import COCO17
 from mvpose.formats.detections.openpose import people_file, read_people
-from mvpose.formats.joint_names import BODY_25
+from mvpose.formats.joint_names import KNOWN
 from mvpose.formats.people.panoptic_poses import body_scene
 from mvpose.skeleton import PANOPTIC19
 from mvpose.wholebody import skeleton_by_name
@@ -117,9 +117,9 @@ def test_feet_are_written_where_they_are_detected(name):
     skeleton = skeleton_by_name(name)
     keypoints = np.random.default_rng(1).uniform(0, 500, (1, len(skeleton), 2))
     (person,) = people_file(keypoints, np.ones((1, len(skeleton))), skeleton=skeleton)["people"]
-    written = dict(zip(BODY_25, np.reshape(person["pose_keypoints_2d"], (25, 3)), strict=True))
+    written = dict(zip(KNOWN["body25"].joints, np.reshape(person["pose_keypoints_2d"], (25, 3)), strict=True))
     for joint, keypoint in zip(skeleton.joints, keypoints[0], strict=True):
-        if joint in BODY_25:
+        if joint in KNOWN["body25"].joints:
             np.testing.assert_array_equal(written[joint], [*keypoint, 1.0])
     hips = [skeleton.index(f"{side}_hip") for side in ("left", "right")]
     middle = keypoints[0, skeleton.index("mid_hip")] if name == "body25" else keypoints[0, hips].mean(axis=0)

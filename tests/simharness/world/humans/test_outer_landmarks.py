@@ -1,9 +1,12 @@
 """Joints of feet and hands of the body model."""
 
+import typing
+
 import numpy as np
 import pytest
 
-from mvpose.wholebody import SKELETONS, skeleton_by_name
+from mvpose.wholebody import skeleton_by_name
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.world.humans.body import make_body
 from simharness.world.humans.outer_landmarks import OuterJoints
 from simharness.world.humans.shape import Shape
@@ -71,7 +74,7 @@ def test_joints_move_with_their_bones(person):
     assert moved[others].max() < 1e-6  # metres: weights of the skin are stored in 16 bits
 
 
-@pytest.mark.parametrize("name", SKELETONS)
+@pytest.mark.parametrize("name", typing.get_args(DetectorSection.model_fields["skeleton"].annotation)[1:])
 def test_every_joint_but_those_of_the_face_is_known(name):
     body = make_body(Shape())
     joints = OuterJoints.of(body, skeleton_by_name(name))
