@@ -8,8 +8,8 @@ from reader_fuzzing import Worker, fuzz
 
 ROUNDS = 9 if os.environ.get("SIMHARNESS_HYPOTHESIS") == "nightly" else 4
 """Mutations of every kind for each reader: 72 together, 162 at night. A mistake that a reader makes in 4 % of the
-mutations stays unseen with a probability of 5 %, one of 2 % at night with 4 %; ``reader_fuzzing.py 2000`` looks for rarer
-ones."""
+mutations stays unseen with a probability of 5 %, one of 2 % at night with 4 %; ``reader_fuzzing.py 2000`` looks for
+rarer ones."""
 
 
 @pytest.fixture(scope="module")
