@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mvpose.cli.estimate_command import Wanted, estimate_into
-from mvpose.cli.inputs import Calibration, Choices
+from mvpose.cli.inputs import Calibration, Choices, picture_size
 from mvpose.cli.program import PROGRAM
 from mvpose.commands.option_groups import grouped
 from mvpose.commands.programs import note
@@ -109,6 +109,8 @@ def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: N
         rig = read_calibration(calibration, size=UNKNOWN_SIZE, only=choices.only, key="--cameras")
         sources = assigned(rig.cameras, open_videos(videos))
         check_sizes(rig.cameras, sources)
+        if (stated := picture_size(choices.size)) is not None and any(source.size != stated for source in sources):
+            raise ValueError(f"--size {choices.size}: the videos have pictures of another size; leave --size out")
         if choices.frames is None:
             check_lengths(sources)
         _detect(sources, detections, networks)

@@ -181,7 +181,7 @@ def estimate_into(
         formats=formats_of(wanted.formats),
         options=options_of(wanted.files_up, together=wanted.together),
         left_out=left_out,
-        page=wanted.page,
+        page=wanted.page and bool(inputs.frames),
         views=views,
         films=wanted.films,
         diagnosis=diagnosis,

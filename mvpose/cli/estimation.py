@@ -37,6 +37,7 @@ MISS = 1.18
 _SEEN = 0.3  # score above which a keypoint counts: those below are guesses of the detector
 _AREA = 0.53  # of a box that a person covers, as in COCO's evaluation without masks
 _FEWEST = 30  # keypoints of a camera from which a median is known
+_MOST = 0.75  # share of people who stand or face wrongly from which it is no posture of theirs
 _APART = 0.05  # share of a camera's detections in people below which it sees other people than the others
 _BODIES = (0.4, 2.2)  # metres from shoulder to ankle, along the bones: from a baby to beyond the tallest
 _LONG = ((5, 11), (11, 13), (13, 15), (6, 12), (12, 14), (14, 16))  # trunk, thigh and shank of both sides in COCO-17
@@ -94,6 +95,9 @@ def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -
     try:
         bodies = [body_of(each, inputs.skeleton) for each in estimates]
         remarks = check(inputs.rig, agreement(inputs.rig, [body_part(frame) for frame in inputs.frames], bodies))
+        remarks += check_postures(
+            np.concatenate([np.zeros((0, 17, 3)), *(each.joints for each in bodies)]), inputs.doubt
+        )
     except ValueError as error:
         if not trust:
             raise
@@ -110,7 +114,7 @@ class Agreement:
     Attributes:
         residuals: median distance of keypoints from the projected joints, (V,), in standard deviations of annotators
             (twice OKS's sigma times the root of the person's area); NaN where there are too few.
-        shares: share of the detections that belong to a person whom other cameras see, too, (V,).
+        shares: share of the detections that belong to a person whom other cameras see, too, (V,); NaN without any.
         body: median length from shoulder to ankle, metres; NaN where nobody is complete.
     """
 
@@ -132,7 +136,7 @@ def agreement(rig: Rig, frames: Sequence[Detections], estimates: Sequence[Estima
         if len(estimate):
             found.append((frame.view[rows], _residuals(rig, frame, estimate, rows, labels[rows])))
             bodies.append(_lengths(estimate.joints))
-    shares = matched / np.maximum(counts, 1)
+    shares = np.where(counts > 0, matched / np.maximum(counts, 1), np.nan)
     if not found:
         return Agreement(np.full(len(rig), np.nan), shares, float("nan"))
     view, residual = (np.concatenate(each) for each in zip(*found, strict=True))
@@ -173,6 +177,36 @@ def check(rig: Rig, agreed: Agreement) -> list[str]:
             "elsewhere, its detections are of another camera or time, or it has moved; `mvpose doctor` tells which"
         )
     return remarks
+
+
+def check_postures(joints: Floats, doubt: str) -> list[str]:
+    """Return remarks about people whose bodies no posture explains.
+
+    Args:
+        joints: people of all frames on COCO-17, (n, 17, 3), metres, z up; NaN where missing.
+        doubt: why the upward axis may be wrong.
+
+    Raises:
+        ValueError: people who lie where the upward axis is in doubt, or whose left is on their right.
+    """
+    nose, ears = joints[:, 0], joints[:, 3:5].mean(axis=1)
+    shoulders, hips = joints[:, 5:7].mean(axis=1), joints[:, 11:13].mean(axis=1)
+    trunk = shoulders - hips
+    handed = np.einsum("nk,nk->n", joints[:, 5] - joints[:, 6], np.cross(trunk, nose - ears))
+    handed = handed[np.isfinite(handed)]
+    if len(handed) >= _FEWEST and (handed < 0).mean() > _MOST:
+        raise ValueError(
+            f"left and right of {100 * (handed < 0).mean():.0f} % of the people are exchanged, by their noses: the "
+            "names of the joints are in another order (--skeleton), or the pictures are mirrored; `mvpose doctor` "
+            "tells which; --trust writes these people nevertheless"
+        )
+    trunk = trunk[np.isfinite(trunk).all(axis=1)]
+    lie = trunk[:, 2] < 0.5 * np.linalg.norm(trunk, axis=1)  # more than 60 degrees from upright
+    if len(lie) < _FEWEST or lie.mean() < _MOST:
+        return []
+    if doubt:
+        raise ValueError(f"{doubt}, and the people lie on their sides: correct --up; --trust writes them nevertheless")
+    return [f"{100 * lie.mean():.0f} % of the people lie: if they stand, another axis points up (--up)"]
 
 
 def _with_residuals(rig: Rig, agreed: Agreement, views: Sequence[int]) -> str:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import mvpose
     from mvpose import Detections, Rig
     from mvpose.formats.joint_names import JointNames
+    from mvpose.formats.pose2sim_project import ProjectSettings
 
 Calibration = Annotated[
     Path,
@@ -49,6 +50,7 @@ class Inputs:
         numbers: number of each frame in the files, (T,).
         period: time between frames, seconds.
         paths: file or folder with the detections of each camera, V.
+        doubt: why the given upward axis may be wrong; "" where nothing speaks against it.
     """
 
     rig: Rig
@@ -56,6 +58,7 @@ class Inputs:
     numbers: NDArray[np.int64]
     period: float
     paths: tuple[Path, ...] = ()
+    doubt: str = ""
 
     @property
     def skeleton(self) -> mvpose.Skeleton:
@@ -140,15 +143,28 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     if choices.fps is not None and not 0.0 < choices.fps < 1e6:
         raise ValueError(f"--fps must be above 0, got {choices.fps}")
     frames, size = _frames(choices.frames), picture_size(choices.size)
-    skeleton = _skeleton(choices.skeleton) if choices.skeleton else None
+    skeleton, origin, project = _skeleton(choices.skeleton) if choices.skeleton else None, "", _project(detections)
+    if skeleton is None:
+        with _noted():
+            skeleton, origin = project.skeleton()
     rig = _read_rig(calibration, choices.only, examined=examined)
     names = [camera.name for camera in rig]
     with single_stage("read", len(rig)) as advance:
         recorded = read_recording(
-            names, detections, skeleton=skeleton, all_joints=choices.joints == "all", frames=frames, progress=advance
+            names,
+            detections,
+            skeleton=skeleton,
+            origin=origin,
+            all_joints=choices.joints == "all",
+            frames=frames,
+            progress=advance,
         )
-    note(recorded.assignment.text(names))
+    for each in (recorded.assignment.text(names), *recorded.notes):
+        note(each)
     extents = recorded.extents()
+    if size is not None:
+        with _noted() if examined else contextlib.nullcontext():
+            plausibility.check_size(rig, size)
     rig, about_size = plausibility.with_sizes(rig, extents, size=size)
     if about_size:
         note(about_size)
@@ -156,13 +172,18 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
         plausibility.check_principal_points(rig)
     with _noted() if examined else contextlib.nullcontext():
         plausibility.check_extents(rig, extents)
+    doubt = ""
     if choices.up is not None:
+        stands = plausibility.up_axis(rig)
         rig = plausibility.turned_up(rig, choices.up)
+        if stands not in (None, choices.up):
+            doubt = f"--up={choices.up}: the cameras stand upright where the {stands} axis of the world points up"
+            note(doubt)
     elif not examined:
         plausibility.check_up(rig)
-    times, period = _times(choices, recorded.numbers, len(rig))
+    times, period = _times(choices, recorded.numbers, names, project)
     paths = tuple(source.path for source in recorded.assignment.sources)
-    return Inputs(rig, recorded.detections(times), recorded.numbers, period, paths)
+    return Inputs(rig, recorded.detections(times), recorded.numbers, period, paths, doubt)
 
 
 def _read_rig(path: Path, only: Sequence[str], *, examined: bool) -> Rig:
@@ -197,6 +218,14 @@ def _noted() -> Iterator[None]:
         note(str(error))
 
 
+def _project(detections: Sequence[Path]) -> ProjectSettings:
+    """Return the settings of the Pose2Sim project in which detections lie."""
+    from mvpose.formats.detections.sources import find_sources
+    from mvpose.formats.pose2sim_project import ProjectSettings
+
+    return ProjectSettings.near(source.path for source in find_sources(detections))
+
+
 def _skeleton(given: str) -> JointNames:
     """Return the joints of a known skeleton, or of a TOML file."""
     from mvpose.formats.joint_names import JointNames, known_skeleton
@@ -209,50 +238,39 @@ def _skeleton(given: str) -> JointNames:
     return JointNames(skeleton.name, skeleton.joints)
 
 
-def _times(choices: Choices, numbers: NDArray[np.int64], cameras: int) -> tuple[NDArray[np.float64], float]:
+def _times(
+    choices: Choices, numbers: NDArray[np.int64], cameras: Sequence[str], project: ProjectSettings
+) -> tuple[NDArray[np.float64], float]:
     """Return the time of each picture, (T, V), seconds, and the time between frames."""
     import numpy as np
 
+    from mvpose.formats.times_file import read_times
+
     if choices.times is not None:
-        times = _read_times(choices.times, len(numbers), cameras)
+        times, remark = read_times(choices.times, len(numbers), cameras)
+        if remark:
+            note(remark)
         return times, float(np.median(np.diff(np.nanmean(times, axis=1)))) if len(times) > 1 else 1.0 / _FPS
-    if choices.fps is None:
+    rate, origin = (choices.fps, "") if choices.fps is not None else _project_rate(project)
+    if origin:
+        note(f"{rate:g} frames per second: {origin}; --fps goes before it")
+    elif rate is None:
         note(f"no --fps: {_FPS:g} frames per second are assumed, which sets how fast people can move")
-    period = 1.0 / (choices.fps or _FPS)
-    return np.repeat((numbers * period)[:, None], cameras, axis=1), period
+    period = 1.0 / (rate or _FPS)
+    return np.repeat((numbers * period)[:, None], len(cameras), axis=1), period
 
 
-def _read_times(path: Path, frames: int, cameras: int) -> NDArray[np.float64]:
-    """Read times of pictures, (T, V): lines of one number, or of one for each camera; a first line may hold names.
+def _project_rate(project: ProjectSettings) -> tuple[float | None, str]:
+    """Return the frames per second of a project, of its settings or its videos, and where they are stated."""
+    rate, origin = project.rate()
+    folders = [file.parent / "videos" for file in project.files if (file.parent / "videos").is_dir()]
+    if rate is None and folders:
+        from mvpose.cli.camera_pictures import common_rate, open_videos
 
-    Raises:
-        ValueError: no such file, or another number of lines or of numbers in a line.
-    """
-    import re
-
-    import numpy as np
-
-    from mvpose.files.input_files import read_bytes
-
-    text = read_bytes(path, what="times of pictures, a line for each frame").decode("utf-8", "replace")
-    lines = [re.split(r"[,;\s]+", line.strip()) for line in text.splitlines() if line.strip()]
-    if lines and any(re.search(r"[A-Za-z]", each) and each.lower() != "nan" for each in lines[0]):
-        lines = lines[1:]
-    try:
-        values = [[float(each) if each else float("nan") for each in line] for line in lines]
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}; expected times in seconds, a line for each frame") from None
-    if len(values) != frames or any(len(line) not in (1, cameras) for line in values):
-        widths = sorted({len(line) for line in values})
-        raise ValueError(
-            f"{path}: expected {frames} lines, one for each frame, of 1 or {cameras} numbers; got {len(values)} "
-            f"lines of {', '.join(map(str, widths)) or 'no'} numbers"
-        )
-    times = np.array([line * (cameras if len(line) == 1 else 1) for line in values]).reshape(frames, cameras)
-    of_frames = np.array([np.nanmean(row) if np.isfinite(row).any() else np.nan for row in times])
-    if not np.isfinite(of_frames).all() or (np.diff(of_frames) <= 0).any():
-        raise ValueError(f"{path}: the times of frames must be numbers of seconds that increase")
-    return times
+        with _noted():
+            rate = common_rate(open_videos(folders[:1]))
+            origin = f"of the videos in {folders[0]}"
+    return rate, origin if rate is not None else ""
 
 
 def _frames(given: str | None) -> tuple[int, int] | None:

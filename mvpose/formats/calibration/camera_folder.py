@@ -17,6 +17,7 @@ from mvpose.files.message_text import listed, shown
 from mvpose.formats.calibration.calibration_file import CalibrationFile
 from mvpose.formats.calibration.camera_entry import is_camera, read_camera
 from mvpose.formats.calibration.opencv import values_of, write_values
+from mvpose.formats.pose2sim_project import FILE, folder_names, project_tables
 
 SUFFIXES = (".json", ".yml", ".yaml", ".xml", ".toml")
 """Endings of calibration files."""
@@ -37,8 +38,8 @@ def only_file(folder: Path) -> Path | None:
         ValueError: no calibration, or several of all cameras.
     """
     files = _files(folder)
-    inside = folder / "calibration"
-    if inside.is_dir() and _files(inside):  # beside it a project of Pose2Sim has Config.toml
+    inside = _inside(folder)
+    if inside and _files(inside):
         return only_file(inside) or inside
     if not files:
         raise ValueError(f"{folder}: has no {', '.join(f'*{each}' for each in SUFFIXES)}; expected {_WHAT}")
@@ -50,8 +51,8 @@ def only_file(folder: Path) -> Path | None:
 
 def calibration_files(folder: Path) -> list[Path]:
     """Return the files that a reader of a folder may read, also those of the folder ``calibration`` within it."""
-    inside = folder / "calibration"
-    return _files(folder) + (_files(inside) if inside.is_dir() else [])
+    inside = _inside(folder)
+    return _files(folder) + (_files(inside) if inside else [])
 
 
 def read_folder(folder: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
@@ -99,8 +100,15 @@ def suffix_of(folder: Path) -> str:
 
 
 def _files(folder: Path) -> list[Path]:
-    found = (each for each in folder.iterdir() if each.suffix.lower() in SUFFIXES and not each.name.startswith("."))
-    return sorted(found, key=natural_order)
+    found = [each for each in folder.iterdir() if each.suffix.lower() in SUFFIXES and not each.name.startswith(".")]
+    settings = [folder / FILE] if folder / FILE in found and project_tables(folder) else []
+    return sorted((each for each in found if each not in settings), key=natural_order)
+
+
+def _inside(folder: Path) -> Path | None:
+    """Return the folder of a project of Pose2Sim in which the calibration lies; None without one."""
+    names = folder_names(folder, "calib_folder_name", ("calibration", "Calibration", "calib-2d"))
+    return next((folder / name for name in names if (folder / name).is_dir()), None)
 
 
 def _camera_values(file: Path) -> dict[str, Any]:

@@ -18,6 +18,7 @@ UNKNOWN_SIZE = (1, 1)
 
 _NORMALISED = 2.0  # pixels; keypoints in units of the picture's width lie in 0..1, up to a person who is cut off
 _BESIDE = 0.1  # of a picture: detectors place joints of people who are cut off this far beside it
+_MIDDLE = 0.15  # of a picture, from its middle to the principal point; of real cameras up to .05
 _UPRIGHT = 0.7  # length of the mean of the cameras' upward directions where they stand upright
 _AXES = ("x", "y", "z", "-x", "-y", "-z")
 
@@ -25,7 +26,7 @@ _AXES = ("x", "y", "z", "-x", "-y", "-z")
 def with_sizes(rig: Rig, extents: Floats, *, size: tuple[int, int] | None = None) -> tuple[Rig, str]:
     """Return the rig with the sizes of pictures that its file does not state.
 
-    A stated ``size`` holds for these cameras. Without one, the pictures are taken to be the smallest that hold all
+    A given ``size`` holds for these cameras. Without one, the pictures are taken to be the smallest that hold all
     keypoints and whose middle is the median principal point; all cameras get the same size.
 
     Args:
@@ -52,6 +53,32 @@ def with_sizes(rig: Rig, extents: Floats, *, size: tuple[int, int] | None = None
     return Rig.unchecked(
         [replace(each, size=size) if new else each for each, new in zip(rig, unknown, strict=True)]
     ), note
+
+
+def check_size(rig: Rig, size: tuple[int, int]) -> None:
+    """Check that a given size of the pictures can be theirs.
+
+    Args:
+        rig: cameras of the calibration, some of :data:`UNKNOWN_SIZE`.
+        size: width and height, pixels.
+
+    Raises:
+        ValueError: the calibration states another size, or principal points are far from the middle of such pictures.
+    """
+    given = f"--size {size[0]}x{size[1]}"
+    for camera in rig:
+        if camera.size not in (UNKNOWN_SIZE, size):
+            raise ValueError(
+                f"{given}: the calibration states {camera.size[0]}x{camera.size[1]} for the pictures of camera "
+                f"{camera.name!r}, which is used: leave --size out, or correct the calibration"
+            )
+    x, y = np.median([camera.K[:2, 2] for camera in rig], axis=0)
+    if (np.abs(np.array([x, y]) / size - 0.5) > _MIDDLE).any():
+        raise ValueError(
+            f"{given}: the principal points are at {x:.0f}, {y:.0f}, far from the middle of such pictures: those of "
+            f"the calibration have about {2 * x:.0f} x {2 * y:.0f} pixels; if they are cut out of larger ones, state "
+            "their size in the calibration"
+        )
 
 
 def check_principal_points(rig: Rig) -> None:

@@ -112,7 +112,7 @@ def read_recording(
         cameras: names of the V cameras, in the order of the rig.
         paths: see :func:`mvpose.formats.detections.sources.find_sources`.
         skeleton: joints of the files; None: those that fit (:mod:`.skeleton_choice`).
-        origin: where the skeleton is stated, for messages; "": by the option.
+        origin: where the skeleton is stated if not by the user, for messages; it is used if it has as many joints.
         all_joints: keep the joints beyond COCO-17, on a skeleton of :mod:`mvpose.wholebody`.
         frames: first and last frame to take, by the numbers in the files; None: all.
         progress: called with the number of cameras that were read since the last call.
@@ -124,7 +124,7 @@ def read_recording(
     assignment = assign(cameras, find_sources(paths))
     views = []
     for source in assignment.sources:
-        views.append(read_view(source, skeleton=skeleton))
+        views.append(read_view(source, skeleton=None if origin else skeleton))
         progress(1)
     choice = choose_skeletons(_all_pictures(views), declared=skeleton, origin=origin)
     views = [_converted(view, choice, all_joints=all_joints) for view in views]
@@ -138,13 +138,15 @@ def read_recording(
             chosen |= dict.fromkeys(kept - chosen.keys(), PicturePeople.nobody())
         pictures.append(chosen)
     empty = [camera for camera, each in zip(cameras, pictures, strict=True) if not any(map(len, each.values()))]
-    if empty:
-        others = [camera for camera in cameras if camera not in empty]
-        which = f"of the camera {listed(empty)}" if others else "of any camera"
+    others = [camera for camera in cameras if camera not in empty]
+    if empty and others:
         mend = f", or leave it out: --cameras {','.join(others)}" if len(others) > 1 else ""
-        raise ValueError(f"nobody is detected in any frame {which}; check the files of detections{mend}")
+        raise ValueError(
+            f"nobody is detected in any frame of the camera {listed(empty)}; check the files of detections{mend}"
+        )
+    notes = choice.notes if others else (*choice.notes, "nobody is detected in any frame of any camera")
     kinds = tuple(view.kind for view in views)
-    return RecordedFrames(numbers, tuple(pictures), assignment, kinds, joints, choice.notes)
+    return RecordedFrames(numbers, tuple(pictures), assignment, kinds, joints, notes)
 
 
 def read_frames(
@@ -339,6 +341,10 @@ def _joints(cameras: Sequence[str], views: Sequence[ViewPeople]) -> Skeleton:
 
 def _frame_numbers(cameras: Sequence[str], views: Sequence[ViewPeople], frames: tuple[int, int] | None) -> Integers:
     """Return the numbers of the frames of a recording, (T,), increasing."""
+    some = [k for k, view in enumerate(views) if view.pictures]
+    if not some:  # lists of results without any
+        return np.arange(frames[0], min(frames[1], frames[0] + MOST_FRAMES) + 1) if frames else np.zeros(0, np.int64)
+    cameras, views = [cameras[k] for k in some], [views[k] for k in some]
     spans = np.array([(min(view.pictures), max(view.pictures)) for view in views])
     whole = [k for k, view in enumerate(views) if view.complete]
     if frames is None and whole and len(np.unique(spans[whole], axis=0)) > 1:

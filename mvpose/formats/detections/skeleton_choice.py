@@ -15,6 +15,7 @@ from mvpose.arrays import Floats
 from mvpose.files.message_text import listed
 from mvpose.formats.detections.detection_file import PicturePeople, nameless_skeleton
 from mvpose.formats.joint_names import KNOWN, JointNames
+from mvpose.formats.pose2sim_project import CUSTOM
 
 _USUAL = ("coco17", "coco18", "body25", "halpe26", "wholebody133", "halpe136")  # taken where too few people are seen
 _BONES = (("shoulder", "elbow", 0.186), ("elbow", "wrist", 0.146), ("hip", "knee", 0.245), ("knee", "ankle", 0.246),
@@ -94,7 +95,7 @@ def choose_skeletons(
     Args:
         pictures: those of all cameras.
         declared: the skeleton, as a person or a file states it; None: the one that fits.
-        origin: where it is stated, for messages; "": by the option.
+        origin: where it is stated, for messages, if not by the option.
         option: option or key that states it.
 
     Raises:
@@ -114,11 +115,16 @@ def choose_skeletons(
             for each in KNOWN.values()
             if len(each) == count
         ]
-        if declared is not None and len(declared) == count:
-            own = deviation(keypoints[some], np.nan_to_num(scores[some]), declared)
-            chosen[count], note = declared, _checked(declared, own, fitted, origin or option, option)
+        stated = declared
+        if declared is not None and declared.name == CUSTOM and len(declared) < count:
+            stated = JointNames(CUSTOM, (*declared.joints, *nameless_skeleton(count).joints[len(declared) :]))
+        if stated is not None and len(stated) == count:
+            own = deviation(keypoints[some], np.nan_to_num(scores[some]), stated)
+            chosen[count], note = stated, _checked(stated, own, fitted, origin, option)
         else:
             chosen[count], note = _fitting(count, fitted, option)
+            if stated is not None:
+                notes.append(f"{origin or option}: not used, as the detections have {count} joints, not {len(stated)}")
         notes += [note] if note else []
     return SkeletonChoice(chosen, tuple(notes))
 
@@ -170,9 +176,9 @@ def _fitting(count: int, fitted: Fitted, option: str) -> tuple[JointNames, str]:
 def _checked(declared: JointNames, own: float, fitted: Fitted, origin: str, option: str) -> str:
     """Return what the user should know about a declared skeleton."""
     if not own > _UNFIT:
-        return ""
+        return f"skeleton {declared.name}: {origin}" if origin else ""
     better = [each for each in fitted if each[1] < min(FITS, own - _APART) and each[0].joints != declared.joints]
-    off = f"{origin}: {declared.name} does not fit: bones of people deviate from those of bodies by {100 * own:.0f} %"
+    off = f"{origin or option}: {declared.name} does not fit: bones deviate from those of bodies by {100 * own:.0f} %"
     if better:
         best = min(better, key=lambda each: each[1])
         raise ValueError(f"{off}, with {_percent([best])}: give {option} {best[0].name}, or correct the file")

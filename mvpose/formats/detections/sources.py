@@ -5,16 +5,23 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mvpose.files.input_files import natural_order
+from mvpose.files.input_files import MIB, natural_order
 from mvpose.files.message_text import listed, one_line
 from mvpose.formats.detections.detection_file import DetectionFile
 from mvpose.formats.detections.detection_formats import FORMATS, suffixes
+from mvpose.formats.pose2sim_project import folder_names
 
-_INSIDE = ("pose-sync", "pose", "predictions")  # folders of Pose2Sim's and MMPose's layouts that hold the detections
+_INSIDE = (
+    "pose-sync",
+    "pose",
+    "pose-2d",
+    "predictions",
+)  # folders of Pose2Sim's and MMPose's layouts that hold the detections
 _AFFIXES = re.compile(r"^(alphapose-results_|results_)|(_json|_keypoints|_predictions|_results|_detections)$")
+_SETTINGS = MIB  # bytes
 _KINDS = "OpenPose folders, COCO or AlphaPose results, MMPose predictions or RTMLib arrays (*.json, *.npz)"
 
 
@@ -25,10 +32,12 @@ class Source:
     Attributes:
         name: what the folder or file is called, without the usual affixes: "cam1" of ``cam1_json``.
         path: the folder of files for one picture each, or the file.
+        recognised: whether a file is of a known format, and not one of settings beside them.
     """
 
     name: str
     path: Path
+    recognised: bool = True
 
 
 def find_sources(paths: Sequence[Path]) -> list[Source]:
@@ -64,9 +73,12 @@ def _below(path: Path) -> list[Source]:
         return [_source(path)]
     files = _files(path)
     if files:
-        return [_source(path)] if _is_of_one_picture(files[0]) else [_source(each) for each in files]
+        first = next(filter(_is_detections, files), files[0])
+        if _is_of_one_picture(first):
+            return [_source(path)]
+        return [replace(_source(each), recognised=_is_detections(each)) for each in files]
     folders = sorted((each for each in path.iterdir() if each.is_dir()), key=natural_order)
-    for inside in _INSIDE:
+    for inside in folder_names(path, "pose_folder_name", _INSIDE):
         if path / inside in folders:
             return _below(path / inside)
     found = [_source(each) for each in folders if _files(each)]
@@ -86,6 +98,17 @@ def _is_of_one_picture(path: Path) -> bool:
     """Return whether a file holds the people of one picture, so that its folder holds those of one camera."""
     file = DetectionFile(path)
     return any(path.suffix.lower() in each.suffixes and each.of_picture(file) for each in FORMATS.values())
+
+
+def _is_detections(path: Path) -> bool:
+    """Return whether a file may hold detections: files of settings beside them are small, and of no known format."""
+    file = DetectionFile(path)
+    try:
+        return path.stat().st_size > _SETTINGS or any(
+            path.suffix.lower() in each.suffixes and each.recognises(file) for each in FORMATS.values()
+        )
+    except (OSError, ValueError):
+        return True  # its reader says what is wrong
 
 
 def _source(path: Path) -> Source:
@@ -153,12 +176,14 @@ def assign(
             f"no {what} for the camera {lacking}: the {what} are called {names}; add them, rename them as the "
             f"cameras of the calibration, or select cameras: {option} {','.join(exact)}"
         )
+    others = tuple(source for source in sources if not source.recognised)
+    sources = [source for source in sources if source.recognised]
     if len(sources) != len(cameras):
         raise ValueError(
             f"the calibration has {len(cameras)} cameras, {listed(cameras)}, but there are {what} of "
             f"{len(sources)}, {names}; name folders or files as the cameras, or select cameras: {option} NAME,NAME"
         )
-    return Assignment(tuple(sources), by_name=False)
+    return Assignment(tuple(sources), by_name=False, unused=others)
 
 
 def _plain(name: str) -> str:

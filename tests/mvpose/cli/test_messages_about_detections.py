@@ -55,11 +55,6 @@ def test_a_camera_in_which_nobody_is_detected(lab):
     refused(lab, "openpose", "nobody is detected in any frame of the camera cam2", "--cameras cam0,cam1,cam3")
 
 
-def test_nobody_anywhere(lab):
-    people_of(lab / "openpose", [])
-    refused(lab, "openpose", "nobody is detected in any frame of any camera; check the files of detections")
-
-
 def test_cameras_of_different_lengths(lab):
     sorted((lab / "openpose" / "cam1").iterdir())[-1].unlink()
     refused(lab, "openpose", "different frames: cam0 0 to 3, cam1 0 to 2", "--frames 0:2")
