@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -17,6 +18,7 @@ from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
     from mvpose.formats.pictures import PictureSource
+    from mvpose.networks.session import Provider
 
 Videos = Annotated[
     list[Path],
@@ -31,20 +33,19 @@ class Networks:
     """Options about networks, as given."""
 
     detector: Annotated[
-        Path,
+        str,
         typer.Option(
-            metavar="FILE",
-            help="Detector of people (ONNX): YOLOX, RTMDet or YOLO; or RTMO and YOLO-pose, which need no --pose. None "
-            "is shipped: rtmlib and MMPose's model zoo have them, such as yolox_m_8xb8-300e_humanart and "
-            "rtmdet_m_person.",
+            metavar="NAME|FILE",
+            help="Detector of people, a name of [cyan]mvpose networks list[/] or an ONNX file: YOLOX, RTMDet or YOLO; or "
+            "MoveNet, RTMO and YOLO-pose, which need no --pose.",
         ),
-    ]
+    ] = "movenet"
     pose: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
-            metavar="FILE",
-            help="Pose head (ONNX): RTMPose or another SimCC head, or one of heat maps (HRNet, ViTPose), such as "
-            "rtmpose-m_body8-halpe26 of rtmlib.",
+            metavar="NAME|FILE",
+            help="Pose head, a name or an ONNX file: RTMPose or another SimCC head, or one of heat maps (HRNet, ViTPose), "
+            "such as rtmpose-m_body8-halpe26 of rtmlib.",
         ),
     ] = None
     detector_kind: Annotated[
@@ -54,10 +55,19 @@ class Networks:
         ),
     ] = None
     min_score: Annotated[
-        float, typer.Option(metavar="P", help="People with a lower score are left out.", min=0.0, max=1.0)
-    ] = 0.3
+        float | None,
+        typer.Option(
+            metavar="P",
+            help="People with a lower score are left out. [dim]\\[default: 0.3; of MoveNet 0.1][/]",
+            min=0.0,
+            max=1.0,
+        ),
+    ] = None
     provider: Annotated[str, typer.Option(metavar="NAME", help="Where the networks run: cpu, cuda or auto.")] = "auto"
-    threads: Annotated[int, typer.Option(metavar="N", help="Threads of the networks on the CPU.", min=1)] = 1
+    threads: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Pictures at once on the CPU. [dim]\\[default: one for each core][/]", min=1),
+    ] = None
 
 
 _LEFT = "detections that are complete are kept, and another run goes on from there"
@@ -132,27 +142,23 @@ def _check_folder(folder: Path) -> None:
 def _detect(sources: Sequence[PictureSource], out: Path, networks: Networks) -> None:
     """Write the detections of videos of one rate."""
     from mvpose.cli.camera_pictures import common_rate
-    from mvpose.cli.video_detection import detect_videos, networks_text
-    from mvpose.networks.detector import PersonDetector, open_head
+    from mvpose.cli.video_detection import detect_videos, networks_text, open_finder
+    from mvpose.networks.catalogue.store import path_of
+    from mvpose.networks.detector import open_head
 
     common_rate(sources)
-    detector, pose, least = networks.detector, networks.pose, networks.min_score
+    detector = path_of(networks.detector)
+    pose = None if networks.pose is None else path_of(networks.pose)
+    provider = cast("Provider", networks.provider)
     try:
-        finder = PersonDetector(
-            detector,
-            kind=networks.detector_kind,  # type: ignore[arg-type]
-            least=least,
-            provider=networks.provider,  # type: ignore[arg-type]
-            threads=networks.threads,
-        )
+        finder = open_finder(detector, kind=networks.detector_kind, least=networks.min_score, provider=provider)
         if not finder.one_stage and pose is None:
             raise ValueError(f"--detector {detector}: gives boxes alone; add --pose, such as an RTMPose network")
-        head = None
-        if pose is not None:
-            head = open_head(pose, provider=networks.provider, threads=networks.threads)  # type: ignore[arg-type]
+        head = None if pose is None else open_head(pose, provider=provider)
     except ModuleNotFoundError as error:
         raise ValueError(str(error)) from None
     if finder.one_stage and pose is not None:
         note(f"{detector.name} gives keypoints as well; those of {pose.name} are used")
-    text = networks_text(detector, pose, least=least, kind=finder.kind)
-    detect_videos(sources, out, finder, head, networks=text)
+    text = networks_text(detector, pose, least=finder.least, kind=finder.kind)
+    workers = networks.threads or len(os.sched_getaffinity(0))
+    detect_videos(sources, out, finder, head, networks=text, workers=workers)

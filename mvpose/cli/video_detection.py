@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -15,8 +15,17 @@ from mvpose.commands.progress import single_stage
 from mvpose.files.atomic_files import open_manifest, write_atomic
 from mvpose.files.input_files import parse_json, read_bytes
 from mvpose.formats.pictures import PictureSource
-from mvpose.networks.detector import PeopleInPicture, PersonDetector, detect_people
+from mvpose.networks.detector import (
+    Kind,
+    PeopleFinder,
+    PeopleInPicture,
+    PersonDetector,
+    PictureSession,
+    detect_people,
+)
+from mvpose.networks.movenet import MoveNet
 from mvpose.networks.pose import PoseHead
+from mvpose.networks.session import Provider
 
 DETECT = "mvpose detect"
 """What the manifest of a folder of detections says."""
@@ -26,7 +35,13 @@ _DECIMALS = 3  # thousandths of a pixel
 
 
 def detect_videos(
-    sources: Sequence[PictureSource], folder: Path, detector: PersonDetector, head: PoseHead | None, *, networks: str
+    sources: Sequence[PictureSource],
+    folder: Path,
+    detector: PeopleFinder,
+    head: PoseHead | None,
+    *,
+    networks: str,
+    workers: int = 1,
 ) -> list[Path]:
     """Write the detections of videos as MMPose does, ``NAME.json`` for each.
 
@@ -36,6 +51,7 @@ def detect_videos(
         detector: detector of people.
         head: pose head, or None.
         networks: what detects, for the check that earlier detections are of the same networks.
+        workers: number of pictures at once.
 
     Raises:
         ValueError: a damaged video.
@@ -57,7 +73,7 @@ def detect_videos(
             advance(len(frames))
             with partial.open("w", encoding="utf-8") as opened:
                 opened.writelines(f"{line}\n" for line in (head_line, *map(json.dumps, frames)))
-                for found in _failing(detect_people(source.pictures(len(frames)), detector, head)):
+                for found in _failing(detect_people(source.pictures(len(frames)), detector, head, workers=workers)):
                     frames.append({"frame_id": len(frames), "instances": _instances(found)})
                     opened.write(json.dumps(frames[-1]) + "\n")
                     opened.flush()
@@ -66,6 +82,27 @@ def detect_videos(
             write_atomic(state, head_line.encode())
             partial.unlink()
     return files
+
+
+def open_finder(
+    path: Path, *, kind: str | None = None, least: float | None = None, provider: Provider = "cpu"
+) -> PeopleFinder:
+    """Open a detector of people, of the kind that its card or its outputs show.
+
+    Args:
+        path: ONNX file.
+        kind: kind of the network; None: that of the file.
+        least: least score of a person; None: the default of the kind.
+        provider: as of :class:`mvpose.networks.Session`.
+
+    Raises:
+        ValueError: as of the detectors.
+    """
+    more = {} if least is None else {"least": least}
+    session = PictureSession(path, provider=provider)
+    if kind is None and session.card.name == MoveNet.kind:
+        return MoveNet(session, **more)
+    return PersonDetector(session, kind=cast("Kind | None", kind), **more)
 
 
 def networks_text(detector: Path, pose: Path | None, *, least: float, kind: str) -> str:

@@ -13,10 +13,12 @@ Class 0 is people, as in COCO.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,17 +64,40 @@ class PeopleInPicture:
     keypoints: Floats | None = None
     keypoint_scores: Floats | None = None
 
+    @classmethod
+    def joined(cls, parts: Sequence[PeopleInPicture]) -> PeopleInPicture:
+        """Return the people of several, who all have keypoints."""
+        columns = ("boxes", "scores", "keypoints", "keypoint_scores")
+        return cls(*(np.concatenate([getattr(each, column) for each in parts]) for column in columns))
+
     def select(self, rows: NDArray[np.int64]) -> PeopleInPicture:
         """Return some people, in a given order."""
         kept = [None if each is None else each[rows] for each in (self.keypoints, self.keypoint_scores)]
         return PeopleInPicture(self.boxes[rows], self.scores[rows], *kept)
 
 
+class PeopleFinder(Protocol):
+    """What finds the people of pictures.
+
+    Attributes:
+        kind: kind of the network.
+        one_stage: whether it gives keypoints as well.
+        least: least score of a person.
+    """
+
+    kind: str
+    one_stage: bool
+    least: float
+
+    def find(self, picture: Pixels) -> PeopleInPicture:
+        """Return the people in a picture, (h, w, 3) uint8, red green blue, the most confident first."""
+
+
 class PersonDetector:
     """Detector of people in an ONNX file.
 
     Args:
-        path: ONNX file.
+        model: ONNX file, or its session.
         kind: its kind; None: by its outputs and its name.
         least: least score of a person.
         overlap: intersection over union above which the weaker of two boxes is left out.
@@ -82,6 +107,7 @@ class PersonDetector:
     Attributes:
         kind: kind of the network.
         one_stage: whether it gives keypoints as well.
+        least: least score of a person.
 
     Raises:
         ValueError: as for :class:`mvpose.networks.Session`, or outputs of no known kind.
@@ -89,7 +115,7 @@ class PersonDetector:
 
     def __init__(
         self,
-        path: str | Path,
+        model: str | Path | PictureSession,
         *,
         kind: Kind | None = None,
         least: float = 0.3,
@@ -99,8 +125,8 @@ class PersonDetector:
     ) -> None:
         if kind is not None and kind not in get_args(Kind):
             raise ValueError(f"kind of a detector must be one of {', '.join(get_args(Kind))}, got {kind!r}")
-        self._session = _PictureSession(path, provider=provider, threads=threads)
-        self._least, self._overlap = least, overlap
+        self._session = as_picture_session(model, provider=provider, threads=threads)
+        self.least, self._overlap = least, overlap
         self.kind = kind or self._recognised()
         if self._session.card == Card():  # the file has none
             self._session.card = replace(CARDS[self.kind], size=self._session.size)
@@ -116,7 +142,7 @@ class PersonDetector:
         crop = crop_images([picture], np.zeros(1, np.int64), placement, size, fill=_FILL)
         found = self._decoded(self._session.outputs_of(crop))
         rows = np.argsort(-found.scores, kind="stable")
-        found = found.select(rows[found.scores[rows] >= self._least])
+        found = found.select(rows[found.scores[rows] >= self.least])
         found = found.select(suppressed(found.boxes, overlap=self._overlap))
         keypoints = None if found.keypoints is None else stride * found.keypoints
         return PeopleInPicture(stride * found.boxes, np.minimum(found.scores, 1.0), keypoints, found.keypoint_scores)
@@ -160,7 +186,7 @@ class PersonDetector:
         )
 
 
-class _PictureSession(Session):
+class PictureSession(Session):
     """Session of a network that takes whole pictures, one at a time, and finds a different number of people in each."""
 
     def outputs_of(self, crop: Pixels) -> list[NDArray[Any]]:
@@ -180,6 +206,11 @@ class _PictureSession(Session):
         usual = self.card.size or (_USUAL_SIZE, _USUAL_SIZE)
         sides = [each if isinstance(each, int) and each > 0 else usual[k] for k, each in enumerate((width, height))]
         return sides[0], sides[1]
+
+
+def as_picture_session(model: str | Path | PictureSession, *, provider: Provider, threads: int) -> PictureSession:
+    """Return a session unchanged, or open a file."""
+    return model if isinstance(model, PictureSession) else PictureSession(model, provider=provider, threads=threads)
 
 
 def decode_yolox(values: Floats, size: tuple[int, int]) -> PeopleInPicture:
@@ -231,7 +262,7 @@ def _blank(size: tuple[int, int]) -> Pixels:
 
 
 def detect_people(
-    pictures: Iterable[Pixels], detector: PersonDetector, head: PoseHead | None
+    pictures: Iterable[Pixels], detector: PeopleFinder, head: PoseHead | None, *, workers: int = 1
 ) -> Iterator[PeopleInPicture]:
     """Yield the people of every picture with their keypoints.
 
@@ -239,19 +270,45 @@ def detect_people(
         pictures: (h, w, 3) uint8, red green blue.
         detector: gives their boxes, and if it is one-stage their keypoints.
         head: pose head; None with a one-stage detector.
+        workers: number of pictures at once, each in a thread.
 
     Raises:
         ValueError: no head with a detector that gives boxes alone.
     """
     if head is None and not detector.one_stage:
         raise ValueError("a detector that gives boxes alone needs a pose head")
-    for picture in pictures:
+
+    def find(picture: Pixels) -> PeopleInPicture:
         found = detector.find(picture)
         if head is None or not len(found.scores):
-            yield found if found.keypoints is not None else _nobody(head)
-            continue
+            return found if found.keypoints is not None else _nobody(head)
         posed = head.detect([picture], np.zeros(len(found.boxes), np.int64), found.boxes, box_scores=found.scores)
-        yield replace(found, keypoints=posed.keypoints, keypoint_scores=posed.scores)
+        return replace(found, keypoints=posed.keypoints, keypoint_scores=posed.scores)
+
+    with ThreadPoolExecutor(workers) as pool:
+        waiting: deque[Future[PeopleInPicture]] = deque()
+        try:
+            for picture in _until_fault(pictures):
+                if isinstance(picture, Exception):  # of a damaged video: people in the pictures before it come first
+                    while waiting:
+                        yield waiting.popleft().result()
+                    raise picture
+                waiting.append(pool.submit(find, picture))
+                if len(waiting) > workers:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for each in waiting:
+                each.cancel()
+
+
+def _until_fault(pictures: Iterable[Pixels]) -> Iterator[Pixels | Exception]:
+    """Yield pictures, and last the error that ends them, if one does."""
+    try:
+        yield from pictures
+    except Exception as error:
+        yield error
 
 
 def open_head(path: str | Path, *, provider: Provider = "cpu", threads: int = 1) -> PoseHead:

@@ -23,13 +23,14 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from mvpose.files.message_text import one_line
-from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
+from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, qualisys, voxelpose
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
 from mvpose.formats.calibration.camera_folder import only_file, read_folder, suffix_of, write_folder
 
 FORMATS: list[CalibrationFormat] = [
     panoptic.FORMAT,
     voxelpose.FORMAT,
+    qualisys.FORMAT,
     easymocap.FORMAT,
     pose2sim.FORMAT,
     opencv.FORMAT,  # after EasyMocap and Pose2Sim, which write the same kinds of files: it takes the rest
