@@ -16,6 +16,8 @@ from mvpose.formats.pictures import ABOUT, ABOUT_SHARE, PictureSource, of_camera
 
 _SAME_SHAPE = 0.01  # relative difference of aspect ratios below which pictures are the calibrated ones, scaled
 
+_BLOCK = 16  # pixels, of the common video codecs
+
 
 def open_videos(paths: Sequence[Path]) -> list[PictureSource]:
     """Open all videos.
@@ -105,14 +107,21 @@ def _slack(count: int) -> float:
 def check_sizes(cameras: Sequence[Camera], pictures: Sequence[PictureSource]) -> None:
     """Check that pictures have the size for which their cameras are calibrated, where the calibration states it.
 
+    Videos are coded in blocks of 16 pixels, and programs differ in whether they count the pixels that fill the last
+    blocks: pictures that lack fewer at the right and the bottom pass, with a note.
+
     Raises:
         ValueError: another size.
     """
-    wrong = [
-        f"{camera.name} {_text(source.size)} instead of {_text(camera.size)}"
-        for camera, source in zip(cameras, pictures, strict=True)
-        if camera.size not in (UNKNOWN_SIZE, source.size)
-    ]
+    wrong = []
+    for camera, source in zip(cameras, pictures, strict=True):
+        if camera.size in (UNKNOWN_SIZE, source.size):
+            continue
+        text = f"{camera.name} {_text(source.size)} instead of {_text(camera.size)}"
+        if all(0 <= calibrated - has < _BLOCK for has, calibrated in zip(source.size, camera.size, strict=True)):
+            note(f"pictures of {text} pixels are taken as cut at the right and the bottom, as codecs do")
+        else:
+            wrong.append(text)
     if wrong:
         raise ValueError(
             f"pictures are not of the calibrated size: {listed(wrong)} pixels; convert them to that size, or scale the "

