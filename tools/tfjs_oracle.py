@@ -1,9 +1,9 @@
 """Compares converted networks with TensorFlow: ``python -m tools.tfjs_oracle PACKAGE.tgz [PICTURE...]``.
 
 Needs TensorFlow, which the project does not require: an environment of its own with ``tensorflow-cpu`` and
-``mvpose[networks,recordings]``. For each network of the catalogue it runs the original graph in TensorFlow, and prints the largest
-difference of each output; for MoveNet also that of the joints from those of the whole graph's six people, in shares of the
-input; and for the catalogue the mean and standard deviation of TensorFlow's outputs for the probe picture.
+``mvpose[networks,recordings]``. For each network of the catalogue it runs the original graph in TensorFlow, and prints
+the largest difference of each output; for MoveNet also that of the joints from those of the whole graph's six people,
+in shares of the input; and the mean and standard deviation of TensorFlow's outputs for the probe picture.
 """
 
 from __future__ import annotations

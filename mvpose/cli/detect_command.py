@@ -36,16 +36,16 @@ class Networks:
         str,
         typer.Option(
             metavar="NAME|FILE",
-            help="Detector of people, a name of [cyan]mvpose networks list[/] or an ONNX file: YOLOX, RTMDet or YOLO; or "
-            "MoveNet, RTMO and YOLO-pose, which need no --pose.",
+            help="Detector of people, a name of [cyan]mvpose networks list[/] or an ONNX file: YOLOX, RTMDet or YOLO; "
+            "or MoveNet, RTMO and YOLO-pose, which need no --pose.",
         ),
     ] = "movenet"
     pose: Annotated[
         str | None,
         typer.Option(
             metavar="NAME|FILE",
-            help="Pose head, a name or an ONNX file: RTMPose or another SimCC head, or one of heat maps (HRNet, ViTPose), "
-            "such as rtmpose-m_body8-halpe26 of rtmlib.",
+            help="Pose head, a name or an ONNX file: RTMPose or another SimCC head, or one of heat maps (HRNet, "
+            "ViTPose), such as rtmpose-m_body8-halpe26 of rtmlib.",
         ),
     ] = None
     detector_kind: Annotated[

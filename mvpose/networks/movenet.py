@@ -1,8 +1,8 @@
-"""People in pictures by MoveNet (Google, 2021): CenterNet's heads, decoded for any number of people and any picture size.
+"""People in pictures by MoveNet (Google, 2021): CenterNet's heads, decoded for any number of people and any size.
 
-The network gives on a grid of every fourth pixel where centres of people are, and of every joint where it is; at each centre
-the places of the person's joints and the size of its box; at each cell the offset of a joint from it. A joint of a person is
-where the heat map of the joint, weighted by the distance from the regressed place, is greatest.
+The network gives on a grid of every fourth pixel where centres of people are, and of every joint where it is; at each
+centre the places of the person's joints and the size of its box; at each cell the offset of a joint from it. A joint of
+a person is where the heat map of the joint, weighted by the distance from the regressed place, is greatest.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Floats
 from mvpose.networks.card import Card
 from mvpose.networks.crops import Pixels, Placement, crop_images
 from mvpose.networks.detector import PeopleInPicture, PictureSession, as_picture_session, suppressed
@@ -25,10 +24,10 @@ Values = NDArray[np.float32]
 SIZES = (320, 640)
 """Longer sides of the inputs in which people are found, pixels: people who are large in one are small in the other.
 
-The network finds people who are about 80 to 250 pixels tall. Measured on rendered scenes at 320 and 640 beside 512 alone,
-with the same detector of six cameras otherwise: PCP of ``full`` 96.2, 99.7, 94.6 for 95.8, 97.2, 92.4 (five people at
-close range, four around a shelf, a crowd of ten). Crops of the people for MoveNet Thunder made it worse (``fast`` 92.5 for
-95.0): a crop in a crowd shows several people.
+The network finds people who are about 80 to 250 pixels tall. On rendered scenes of five people at close range, of four
+around a shelf and of a crowd of ten, both sizes give ``full`` a PCP of 96.2, 99.7 and 94.6, and 512 alone 95.8, 97.2
+and 92.4. Reading the joints again in crops of the people, by MoveNet Thunder, made it worse (``fast`` 92.5 for 95.0 at
+close range): in a crowd, a crop shows several people.
 """
 
 _CELL = 4  # pixels of the input for each cell
@@ -36,7 +35,7 @@ _STEP = 32  # the network halves its input five times
 _MOST = 50  # people in an input
 _BLACK = (0, 0, 0)
 _REACH = 2  # cells around a centre in which no other is
-_SPREAD = 0.300048828125  # (0.3 in half precision) of the shorter side of the grid: squared width of the weights around the regressed places of joints
+_SPREAD = 0.300048828125  # of the shorter side of the grid: squared width of the weights; 0.3 in half precision
 _LEAST = 0.126953125  # score of a joint that counts towards the score of its person
 
 
@@ -62,7 +61,7 @@ class Heads:
 
 
 class MoveNet:
-    """Detector of people and their joints by MoveNet MultiPose in an ONNX file, as ``mvpose networks get movenet`` makes.
+    """Detector of people and their joints by MoveNet MultiPose, as ``mvpose networks get movenet`` stores it.
 
     Args:
         model: ONNX file, or its session.
@@ -134,7 +133,7 @@ def peaks(values: Values, *, most: int, least: float) -> NDArray[np.int64]:
 def decode(heads: Heads, *, most: int, least: float) -> PeopleInPicture:
     """Return the people in an input, as MultiPose's own graph does for six.
 
-    One difference: where two people share the cell of a joint, each has its own score of it, and not the higher of both.
+    One difference: where two people share the cell of a joint, each has its own score of it, not the higher of both.
 
     Args:
         heads: outputs of the network.

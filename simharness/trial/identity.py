@@ -57,8 +57,8 @@ BORROWED = ("formats/calibration", "formats/joint_names.py", "formats/people", "
 feet and hands and their estimates."""
 
 BESIDE_THE_METHOD = (
-    "cli", "commands", "files", "formats", "networks/catalogue", "networks/detector.py", "networks/movenet.py", "recording.py", "report",
-    "skeleton_fit", "wholebody",
+    "cli", "commands", "files", "formats", "networks/catalogue", "networks/detector.py", "networks/movenet.py",
+    "recording.py", "report", "skeleton_fit", "wholebody",
 )  # fmt: skip
 """Folders and modules of ``mvpose`` that make no estimates of bodies in trials: readers, writers, detection in videos,
 hands and faces, the command line, pages."""

@@ -92,7 +92,8 @@ MVPOSE = (  # run by tests/mvpose/cli
     "mvpose estimate CALIBRATION DETECTIONS --out results",
     "mvpose doctor CALIBRATION DETECTIONS",
     "mvpose repair CALIBRATION DETECTIONS --out NEW",
-    "mvpose detect VIDEO... --detector det.onnx --pose pose.onnx --out FOLDER",
+    "mvpose networks get movenet",
+    "mvpose run CALIBRATION VIDEO... --out results",
     "mvpose run CALIBRATION VIDEO... --detector det.onnx --pose pose.onnx --out results",
     "mvpose view results",
 )

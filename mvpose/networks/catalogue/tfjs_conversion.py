@@ -1,7 +1,7 @@
 """Graphs of TensorFlow.js to ONNX: convolutional networks up to their heads, with pictures as input.
 
-Tensors keep the layout of TensorFlow, (n, height, width, channels), and integers become 64 bits wide. Convolutions stand
-between two transpositions, which onnxruntime cancels against each other when it opens the file.
+Tensors keep the layout of TensorFlow, (n, height, width, channels), and integers become 64 bits wide. Convolutions
+stand between two transpositions, which onnxruntime cancels against each other when it opens the file.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Graph models of TensorFlow.js: a JSON file with the graph, and a file of weights (``tfjs`` format ``graph-model``)."""
+"""Graph models of TensorFlow.js: a JSON file with the graph, and a file of weights."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def _constants(entries: list[dict[str, Any]], content: bytes) -> dict[str, NDArr
 
 
 def _value(value: dict[str, Any]) -> Any:
-    """Return an attribute: ``{"i": "3"}``, ``{"list": {"i": ["1", "2"]}}``, ``{"s": BASE64}``, ``{"type": NAME}`` ..."""
+    """Return an attribute: ``{"i": "3"}``, ``{"list": {"i": ["1", "2"]}}``, ``{"s": BASE64}``, ``{"type": NAME}``."""
     (kind, given), *_ = value.items()
     if kind == "list":
         ((inner, many),) = given.items() or [("i", [])]

@@ -38,7 +38,9 @@ def windows(values, size, stride, padding):
         counts.append(count)
     padded = np.pad(values, [(0, 0), *pads, (0, 0)])
     rows, columns = (stride * np.arange(count) for count in counts)
-    return np.stack([[padded[:, r : r + size, c : c + size] for c in columns] for r in rows]).transpose(2, 0, 1, 3, 4, 5)
+    return np.stack([[padded[:, r : r + size, c : c + size] for c in columns] for r in rows]).transpose(
+        2, 0, 1, 3, 4, 5
+    )
 
 
 CONVOLUTION = {"data_format": "NHWC", "dilations": [1, 1, 1, 1]}
