@@ -226,6 +226,12 @@ class Diagnosis(Sealed):
         """Findings that are alarms, worst first."""
         return tuple(each for each in self.findings if each.severity == "alarm")
 
+    @property
+    def open_questions(self) -> tuple[Finding, ...]:
+        """Unknown findings that leave open whether the cameras are right, those about the whole rig first."""
+        unknown = [each for each in self.findings if each.severity == "unknown" and each.kind in _ABOUT_CAMERAS]
+        return tuple(sorted(unknown, key=lambda each: each.camera is not None))
+
     def to_json(self) -> dict[str, Any]:
         """Return the diagnosis as values that ``json.dumps`` writes."""
         return {

@@ -11,10 +11,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.calibration.adjustment import Adjustment, adjust, importance_by_place, shared_effect, shared_joints
 from mvpose.calibration.calibration_prior import Prior
+from mvpose.calibration.mends import Mend
 from mvpose.calibration.normal_equations import (
     CENTER,
     CLOCK,
@@ -30,7 +32,7 @@ from mvpose.calibration.rig_size import resized, size_of_people
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
 from mvpose.calibration.tracklet_matching import PeopleGroups, RigUncertainty, match_tracklets
 from mvpose.calibration.tracklets import Tracklets, chosen_frames, link
-from mvpose.camera import Rig
+from mvpose.camera import Camera, Rig
 from mvpose.detections import Detections
 
 Freedom = Literal["extrinsics", "focal", "center"]
@@ -175,6 +177,28 @@ def repair(
         return _refused(rig, reason)
     result = _result(rig, sightings, adjusted, held)
     return result if size == "calibration" else _of_size(size, result, sightings, adjusted)
+
+
+def mended(rig: Rig, frames: Sequence[Detections], options: Sequence[str], *, period: float = 0.04) -> Repair:
+    """Return the repair by options of ``mvpose repair`` (:attr:`mvpose.calibration.Diagnosis.repair`).
+
+    Raises:
+        ValueError: a mend that is not possible, or cameras that make no rig after it.
+    """
+    pairs = list(zip(options[::2], options[1::2], strict=True))
+    cameras: Sequence[Camera] = list(rig)
+    for name, value in pairs:
+        if name == "--mend":
+            cameras = Mend.parsed(value).applied(cameras)
+    free = [each for name, value in pairs if name == "--free" for each in value.split(",")]
+    better = Rig(cameras)
+    if free:
+        result = repair(better, frames, period=period, free=[each for each in get_args(Freedom) if each in free])
+    else:
+        result = replace(_refused(better, ""), refused=None, held=())
+    turns = [after.R.T @ before.R for before, after in zip(rig, result.rig, strict=True)]
+    corrections = np.column_stack([Rotation.from_matrix(turns).as_rotvec(), result.rig.centers - rig.centers])
+    return replace(result, corrections=corrections)
 
 
 def _alternate(

@@ -117,10 +117,11 @@ def _write_page(
         inputs = replace(inputs, rig=turned_up(inputs.rig, up))
     repaired = None
     if diagnosis.verdict == "faults":  # the page draws them before and after
-        from mvpose.calibration import repair
+        from mvpose.calibration.repair import mended
 
         with failing("the repair"):
-            repaired = repair(inputs.rig, inputs.frames, period=inputs.period)
+            options = diagnosis.repair or ("--free", "extrinsics")
+            repaired = mended(inputs.rig, inputs.frames, options, period=inputs.period)
     with atomic_folder(folder, _DOCTOR) as partial, failing("the page"):
         write_doctor_page(
             partial,

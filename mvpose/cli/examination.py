@@ -56,7 +56,4 @@ def examined_frames(frames: Sequence[Detections], *, period: float) -> tuple[np.
 
 def _verdict(diagnosis: Diagnosis) -> str:
     """Return the verdict as one line."""
-    if diagnosis.alarms:
-        return f"{sentence(diagnosis)} `mvpose doctor` says what mends it"
-    unknown = next((each for each in diagnosis.findings if each.severity == "unknown"), None)
-    return unknown.text if unknown is not None else sentence(diagnosis)
+    return sentence(diagnosis) + (" `mvpose doctor` says what mends it" if diagnosis.alarms else "")

@@ -13,7 +13,7 @@ import numpy as np
 from markupsafe import Markup
 
 from mvpose.arrays import Floats
-from mvpose.calibration.findings import Diagnosis, Finding, camera_names
+from mvpose.calibration.findings import ALARM, Diagnosis, Finding, camera_names
 from mvpose.calibration.repair import Repair
 from mvpose.calibration.sightings import Sightings, gather
 from mvpose.camera import Rig
@@ -181,7 +181,14 @@ def _cameras(case: DoctorCase) -> list[dict[str, Any]]:
     after = None if case.after is None else case.residuals(case.after)
     rows = []
     for view, name in enumerate(case.names):
-        row: dict[str, Any] = {"name": name, "before": _pixels(before[view]), "accused": view in case.accused}
+        usual = math.nan if case.diagnosis.usual is None else float(case.diagnosis.usual[view])
+        row: dict[str, Any] = {
+            "name": name,
+            "before": _pixels(before[view]),
+            "large": before[view] >= ALARM["times_usual"] * usual,
+            "usual": _pixels(usual),
+            "accused": view in case.accused,
+        }
         if after is not None and case.repair is not None:
             correction, covariance = case.repair.corrections[view], case.repair.covariance[view]
             row["turned"] = _with_spread(correction[:3], covariance[:3, :3], 180.0 / math.pi, "°", 2)

@@ -9,7 +9,7 @@ from mvpose.calibration.findings import KINDS, Diagnosis, Finding
 
 _SENTENCES = {
     "fine": "Nothing is wrong with the cameras.",
-    "cannot tell": "This recording does not determine whether the cameras are right.",
+    "cannot tell": "This recording does not determine whether the cameras are right",
 }
 _UNITS = {
     "degrees": "°", "metres": "m", "ms": "ms", "s": "s", "px": "px", "pixels": "px", "percent": "%", "hz": "Hz",
@@ -37,8 +37,11 @@ class Quantity:
 
 
 def sentence(diagnosis: Diagnosis) -> str:
-    """Return the verdict as one sentence."""
+    """Return the verdict as one sentence, with the worst finding where it is not fine."""
     alarms = diagnosis.alarms
+    if not alarms and diagnosis.verdict == "cannot tell":
+        reason = diagnosis.open_questions[0].text.removeprefix("cannot tell: ").rstrip(".")
+        return f"{_SENTENCES[diagnosis.verdict]}: {reason}."
     if not alarms:
         return _SENTENCES[diagnosis.verdict]
     more = len(alarms) - 1

@@ -67,7 +67,9 @@ def verdicts(result):
 class TestCommand:
     def test_a_short_recording_tells_nothing(self, lab):
         (line,) = verdicts(estimate(lab))
-        assert line.startswith("note: calibration, by 4 of 4 frames: cannot tell: ")
+        assert line.startswith(
+            "note: calibration, by 4 of 4 frames: This recording does not determine whether the cameras are right: "
+        )
         page, numbers = (lab / "out" / f"recording.{kind}" for kind in ("html", "json"))
         assert "cannot tell" in page.read_text(encoding="utf-8")
         assert json.loads(numbers.read_text())["doctor"]["verdict"] == "cannot tell"
