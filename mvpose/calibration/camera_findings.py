@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from mvpose.calibration.cameras import CameraFault, CameraFit
-from mvpose.calibration.findings import Finding, judged
+from mvpose.calibration.findings import Finding, is_excluded, judged
 from mvpose.calibration.mends import Mend
 from mvpose.camera import Camera, Rig
 
@@ -20,6 +20,7 @@ off by 30 to 50 mm); it does not shrink with the length of a recording."""
 _LENSES = ("distortion-ignored", "distortion-model")
 _REPAIR = ("--free", "extrinsics")
 _DRAWS = 4000
+_NINE_TENTHS = 1.282  # standard deviations of a Gaussian below which nine tenths are
 
 
 def findings_of_cameras(
@@ -44,7 +45,7 @@ def findings_of_cameras(
     faulty = {each.fault.view for each in fit.faults}
     for view in range(len(rig)):
         if view not in faulty:
-            findings += _note(fit, view, names, depth)
+            findings += _remark(fit, view, names, depth, not undetermined)
     return findings
 
 
@@ -190,21 +191,38 @@ def _turn(change: Floats, name: str) -> str:
     return str(Mend("turn", ",".join(f"{angle:.3f}" for angle in np.degrees(change[:3])), (name,)))
 
 
-def _note(fit: CameraFit, view: int, names: Sequence[str], depth: Floats) -> list[Finding]:
-    """Return a finding if the correction of a camera that no fault explains is significant."""
-    change, covariance = fit.change[view], fit.covariance[view]
-    deviation = np.abs(change[:6]) / np.sqrt(np.diagonal(covariance)[:6])
-    if deviation.max() < 3.0:
-        return []
-    size, interval = _pose_size(change, _draws(change, covariance))
-    if size["degrees"] < 0.1 and size["metres"] < 0.01:
-        return []
-    severity = judged(size, {key: low for key, (low, _) in interval.items()}, determined=False)
-    text = f"the estimated correction of {names[view]} is {size['degrees']:.2f} degrees and "
-    text += f"{100 * size['metres']:.1f} cm, "
-    text += "as small as for good calibrations" if severity == "note" else "larger than for good calibrations"
+def possible_errors(fit: CameraFit, view: int) -> dict[str, float]:
+    """Return turn (degrees) and shift (metres) of a camera that nine tenths of the probability allow at most."""
+    pose, covariance = fit.freed(view)
+    high = {}
+    for name, part, unit in (("degrees", slice(0, 3), 180.0 / np.pi), ("metres", slice(3, 6), 1.0)):
+        length = max(float(np.linalg.norm(pose[part])), 1e-9)
+        along = pose[part] / length
+        high[name] = unit * (length + _NINE_TENTHS * float(np.sqrt(along @ covariance[part, part] @ along)))
+    return high
+
+
+def _remark(fit: CameraFit, view: int, names: Sequence[str], depth: Floats, determined: bool) -> list[Finding]:
+    """Return a finding of a camera that no fault explains, if its correction is significant or might be large."""
+    pose, covariance = fit.freed(view)
+    total = np.zeros(len(_SYSTEMATIC))
+    total[:6] = pose
+    full = np.diag(np.full(len(total), 1e-18))
+    full[:6, :6] = covariance
+    size, interval = _pose_size(total, _draws(total, full))
     cost = (np.radians(size["degrees"]) * depth[view] + size["metres"]) / len(names)
-    return [Finding("moved-camera", text, severity, 0.5, names[view], view, size, interval, cost, repair=_REPAIR)]
+    high = possible_errors(fit, view)
+    if determined and not is_excluded(high):
+        text = f"{names[view]} may be off by {high['degrees']:.1f} degrees and {100 * high['metres']:.0f} cm: its "
+        text += f"estimated correction is {size['degrees']:.2f} degrees and {100 * size['metres']:.1f} cm, more than "
+        text += "those of good calibrations, and too uncertain for an alarm"
+        return [Finding("moved-camera", text, "unknown", 0.5, names[view], view, size, interval, cost, repair=_REPAIR)]
+    change, sigma = fit.change[view, :6], np.sqrt(np.diagonal(fit.covariance[view])[:6])
+    if (np.abs(change) / sigma).max() < 3.0 or (size["degrees"] < 0.1 and size["metres"] < 0.01) or not determined:
+        return []
+    text = f"the estimated correction of {names[view]} is {size['degrees']:.2f} degrees and "
+    text += f"{100 * size['metres']:.1f} cm, as small as for good calibrations"
+    return [Finding("moved-camera", text, "note", 0.5, names[view], view, size, interval, cost, repair=_REPAIR)]
 
 
 def _pose_size(change: Floats, draws: Floats) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:

@@ -95,6 +95,19 @@ class CameraFit:
     equations: NormalEquations
     quadratic: Quadratic
 
+    def freed(self, view: int) -> tuple[Floats, Floats]:
+        """Return correction (6,) and covariance (6, 6) of the pose of a camera whose calibration is not believed.
+
+        The other cameras have the faults that were found, or those of a good calibration.
+        """
+        widest = max((each for each in MODELS if len(each.index) == 6), key=lambda each: each.sigma)
+        others = [each.fault for each in self.faults if each.fault.view != view]
+        free = FaultHypothesis(widest, view, ALWAYS, np.ones(len(self.quadratic.H)))
+        mean, covariance = self.quadratic.posterior([*others, free])
+        pose = np.zeros((6, len(mean)))
+        pose[:, PARAMETERS * view : PARAMETERS * view + 6] = pose[:, -6:] = np.eye(6)
+        return pose @ mean, pose @ covariance @ pose.T
+
 
 def fit(cameras: Floats, sightings: JointViews) -> CameraFit:
     """Find the faults of cameras.

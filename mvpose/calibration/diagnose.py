@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mvpose.arrays import Floats, Integers
-from mvpose.calibration.camera_findings import findings_of_cameras, turn_finding
+from mvpose.calibration.camera_findings import findings_of_cameras, possible_errors, turn_finding
 from mvpose.calibration.cameras import CameraFit, fit
 from mvpose.calibration.clocks import estimate_clocks
 from mvpose.calibration.consistency import Consistency, Reading
@@ -115,6 +115,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
         findings += [each for each in clocks.findings() if each.view not in useless]
     if undetermined:
         findings = [replace(each, severity="unknown") if _doubtful(each, different) else each for each in findings]
+    high = [] if undetermined else [possible_errors(result, view) for view in range(len(rig)) if view not in useless]
     residuals, usual = residuals_of_others(mended.packed, joints, scale=result.equations.scale)
     findings += _large_residuals(residuals, usual, findings, names)
     return Diagnosis.of_findings(
@@ -123,6 +124,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
         cameras=names,
         residuals=residuals,
         usual=usual,
+        within={name: max(each[name] for each in high) for name in (high[0] if high else ())},
     )
 
 

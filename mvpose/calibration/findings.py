@@ -65,6 +65,11 @@ ALARM: Mapping[str, float] = MappingProxyType(
 outermost tenth of the people, clock, and residual over the usual one. Errors of good rigs are smaller: the corrections
 that are estimated for careful, published calibrations are 0.05 to 0.28 degrees and 1 to 2.5 cm (Shelf)."""
 
+EXCLUDED: Mapping[str, float] = MappingProxyType({"degrees": 0.5, "metres": 0.12})
+"""Sizes of which "fine" says that no camera has them: the estimate without trust in the calibration, with what nine
+tenths of its probability allow, is below. Shifts are less certain than turns: detectors place joints differently from
+different sides, which imitates shifts of 5 cm (Shelf's published cameras), and of distant cameras 9 cm."""
+
 _CLEAR = 2.0  # times the size of an alarm, in a recording that does not determine smaller ones
 _SURE = 0.95
 
@@ -96,6 +101,11 @@ def judged(
         return "note"
     clear = any(low.get(name, 0.0) >= _CLEAR * limit for name, limit in limits.items())
     return "alarm" if determined or (clear and probability >= _SURE) else "unknown"
+
+
+def is_excluded(high: Mapping[str, float]) -> bool:
+    """Whether what nine tenths of the probability allow for a camera, by name, is within what "fine" promises."""
+    return all(value < EXCLUDED[name] for name, value in high.items())
 
 
 @dataclass(frozen=True)
@@ -176,6 +186,8 @@ class Diagnosis(Sealed):
         residuals: median distance of each camera's keypoints from the people that the other cameras see, (V,), pixels;
             NaN where a camera shares nobody with the others.
         usual: what these distances are where the calibration is right and detectors err as usual, (V,), pixels.
+        within: turn (``"degrees"``) and shift (``"metres"``) that nine tenths of the probability allow for any
+            camera at most; empty where the recording does not determine it.
         repair: options of ``mvpose repair`` that mend all alarms for which there are any, in the order in which they
             must be applied.
 
@@ -190,6 +202,7 @@ class Diagnosis(Sealed):
     residuals: Floats
     usual: Floats | None = None
     repair: tuple[str, ...] = ()
+    within: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for key in ("findings", "evidence", "cameras"):
@@ -207,6 +220,7 @@ class Diagnosis(Sealed):
         cameras: Sequence[str],
         residuals: Floats,
         usual: Floats | None = None,
+        within: Mapping[str, float] = MappingProxyType({}),
     ) -> Diagnosis:
         """Return the diagnosis of findings, with the verdict that follows from them.
 
@@ -219,7 +233,7 @@ class Diagnosis(Sealed):
         elif any(each.severity == "unknown" and each.kind in _ABOUT_CAMERAS for each in ordered):
             verdict = "cannot tell"
         repair = joined_options([each.repair for each in findings if each.severity == "alarm"])
-        return cls(tuple(ordered), verdict, tuple(evidence), tuple(cameras), residuals, usual, repair)
+        return cls(tuple(ordered), verdict, tuple(evidence), tuple(cameras), residuals, usual, repair, within)
 
     @property
     def alarms(self) -> tuple[Finding, ...]:
@@ -239,6 +253,7 @@ class Diagnosis(Sealed):
             "findings": [each.to_json() for each in self.findings],
             "evidence": list(self.evidence),
             "repair": list(self.repair),
+            "within": {name: _number(value) for name, value in self.within.items()},
             "residuals_px": {
                 name: _number(value) for name, value in zip(self.cameras, self.residuals.tolist(), strict=True)
             },

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mvpose.arrays import Floats, Integers
-from mvpose.calibration.camera_models import MODELS, FaultHypothesis
 from mvpose.calibration.cameras import CameraFit
 from mvpose.calibration.consistency import Consistency, Reading
 from mvpose.calibration.findings import Finding
@@ -100,7 +99,7 @@ def unknowns(
         return [_cannot(f"people stood still (they moved by {moved:.1f} m in all)", RECORD)]
     findings = []
     for view in used:
-        turn, shift = _uncertainty(fit, view, views)
+        turn, shift = _uncertainty(fit, view)
         if turn > _TURN or shift > _SHIFT:
             findings.append(
                 _cannot(
@@ -116,12 +115,9 @@ def unknowns(
     return findings
 
 
-def _uncertainty(fit: CameraFit, view: int, views: int) -> tuple[float, float]:
+def _uncertainty(fit: CameraFit, view: int) -> tuple[float, float]:
     """Return the standard deviations of turn (rad) and shift (m) of a camera of which nothing is believed."""
-    widest = max((each for each in MODELS if each.kind == "moved-camera"), key=lambda each: each.sigma)
-    blocks = len(fit.quadratic.H)
-    _, covariance = fit.quadratic.posterior([FaultHypothesis(widest, view, "always", np.ones(blocks))])
-    pose = covariance[-6:, -6:]
+    _, pose = fit.freed(view)
     return float(np.sqrt(np.trace(pose[:3, :3]) / 3)), float(np.sqrt(np.trace(pose[3:, 3:]) / 3))
 
 

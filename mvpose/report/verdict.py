@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from mvpose.calibration.findings import KINDS, Diagnosis, Finding
 
 _SENTENCES = {
-    "fine": "Nothing is wrong with the cameras.",
+    "fine": "Nothing is wrong with the cameras",
     "cannot tell": "This recording does not determine whether the cameras are right",
 }
 _UNITS = {
@@ -43,7 +43,9 @@ def sentence(diagnosis: Diagnosis) -> str:
         reason = diagnosis.open_questions[0].text.removeprefix("cannot tell: ").rstrip(".")
         return f"{_SENTENCES[diagnosis.verdict]}: {reason}."
     if not alarms:
-        return _SENTENCES[diagnosis.verdict]
+        within = diagnosis.within
+        size = f"{within['degrees']:.1f} degrees or {100 * within['metres']:.0f} cm" if within else ""
+        return f"{_SENTENCES['fine']}{f': none is off by more than {size}' if within else ''}."
     more = len(alarms) - 1
     others = "" if not more else f" There {'are' if more > 1 else 'is'} {more} more fault{'s' if more > 1 else ''}."
     return f"{sentence_of(alarms[0])}{others}"
