@@ -233,7 +233,7 @@ class Diagnosis(Sealed):
         elif any(each.severity == "unknown" and each.kind in _ABOUT_CAMERAS for each in ordered):
             verdict = "cannot tell"
         repair = joined_options([each.repair for each in findings if each.severity == "alarm"])
-        return cls(tuple(ordered), verdict, tuple(evidence), tuple(cameras), residuals, usual, repair, within)
+        return cls(tuple(ordered), verdict, tuple(evidence), tuple(cameras), residuals, usual, repair, dict(within))
 
     @property
     def alarms(self) -> tuple[Finding, ...]:
