@@ -23,8 +23,6 @@ A scenario file as an assertion, for test suites::
 Studies have a module of their own: :mod:`simharness.study.study_run`.
 """
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Mapping, Sequence

@@ -16,8 +16,8 @@ from packaging.metadata import Metadata
 from packaging.requirements import Requirement
 
 from simharness.capture.rendering import gl
+from simharness.capture.rendering.raster import make_renderer
 from simharness.capture.rendering.renderer import Unavailable
-from simharness.capture.rendering.renderer_names import make_renderer
 
 ROOT = Path(__file__).parents[1]
 SIMHARNESS, MVPOSE = (tomllib.loads((ROOT / each).read_text()) for each in ("pyproject.toml", "mvpose/pyproject.toml"))

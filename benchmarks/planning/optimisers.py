@@ -20,10 +20,9 @@ from benchmarks.method.report import table
 from benchmarks.planning.rooms import draw_room
 from mvpose.arrays import Floats
 from simharness.planning.candidates import Candidate, candidates_in, far_enough
-from simharness.planning.limits import Limits
 from simharness.planning.planned_room import Room
 from simharness.planning.rig_value import RigValue
-from simharness.planning.search import CandidateSet, exchange_search, refine
+from simharness.planning.search import CandidateSet, Limits, exchange_search, refine
 from simharness.planning.value_fit import fit_value
 
 FIRST_SEED = 2000  # no room of the benchmark of plans
@@ -65,7 +64,7 @@ def _exchange(
     room: Room, value: RigValue, candidates: Sequence[Candidate], count: int, starts: int, seed: int
 ) -> float:
     terms = [value.terms(each) for each in candidates]
-    sets = exchange_search(value, terms, Limits.of(room, candidates, count), starts=starts, seed=seed)
+    sets = exchange_search(value, terms, Limits.of_room(room, candidates, count), starts=starts, seed=seed)
     chosen, found = sets[0]
     start = CandidateSet(tuple(candidates[k] for k in chosen), found)
     return refine(value, room, start, seed=seed, key="benchmark").value

@@ -19,8 +19,8 @@ from benchmarks.planning.rooms import draw_room
 from simharness.planning.candidates import Candidate
 from simharness.planning.plan_rig import PlanEffort, plan_rig
 from simharness.planning.rig_comparison import corner_rig, rig_of, ring_rig, simulate_rigs
-from simharness.planning.scene_results import interval_of
 from simharness.planning.search import Ledger
+from simharness.planning.simulated_scenes import interval_of
 
 RIGS = ("plan", "corners", "ring", "peer")
 FIRST_SEED = 1000

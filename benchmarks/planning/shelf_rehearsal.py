@@ -19,8 +19,7 @@ from mvpose.commands.progress import reporter
 from simharness.planning import Volume
 from simharness.planning.rehearsal_scene import ACTIVITIES, SceneSettings
 from simharness.planning.rehearsal_setup import RehearsalSetup
-from simharness.planning.scene_results import Condition, interval_of
-from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
+from simharness.planning.simulated_scenes import Condition, SceneBatch, interval_of, simulate_scenes
 from simharness.reality.recording_file import read_recording
 from simharness.reality.validation.subsets import FILLED, camera_subsets
 from simharness.scenario.presets import read_profile

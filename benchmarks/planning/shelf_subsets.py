@@ -167,7 +167,7 @@ def predicted_pcp(
         seed: seed of all draws.
         repeats: number of people at each place.
     """
-    layer = FastLayer.of(
+    layer = FastLayer.in_volume(
         Volume.around(people.joints),
         detector=read_profile(detector),
         orientations=repeats,

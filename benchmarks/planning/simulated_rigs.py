@@ -122,7 +122,7 @@ def simulated(scenario: Scenario) -> Outcome:
 def predicted(scenario: Scenario, *, spacing: float = 0.5, draws: int = 1) -> Prediction:
     """Return the prediction of the fast layer for ``full``."""
     side = 2 * scenario.people.area
-    layer = FastLayer.of(
+    layer = FastLayer.in_volume(
         Volume.box(side, side),
         detector=scenario.detector,
         people=scenario.people.count,

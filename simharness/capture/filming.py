@@ -5,13 +5,11 @@ independent of each other, so several processes can film parts, which :meth:`~si
 joins.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Collection, Iterator
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -24,12 +22,10 @@ from simharness.capture.picture import ScenePictures, meshes_at, stack_bands
 from simharness.capture.rendering.renderer import Image, Renderer
 from simharness.capture.shutter import band_cameras, band_times, joints_at_exposure
 from simharness.types.views import LookalikeViews, Views, Visibility
+from simharness.world.rigs.exposure_schedule import ExposureSchedule
 from simharness.world.rigs.projection import project_to_image
 from simharness.world.scene.lookalikes import Lookalikes
-
-if TYPE_CHECKING:
-    from simharness.world.rigs.exposure_schedule import ExposureSchedule
-    from simharness.world.scene.playback import Playback, PlaybackState
+from simharness.world.scene.playback import Playback, PlaybackState
 
 PREVIEW = 320  # width of the reduced pictures, pixels
 

@@ -14,8 +14,6 @@ distance between surface and joint separates "skin around the joint" from "somet
 - A surface behind the joint means that the joint projects just outside the outline of its body: it is visible.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -10,11 +10,9 @@ along each axis, the only one with the sum 1, the mean ``shift`` and the varianc
 done in loops along rows without branches, on slices of equal length, so that the compiler vectorises them.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -23,10 +21,8 @@ from scipy.special import ndtri
 
 from mvpose.camera import Camera
 from mvpose.kernels import njit
+from simharness.scenario.sections.cameras_section import SensorSection
 from simharness.types.srgb import linear_table, rounded
-
-if TYPE_CHECKING:
-    from simharness.scenario.sections.cameras_section import SensorSection
 
 Rgb = NDArray[np.uint8]
 

@@ -7,9 +7,7 @@ the other geoms MuJoCo tests only rays that meet a box around one of them: most 
 Rays start at a camera and end at their target; of the surfaces between, the first one counts.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -20,11 +18,8 @@ from mvpose.camera import Camera
 from mvpose.kernels import njit
 from simharness.capture.rendering.renderer import NEAR
 from simharness.world.humans.mujoco_model import SKIN_GROUP
-
-if TYPE_CHECKING:
-    from simharness.world.scene.build import Scene
-    from simharness.world.scene.playback import PlaybackState
-
+from simharness.world.scene.build import Scene
+from simharness.world.scene.playback import PlaybackState
 
 _OBJECT_GROUPS = np.array([group != SKIN_GROUP for group in range(6)], np.uint8)  # geom groups tested by MuJoCo
 _ROUNDING = 1e-5  # metres: boxes around objects are larger by this than those of MuJoCo, which rounds meshes

@@ -9,7 +9,6 @@ from __future__ import annotations
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,10 +23,7 @@ from simharness.capture.shutter import joints_at_exposure
 from simharness.types.views import Visibility
 from simharness.world.rigs.projection import bend, is_imaged, projection_matrix
 from simharness.world.scene.lookalikes import Lookalikes
-
-if TYPE_CHECKING:
-    from simharness.world.scene.playback import Playback, PlaybackState
-
+from simharness.world.scene.playback import Playback, PlaybackState
 
 # Share of a box that the person fills: median over simulated people who walk and wave (10th to 90th percentile: 0.33 to
 # 0.60).

@@ -4,8 +4,6 @@ The geometry of the picture does not change, so its ground truth stays valid. Ea
 noise is drawn for every picture.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache

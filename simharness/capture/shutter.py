@@ -4,8 +4,6 @@ The readout is divided into bands of rows, each rendered at its time; between th
 linearly.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

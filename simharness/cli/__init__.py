@@ -4,15 +4,10 @@ Exit codes: 0 success, 1 regression found, 2 bad input (one message on stderr), 
 traceback), 130 interrupted. Commands import heavy modules only when they run.
 """
 
-from __future__ import annotations
-
 from simharness.cli import (
     blame_command,
     check_command,
     evaluate_command,
-    export_command,
-    fit_detector_command,
-    plan_command,
     rehearse_command,
     report_command,
     run_command,
@@ -26,17 +21,14 @@ __all__ = ["app", "main"]
 
 app = PROGRAM.app()
 run_command.add_to(app)
-export_command.add_to(app)
 scenarios_command.add_to(app)
 check_command.add_to(app)
 blame_command.add_to(app)
 report_command.add_to(app)
 study_command.add_to(app)
 app.add_typer(evaluate_command.app, name="evaluate")
-fit_detector_command.add_to(app)
 validate_command.add_to(app)
 rehearse_command.add_to(app)
-plan_command.add_to(app)
 
 
 def main() -> None:

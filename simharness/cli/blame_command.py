@@ -8,8 +8,7 @@ import typer
 from rich.console import Console
 
 from mvpose.commands.output_files import check_place, write_json
-from simharness.cli.options import JsonFile, Overrides, ScenarioFile, Seed
-from simharness.cli.program import PROGRAM
+from simharness.cli.program import PROGRAM, JsonFile, Overrides, ScenarioFile, Seed, Workers
 
 if TYPE_CHECKING:
     from simharness.study.causes.cause_shares import Blame
@@ -41,10 +40,7 @@ def blame(
             help="Only this cause: [cyan]swaps[/], [cyan]noise[/]. Repeatable. [dim]\\[default: all][/]",
         ),
     ] = None,
-    workers: Annotated[
-        int,
-        typer.Option(metavar="N", min=1, max=1024, help="Processes that share the seeds; the results stay the same."),
-    ] = 1,
+    workers: Workers = 1,
     json_file: JsonFile = None,
 ) -> None:
     """Find what cost a scenario its score, and what to mend first.

@@ -11,13 +11,12 @@ from rich.console import Console
 
 from mvpose.commands.errors import failing
 from mvpose.commands.programs import BAD_INPUT, FOUND
-from simharness.cli.program import PROGRAM
+from simharness.cli.program import PROGRAM, Workers
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from simharness.gate.compare import Verdict
-    from simharness.gate.gate_result import FailedCase, GateResult
+    from simharness.gate.compare import FailedCase, GateResult, Verdict
     from simharness.scenario.load import Study
 
 _LISTED = 8  # changes of each kind: a bug that breaks everything breaks a hundred scores
@@ -63,7 +62,7 @@ def check(
     accept_better: Annotated[
         bool, typer.Option("--accept-better", help="Let improvements beyond their bounds pass in this run.")
     ] = False,
-    workers: Annotated[int, typer.Option(metavar="N", min=1, max=1024, help="Processes that share the trials.")] = 1,
+    workers: Workers = 1,
 ) -> None:
     r"""Gate for CI: run a suite, compare it with a baseline, and exit with code 1 where it got worse.
 
@@ -92,8 +91,8 @@ def check(
             _update(study, baseline, workers)
             return
         from mvpose.commands.progress import reporter
-        from simharness.gate.gate_check import baseline_of
-        from simharness.gate.gate_check import check as check_suite
+        from simharness.gate.suite import baseline_of
+        from simharness.gate.suite import check as check_suite
 
         before = baseline_of(study, baseline)
         with failing(), reporter() as bars:
@@ -125,7 +124,7 @@ def _update(study: Study, path: Path, workers: int) -> None:
     """Measure a suite and write its scores as the baseline."""
     from mvpose.commands.progress import reporter
     from simharness.gate.baseline import write_baseline
-    from simharness.gate.required_seeds import require_seeds
+    from simharness.gate.score_tests import require_seeds
     from simharness.gate.suite import run_suite
 
     require_seeds(study)

@@ -14,8 +14,7 @@ from typer.core import TyperGroup
 
 from mvpose.commands.errors import failing
 from mvpose.commands.output_files import PROVENANCE, check_place, write_json
-from simharness.cli.options import JsonFile, Overrides, RecordingFile, RecordingFolder, ScenarioFile
-from simharness.cli.program import PROGRAM
+from simharness.cli.program import PROGRAM, JsonFile, Overrides, RecordingFile, RecordingFolder, ScenarioFile
 
 if TYPE_CHECKING:
     from mvpose.estimators import Estimator
@@ -92,7 +91,7 @@ def evaluate_recording(
         check_place(json_file, option="--json", mark=PROVENANCE)
         from mvpose.commands.progress import reporter
         from mvpose.presets import NEED_DESCRIPTORS, without_repair
-        from simharness.cli.evaluation_tables import print_evaluation
+        from simharness.cli.score_tables import print_evaluation
         from simharness.reality.evaluation import evaluate
         from simharness.reality.recording_file import read_recording
 
@@ -147,7 +146,7 @@ def evaluate_poses(
         from mvpose import COCO17
         from mvpose.formats.joint_names import KNOWN, to_skeleton
         from mvpose.formats.people import read_people
-        from simharness.cli.evaluation_tables import print_evaluation
+        from simharness.cli.score_tables import print_evaluation
         from simharness.reality.evaluation import evaluate_people
         from simharness.reality.recording_file import find_recording, read_keys, read_recording
 
@@ -175,16 +174,15 @@ def twin(
         start = perf_counter()
         check_place(json_file, option="--json", mark=PROVENANCE)
         from mvpose.commands.progress import reporter
-        from simharness.cli.evaluation_tables import print_twin_comparison
+        from simharness.cli.score_tables import print_twin_comparison
         from simharness.reality.detector_fit.fit import fit
         from simharness.reality.recording_file import read_recording
-        from simharness.reality.twin import TwinModel, simulate_twins
-        from simharness.reality.twin_comparison import compare
+        from simharness.reality.twin import TwinModel, compare, simulate_twins
 
         recorded = read_recording(recording, folder)
         with reporter() as bars:
             with bars.stage("fit", 1):
-                model = TwinModel.of(recorded, fit(recorded))
+                model = TwinModel.of_fit(recorded, fit(recorded))
             comparison = compare(recorded, simulate_twins(model, count=twins, reporter=bars), reporter=bars)
         if json_file is not None:
             _write(comparison.summary(), json_file, seeds=comparison.seeds, variants=comparison.real, start=start)
@@ -203,7 +201,7 @@ def evaluate_seeds(
         start = perf_counter()
         check_place(json_file, option="--json", mark=PROVENANCE)
         from mvpose.commands.progress import reporter
-        from simharness.cli.evaluation_tables import print_seed_evaluation
+        from simharness.cli.score_tables import print_seed_evaluation
         from simharness.reality.seed_evaluation import evaluate_seeds as evaluate_at_seeds
         from simharness.scenario.load import load
 

@@ -1,6 +1,9 @@
-"""The program ``simharness``."""
+"""The program ``simharness``, and the arguments and options that several of its commands share."""
 
-from __future__ import annotations
+from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from mvpose.commands.programs import Program
 
@@ -17,3 +20,55 @@ PROGRAM = Program(
     version=_version,
     tracebacks=True,
 )
+
+
+ScenarioFile = Annotated[
+    Path,
+    typer.Argument(
+        help="A scenario file (TOML), or the name of a shipped scenario: [cyan]quickstart[/].", metavar="SCENARIO"
+    ),
+]
+RecordingFile = Annotated[
+    Path,
+    typer.Argument(
+        help="A recording with truth: its description (TOML), a folder with recording.toml, or the name of a shipped "
+        "description: [cyan]shelf[/].",
+        metavar="RECORDING",
+    ),
+]
+RecordingFolder = Annotated[
+    Path | None,
+    typer.Argument(
+        help="Folder with the files of the recording. [dim]\\[default: that of the description][/]", metavar="FOLDER"
+    ),
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Change a key of the scenario: [cyan]people.count=6[/]. Repeatable."
+    ),
+]
+Seed = Annotated[
+    int | None, typer.Option(metavar="N", help="Seed of all random draws, instead of the scenario's: another scene.")
+]
+BlameSeeds = Annotated[
+    int,
+    typer.Option(
+        "--blame",
+        metavar="N",
+        min=0,
+        help="Also find what cost the score, at N seeds, as [cyan]simharness blame[/] does; 0: do not.",
+    ),
+]
+JsonFile = Annotated[
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write all results to this file as well.", dir_okay=False),
+]
+Workers = Annotated[
+    int,
+    typer.Option(metavar="N", min=1, max=1024, help="Processes that share the work; the results stay the same."),
+]
+AllWorkers = Annotated[
+    int | None,
+    typer.Option(metavar="N", min=1, help="Processes; the results stay the same. [dim]\\[default: all cores][/]"),
+]

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mvpose.commands.errors import failing
-from simharness.cli.options import BlameSeeds
-from simharness.cli.program import PROGRAM
+from simharness.cli.program import PROGRAM, BlameSeeds
 
 if TYPE_CHECKING:
     from simharness.outputs.study.worst_frames import WorstFrame

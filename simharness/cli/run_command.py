@@ -1,4 +1,4 @@
-"""``simharness run`` and ``render``: a single scenario."""
+"""``simharness run``, ``render`` and ``export``: one scenario as a report, as pictures or as a benchmark sequence."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from simharness.cli.options import BlameSeeds, Overrides, ScenarioFile, Seed
-from simharness.cli.program import PROGRAM
+from simharness.cli.program import PROGRAM, BlameSeeds, Overrides, ScenarioFile, Seed, Workers
 
 if TYPE_CHECKING:
     from simharness.cli.score_tables import ScoreTable
@@ -22,16 +21,14 @@ def add_to(app: typer.Typer) -> None:
     """Add the commands."""
     app.command()(run)
     app.command()(render)
+    app.command()(export)
 
 
 def run(
     scenario: ScenarioFile,
     overrides: Overrides = None,
     seed: Seed = None,
-    workers: Annotated[
-        int,
-        typer.Option(metavar="N", min=1, max=1024, help="Processes that share the frames; the results stay the same."),
-    ] = 1,
+    workers: Workers = 1,
     out: Annotated[
         Path,
         typer.Option(metavar="FOLDER", help="Folder in which the result folder NAME-HASH appears.", file_okay=False),
@@ -61,7 +58,7 @@ def run(
         table.print_to(console)
     if blame:
         from simharness.cli.blame_command import print_blame
-        from simharness.study.causes.blame_file import read_blame
+        from simharness.study.causes.blame_text import read_blame
 
         if found := read_blame(folder):
             print_blame(found, console)
@@ -117,7 +114,7 @@ def render(
 def _tables(summary: Mapping[str, Any]) -> list[ScoreTable]:
     """Return the headline scores of a run, and those of identities, and of feet and hands, where there are any."""
     from simharness.outputs.run.headline import COLUMNS, WHOLE_BODY_COLUMNS, has_whole_body
-    from simharness.outputs.run.tracked_people import IDENTITY_COLUMNS, has_identities
+    from simharness.outputs.run.identity_plots import IDENTITY_COLUMNS, has_identities
 
     variants: Mapping[str, Any] = summary["variants"]
     title = f"{summary['name']}: {summary['frames']} frames, seed {summary['seed']}"
@@ -136,3 +133,36 @@ def _table(title: str, columns: Sequence[Column], variants: Mapping[str, Any]) -
     headings = [f"{each.title}\n{each.unit}" if each.unit else each.title.replace(" ", "\n") for each in columns]
     rows = [(name, *(column.number(scores) for column in columns)) for name, scores in variants.items()]
     return ScoreTable(title, ("variant",), headings, rows)
+
+
+def export(
+    scenario: ScenarioFile,
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            help="Folder in which the sequence gets a folder with the name of the scenario.", metavar="FOLDER"
+        ),
+    ] = Path("results/exports"),
+    overrides: Overrides = None,
+    seed: Seed = None,
+    every: Annotated[int, typer.Option(metavar="N", help="Write every Nth frame only.")] = 1,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Write the pictures.")] = True,
+) -> None:
+    """Write a scenario as a benchmark in the layout of CMU Panoptic: pictures, truth, calibration, detections.
+
+    The detections are OpenPose files. The sequence appears in FOLDER/NAME when
+    it is complete, and replaces an earlier export; manifest.json describes it.
+    """
+    with PROGRAM.exit_on_error():
+        from mvpose.commands.progress import reporter
+        from simharness.scenario.load import load
+
+        loaded = load(scenario, overrides=overrides or (), seed=seed)
+        from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
+
+        plan = ExportPlan(folder / loaded.name, every=every, pictures=pictures)
+        with reporter() as bars:
+            made = export_sequence(loaded, plan, reporter=bars, command=PROGRAM.command_line())
+    files = [file for file in made.rglob("*") if file.is_file()]
+    megabytes = sum(file.stat().st_size for file in files) / 1e6
+    typer.echo(f"{len(files)} files, {megabytes:.1f} MB, in {made}")

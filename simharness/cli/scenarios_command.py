@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from simharness.cli.options import Overrides, ScenarioFile, Seed
-from simharness.cli.program import PROGRAM
+from simharness.cli.program import PROGRAM, Overrides, ScenarioFile, Seed
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -1,14 +1,28 @@
-"""Tables of scores in a terminal: a table that is wider than the terminal is divided, and nothing is cut."""
+"""Tables of scores in a terminal: of runs and studies, of evaluations, of a recording beside its twin.
+
+A table that is wider than the terminal is divided, and nothing is cut.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
+from rich.box import SIMPLE_HEAD, Box
+from rich.console import Console, Group, RenderableType
+from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
+
+from simharness.scoring.pcp import GROUPS
+from simharness.scoring.score_summary import STAGES
+from simharness.scoring.tracking.identity_figures import DISTANCE
+
+if TYPE_CHECKING:
+    from simharness.reality.evaluation import Evaluation, PublishedPcp
+    from simharness.reality.seed_evaluation import SeedEvaluation
+    from simharness.reality.twin import TwinComparison
 
 _UNLIMITED = 10_000  # columns of a terminal in which everything fits
 
@@ -64,3 +78,206 @@ class ScoreTable:
         for row in self.rows:
             table.add_row(*map(Text, (*row[:count], *row[count + start : count + end])))
         return table
+
+
+_ONLY_ANNOTATED = (
+    " Identities: IDR, people with the estimate of their identity within 0.5 m. There is no HOTA and no IDF1: they "
+    "would count estimates of people who are not annotated as false."
+)
+_PAPER_ACTORS = (0, 1, 2)  # of Campus and Shelf, by tables 1 and 2
+
+
+def print_evaluation(evaluation: Evaluation, console: Console) -> None:
+    """Print PCP by actor and part beside that of the paper, errors that PCP ignores, and the time per stage."""
+    summaries = evaluation.summary()["variants"]
+    headline = Text.assemble(
+        (evaluation.name, "bold"),
+        f"  {evaluation.frames} frames, {evaluation.annotated} of them annotated; head mapping ",
+        (evaluation.head, "bold"),
+    )
+    tracked = {name: [each["tracking"]] for name, each in summaries.items() if "tracking" in each}
+    tables = [_pcp_table(name, evaluation) for name in evaluation.variants]
+    numbers = ", ".join(str(actor + 1) for actor in evaluation.actors)
+    paper = "Paper: Dong et al. 2019, with their detections and the 2019 head." if _paper(evaluation) else ""
+    notes = Text(
+        f"PCP: part correct within 0.5 of its length; average of actors {numbers}; ignores ghosts. {paper}\n"
+        "One-to-one: pairs under 500 mm. An estimate of a person who is not annotated in a frame counts as a ghost. "
+        "Same view: detections that share an estimate with another detection of their view."
+        f"{_ONLY_ANNOTATED if tracked else ''}",
+        style="dim",
+    )
+    blocks: list[RenderableType] = [
+        headline,
+        *tables,
+        *([_variants_table(evaluation)] if len(tables) > 1 else []),
+        _people_table(summaries),
+        *([_identities_table(tracked)] if tracked else []),
+        *([_time_table(summaries)] if any(map(any, (each.timings for each in evaluation.variants.values()))) else []),
+        notes,
+    ]
+    console.print(Group(*(Padding(block, (0, 0, 1, 0)) for block in blocks)))
+
+
+def print_twin_comparison(comparison: TwinComparison, console: Console) -> None:
+    """Print the PCP of every variant in reality and in simulation side by side."""
+    from simharness.reality.twin import TOLERANCE
+
+    table = Table(
+        title=f"{comparison.name}: PCP in reality and in simulation, with 95 % intervals; median MPJPE",
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+    )
+    table.add_column("variant", no_wrap=True)
+    for column in ("real", "simulated", "change", "mm, real", "mm, sim."):
+        table.add_column(column, justify="right", no_wrap=True)
+    for name, real in comparison.real.items():
+        simulated = comparison.simulated[name]
+        errors = [comparison.summaries[which][name]["mpjpe_mm"]["median"] for which in ("real", "simulated")]
+        table.add_row(
+            name,
+            str(real),
+            str(simulated),
+            f"{simulated.pcp - real.pcp:+.1f}",
+            *("–" if error is None else f"{error:.1f}" for error in errors),
+        )
+    console.print(table)
+    order = "same" if comparison.same_order else "different"
+    console.print(
+        f"{len(comparison.seeds)} twins of {comparison.frames} frames. Largest "
+        f"difference {comparison.largest_difference:.1f} points (limit: {TOLERANCE:g}), {order} order.",
+        style="dim",
+        highlight=False,
+    )
+
+
+def print_seed_evaluation(result: SeedEvaluation, console: Console) -> None:
+    """Print PCP by variant, of all people and of each person, and the scores of identities of variants with any."""
+    first, *others = result.scenario.method.variants
+    people = range(result.scenario.people.count)
+    rows = []
+    for name in (first, *others):
+        difference = "" if name == first else result.difference(name, first)
+        scores = [result.pcp(name, [person]) for person in people]
+        rows.append((name, str(result.pcp(name)), str(difference), *(f"{each.pcp:.1f}" for each in scores)))
+    title = (
+        f"{result.scenario.name}: PCP over {len(result.seeds)} seeds with 95 % intervals: of all people, minus "
+        f"{first} on the same detections, and of each person"
+    )
+    ScoreTable(title, ("variant",), ("all", f"minus {first}", *map(str, people)), rows).print_to(console)
+    trackings = {name: [each.tracking for each in result.variant_scores(name)] for name in (first, *others)}
+    tracked = {name: known for name, each in trackings.items() if (known := [one for one in each if one is not None])}
+    if tracked:
+        console.print(_identities_table(tracked))
+        console.print(_ONLY_ANNOTATED.strip(), style="dim", highlight=False)
+
+
+def _paper(evaluation: Evaluation) -> Mapping[str, PublishedPcp]:
+    """Return the published scores by variant; of other recordings none."""
+    from simharness.reality.evaluation import ABLATION
+
+    return ABLATION.get(evaluation.name, {}) if evaluation.actors == _PAPER_ACTORS else {}
+
+
+def _pcp_table(name: str, evaluation: Evaluation) -> Table:
+    scores, actors = evaluation.variants[name], evaluation.actors
+    table = _table(f"PCP, {name}", "actor")
+    for group in GROUPS:
+        table.add_column(group.replace("_", " "), justify="right")
+    table.add_column("all", justify="right", style="bold")
+    published = _paper(evaluation).get(name)
+    if published:
+        table.add_column("paper", justify="right", style="cyan")
+    rows = scores.pcp_table(actors=actors)
+    summary = scores.summary(actors=actors)
+    rows.append({**summary["pcp_parts"], "all": summary["pcp"]})
+    labels = [*(str(actor + 1) for actor in actors), "average"]
+    for index, (label, row) in enumerate(zip(labels, rows, strict=True)):
+        last = index == len(rows) - 1
+        cells = [_number(value, 1) for value in row.values()]
+        cells += [_number(published[index], 1)] if published else []
+        table.add_row(label, *cells, style="bold" if last else "", end_section=index == len(rows) - 2)
+    return table
+
+
+def _variants_table(evaluation: Evaluation) -> Table:
+    """Return the PCP of all actors with a row for each variant, followed by the row of the paper if it has one."""
+    table = _table("PCP of the variants", "variant")
+    for actor in evaluation.actors:
+        table.add_column(f"actor {actor + 1}", justify="right")
+    table.add_column("average", justify="right", style="bold")
+    for name, scores in evaluation.summary()["variants"].items():
+        table.add_row(name, *(_number(value, 1) for value in (*scores["pcp_actors"], scores["pcp"])))
+        if published := _paper(evaluation).get(name):
+            table.add_row("  paper", *(_number(value, 1) for value in published), style="cyan not bold")
+    return table
+
+
+def _people_table(summaries: Mapping[str, Any]) -> Table:
+    table = _table("People, one-to-one: %, people per frame, and MPJPE in mm", "variant")
+    columns = ("precision", "recall", "ghosts", "missed", "mean", "median", "same view")
+    for column in columns:
+        table.add_column(column, justify="right")
+    for name, scores in summaries.items():
+        table.add_row(
+            name,
+            _number(scores["precision"], 1, scale=100),
+            _number(scores["recall"], 1, scale=100),
+            _number(scores["ghosts_per_frame"], 2),
+            _number(scores["missed_per_frame"], 2),
+            _number(scores["mpjpe_mm"]["mean"], 1),
+            _number(scores["mpjpe_mm"]["median"], 1),
+            _number(scores["same_view_violations"], 0),
+        )
+    return table
+
+
+def _identities_table(tracked: Mapping[str, Sequence[Mapping[str, Any]]]) -> Table:
+    """Return the scores of identities by variant, means over its recordings."""
+    table = _table("Identities of annotated people: PCP and IDR in %, MPJPE in mm", "variant")
+    for column in ("PCP", "IDR", "MPJPE", "switches", "a minute", "interrupted"):
+        table.add_column(column, justify="right")
+    for name, recordings in tracked.items():
+        at = [each["mean_joint"][f"{DISTANCE:g}"] for each in recordings]
+        counted = 0 if len(recordings) == 1 else 1  # decimals: means of counts are no whole numbers
+        table.add_row(
+            name,
+            _number(_mean(recordings, "pcp_tracked"), 1),
+            _number(_mean(at, "idr"), 1, scale=100),
+            _number(_mean(recordings, "mpjpe_tracked_mm"), 1),
+            _number(_mean(at, "id_switches"), counted),
+            _number(_mean(at, "switches_per_minute"), 2),
+            _number(_mean(at, "interruptions"), counted),
+        )
+    return table
+
+
+def _mean(figures: Sequence[Mapping[str, Any]], key: str) -> float | None:
+    """Return the mean of a figure over the recordings that have it."""
+    known = [each[key] for each in figures if each[key] is not None]
+    return sum(known) / len(known) if known else None
+
+
+def _time_table(summaries: Mapping[str, Any]) -> Table:
+    table = _table("Time per frame, ms: median (99th percentile)", "variant")
+    for stage in STAGES:
+        table.add_column(stage, justify="right", style="bold" if stage == "total" else "")
+    for name, scores in summaries.items():
+        times = (scores["timings_ms"][stage] for stage in STAGES)
+        table.add_row(name, *(f"{_number(time['median'], 2)} ({_number(time['p99'], 2)})" for time in times))
+    return table
+
+
+_RULES = Box("    \n    \n ── \n    \n ── \n ── \n    \n    \n")  # a rule under the header and between sections
+
+
+def _table(title: str, first: str) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold", box=_RULES, show_edge=False, pad_edge=False)
+    table.add_column(first, min_width=8, no_wrap=True)
+    return table
+
+
+def _number(value: float | None, digits: int, *, scale: float = 1.0) -> str:
+    return "–" if value is None else f"{scale * value:.{digits}f}"

@@ -16,14 +16,13 @@ from rich.text import Text
 from mvpose.commands.errors import failing
 from mvpose.commands.option_groups import grouped
 from mvpose.commands.programs import FAILED
-from simharness.cli.options import BlameSeeds, Overrides, ScenarioFile
-from simharness.cli.program import PROGRAM
+from simharness.cli.program import PROGRAM, BlameSeeds, Overrides, ScenarioFile, Workers
 
 if TYPE_CHECKING:
     import polars as pl
 
     from simharness.cli.score_tables import ScoreTable
-    from simharness.outputs.study.losses import Loss
+    from simharness.outputs.study.curves import Loss
     from simharness.study.study_folder import Results
 
 INTERRUPTED = 130
@@ -36,10 +35,7 @@ _IDENTITIES = ("hota", "idf1", "id_switches", "switches_per_minute")
 class Running:
     """How and where the trials of a study run, and where the results appear."""
 
-    workers: Annotated[
-        int,
-        typer.Option(metavar="N", min=1, max=1024, help="Processes that share the trials; the results stay the same."),
-    ] = 1
+    workers: Workers = 1
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: [cyan]tcp://host:8786[/].")
     ] = None
@@ -193,8 +189,7 @@ def _tables(results: Results) -> list[ScoreTable]:
 def _losses(results: Results, score: str) -> ScoreTable:
     """Return what every factor costs: the score at its best and worst value, and where five points are lost."""
     from simharness.cli.score_tables import ScoreTable
-    from simharness.outputs.study.curves import factors_by_case
-    from simharness.outputs.study.losses import LOST, losses
+    from simharness.outputs.study.curves import LOST, factors_by_case, losses
     from simharness.outputs.study.plots import short
     from simharness.runtime.number_text import fixed
     from simharness.scoring.catalogue import SCORES
@@ -220,7 +215,7 @@ def _losses(results: Results, score: str) -> ScoreTable:
 
 def _lost_at(loss: Loss, values: Sequence[Any]) -> str:
     """Return where points are lost, with its interval."""
-    from simharness.outputs.study.losses import short
+    from simharness.outputs.study.curves import short
 
     point = loss.point
     if point is None:
@@ -311,8 +306,8 @@ def blame_results(results: Results, *, seeds: int, workers: int = 1) -> None:
     """Find what cost a study its score, write it into its folder, and print it."""
     from mvpose.commands.progress import reporter
     from simharness.cli.blame_command import print_blame
-    from simharness.outputs.study.losses import blame_study
-    from simharness.study.causes.blame_file import write_blame
+    from simharness.outputs.study.curves import blame_study
+    from simharness.study.causes.blame_text import write_blame
 
     with reporter() as bars:
         found = blame_study(results, seeds=seeds, workers=workers, reporter=bars)

@@ -1,4 +1,4 @@
-"""``simharness validate``: what simulation predicts for a recording, beside what was recorded."""
+"""``simharness fit-detector`` and ``validate``: what simulation predicts for a recording, beside what was recorded."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from rich.console import Console
 from mvpose.commands.errors import failing
 from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
 from mvpose.commands.programs import FOUND
-from simharness.cli.options import JsonFile, RecordingFile, RecordingFolder
-from simharness.cli.program import PROGRAM
+from simharness.cli.program import PROGRAM, AllWorkers, JsonFile, RecordingFile, RecordingFolder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +25,8 @@ _TWINS, _QUICK_TWINS = 10, 4
 
 
 def add_to(app: typer.Typer) -> None:
-    """Add the command."""
+    """Add the commands."""
+    app.command("fit-detector")(fit_detector)
     app.command()(validate)
 
 
@@ -56,10 +56,7 @@ def validate(
         ),
     ] = None,
     json_file: JsonFile = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, help="Processes; the results stay the same. [dim]\\[default: all cores][/]"),
-    ] = None,
+    workers: AllWorkers = None,
 ) -> None:
     """Test whether simulation predicts a recording, and exit with code 1 where it does not.
 
@@ -80,8 +77,7 @@ def validate(
         place = out or Path("results/validation") / recorded.name
         _check(place)
         from simharness.outputs.validation.page import render_validation
-        from simharness.reality.validation.unseen_prediction import predict_halves, simulate_predictions
-        from simharness.reality.validation.validation import QUICK, ValidationPlan
+        from simharness.reality.validation.validation import QUICK, ValidationPlan, predict_halves, simulate_predictions
         from simharness.reality.validation.validation import validate as compare
         from simharness.reality.validation.validation_summary import summarize_halves, summarize_validation
         from simharness.trial.identity import provenance
@@ -143,3 +139,57 @@ def _print_verdicts(verdicts: Sequence[BoundVerdict], name: str, console: Consol
         held, _, _, real, simulated, _, bound = row.cells
         table.add_row(title, f"{held}/{row.count}", real, simulated, bound, f"[{styles[row.state]}]{row.state}[/]")
     console.print(table, highlight=False)
+
+
+def fit_detector(
+    recording: RecordingFile,
+    folder: RecordingFolder = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the profile (TOML) to this file.", dir_okay=False)
+    ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Plot the measured errors and those of a simulated twin (PNG).", dir_okay=False
+        ),
+    ] = None,
+    json_file: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Write all numbers to this file.", dir_okay=False),
+    ] = None,
+) -> None:
+    """Measure the errors of the detector of a recording, and write a detector profile with them."""
+    with PROGRAM.exit_on_error():
+        check_place(out, option="--out", mark=b"# Made by: simharness")
+        check_place(figure, option="--figure", mark=b"Matplotlib")
+        check_place(json_file, option="--json", mark=b'"annotation"')
+        from mvpose.commands.progress import reporter
+        from simharness.reality.detector_fit.fit import fit, write_profile
+        from simharness.reality.detector_fit.fit_table import (
+            plot_comparison,
+            print_agreement,
+            print_annotation,
+            print_measurement,
+        )
+        from simharness.reality.recording_file import read_recording
+        from simharness.reality.twin import TwinModel, simulate_twins
+
+        recorded = read_recording(recording, folder)
+        with reporter() as bars, bars.stage("fit", 1):
+            command = f"simharness fit-detector {recorded.name} FOLDER --out FILE"
+            fitted = fit(recorded, name=recorded.name if out is None else out.stem, command=command)
+        if out is not None:
+            write_profile(fitted, out)
+        console = Console()
+        print_measurement(fitted.real, console)
+        print_annotation(fitted.annotation, console)
+        summary = {"real": fitted.real.summary(), "annotation": fitted.annotation.summary()}
+        if figure is not None:
+            with failing(), reporter() as bars:
+                (twin,) = simulate_twins(TwinModel.of_fit(recorded, fitted), count=1, reporter=bars)
+                simulated = fit(twin).real
+            plot_comparison([fitted.real, simulated], figure)
+            print_agreement(fitted.real, simulated, console)
+            summary["simulated"] = simulated.summary()
+        if json_file is not None:
+            write_json(summary, json_file)

@@ -1,7 +1,5 @@
 """Systematic offset of a detector's joints from the anatomical ones, e.g. annotated hips above the hip joints."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -5,8 +5,6 @@ left. Each has separate streams, so raising one parameter changes no other draw.
 average, which is also the correlation time of the noise of boxes and of their scores.
 """
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from itertools import combinations
 
@@ -20,8 +18,7 @@ from mvpose.camera import Rig
 from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import LIMB_OF_JOINT, Key, KeyedDraws, logistic
 from simharness.detector.steps import Context, StepStage, step
-from simharness.detector.view_geometry import hidden_shares
-from simharness.detector.viewing_conditions import BOX_SHARE, overlaps
+from simharness.detector.viewing_conditions import BOX_SHARE, hidden_shares, overlaps
 from simharness.scenario.sections.detector_section import BoxesSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility

@@ -1,7 +1,5 @@
 """Delivery of pictures: late, repeated or lost pictures give the detections of the picture, not of the frame."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np

@@ -140,11 +140,11 @@ def _frames(
 
 def _with_outer(detections: Detections, keypoints: Floats, scores: Floats, skeleton: Skeleton) -> Detections:
     """Return detections on COCO17 with outer joints (m, E, 2), (m, E), on their common skeleton."""
-    return Detections(
-        detections.view,
-        whole_joints(detections.keypoints, keypoints, skeleton),
-        whole_joints(detections.scores[..., None], scores[..., None], skeleton)[..., 0],
-        detections.boxes,
-        detections.box_scores,
-        skeleton,
+    return replace(
+        detections,
+        keypoints=whole_joints(detections.keypoints, keypoints, skeleton),
+        scores=whole_joints(detections.scores[..., None], scores[..., None], skeleton)[..., 0],
+        skeleton=skeleton,
+        descriptors=None,
+        likelihoods=None,
     )

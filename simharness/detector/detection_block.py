@@ -1,7 +1,5 @@
 """Detections of a whole sequence as one block of arrays: every step of the detector takes one and returns one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum

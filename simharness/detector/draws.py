@@ -10,8 +10,6 @@ the shoulder; an ankle on the knee, the knee on the hip. In every set of detecti
 joint is reported whose parent is not. The joints of the face are found independently of each other.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -10,8 +10,6 @@ distribution with the measured mean has both (:func:`jitter_distance`): the leas
 bounds.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -7,8 +7,6 @@ p, its map has a peak of height p, and a peak of height 1 - p at the one other p
 have these two peaks here.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 Scores of real detectors behave so (Ronchi & Perona, ICCV 2017).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

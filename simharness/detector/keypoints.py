@@ -4,12 +4,10 @@ Every joint in the picture has at most one error: not reported (drop), guessed, 
 at its left-right counterpart (inversion), far off (miss), slightly off (jitter); otherwise it is good. Each error has a
 separate stream. They are drawn in that order, each among the joints that the errors before it left: raising one
 parameter takes more joints and changes no other joint. After drop, a joint may be guessed from the joints that are
-neither dropped nor guessed (:mod:`simharness.detector.guesses`); only guesses depend on which joints these are.
+neither dropped nor guessed (:mod:`simharness.detector.reported`); only guesses depend on which joints these are.
 
 Classes and distances: Ronchi & Perona, "Benchmarking and error diagnosis in multi-instance pose estimation", ICCV 2017.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
@@ -23,12 +21,18 @@ from simharness.detector.bias import pixel_offsets
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import ErrorDraws, KeyedDraws
 from simharness.detector.error_classes import MIRROR, PAIRED, jitter_distance
-from simharness.detector.guesses import guess_places, pixels_per_metre
-from simharness.detector.reported import ReportedJoints, last_pixels
+from simharness.detector.reported import ReportedJoints, guess_places, last_pixels, pixels_per_metre
 from simharness.detector.scatter import Scatter
 from simharness.detector.steps import Context, StepStage, step
-from simharness.detector.view_geometry import bearings, image_axes
-from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE, SELF_OCCLUDED, VISIBLE, Conditions
+from simharness.detector.viewing_conditions import (
+    OCCLUDED,
+    OUTSIDE,
+    SELF_OCCLUDED,
+    VISIBLE,
+    Conditions,
+    bearings,
+    image_axes,
+)
 from simharness.scenario.sections.detector_section import BiasSection, CorrelationSection, KeypointsSection
 from simharness.types.sequence import Sequence
 from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError

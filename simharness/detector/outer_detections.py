@@ -15,8 +15,6 @@ False positives have no outer joints. All draws are separate from those of the j
 the bit.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,8 +28,7 @@ from simharness.detector.bias import pixel_offsets
 from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.scatter import Scatter
 from simharness.detector.steps import Context
-from simharness.detector.view_geometry import image_axes
-from simharness.detector.viewing_conditions import BOX_SHARE, OUTSIDE, VISIBLE, occlusion_classes
+from simharness.detector.viewing_conditions import BOX_SHARE, OUTSIDE, VISIBLE, image_axes, occlusion_classes
 from simharness.scenario.sections.detector_section import BiasSection
 from simharness.types.outer_joints import OuterTruth
 from simharness.types.truth import KeypointError

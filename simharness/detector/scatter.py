@@ -3,8 +3,6 @@
 The parts are shares of one variance, so that the distribution of each keypoint does not depend on them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

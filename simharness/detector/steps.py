@@ -22,8 +22,6 @@ Rules for a step:
 - Keys of existing draws never change, not even to follow a renamed function: a new key is another detector.
 """
 
-from __future__ import annotations
-
 import difflib
 import importlib
 from collections.abc import Callable
@@ -44,7 +42,7 @@ MODULES = (
     "keypoint_scores",
     "boxes",
     "phantoms",
-    "decoy_hits",
+    "false_positives",
     "heatmaps",
     "delivery",
 )
@@ -90,7 +88,7 @@ class Context:
     @cached_property
     def conditions(self) -> Conditions:
         """Viewing conditions of everyone in the pictures."""
-        return Conditions.of(self.views)
+        return Conditions.of_views(self.views)
 
 
 StepFunction = Callable[[DetectionBlock, Context], DetectionBlock]

@@ -1,7 +1,5 @@
 """Scores of a suite, and its baseline file: a line for each trial and variant, sorted for readable diffs."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

@@ -1,31 +1,4 @@
-"""Comparison of two measurements of one suite, seed by seed.
-
-Every gated score of every variant, and its time, is compared over the whole suite and over each case alone. A single
-case shows changes that the mean over the suite dilutes, for example a step that became quadratic in the number of
-people. A change counts if it is larger than allowed *and* significant.
-
-*Allowed* is a loss of the score's tolerance, and a gain of its bound. A gain that is too large is no success until
-somebody has accepted it: the method may have become better, and then the baseline should know, or the suite easier. A
-score with a best value, such as coverage, may move away from it by its tolerance, and in either direction by its bound.
-A frame may take longer by a factor, which is smaller on the kind of processor that measured the baseline than on
-others; a faster method needs no acceptance, because it is no sign of an easier suite.
-
-*Significant* is a two-sided paired test over seeds with Holm's correction, where the whole suite and the single cases
-have half of the level each. The cases are conditions of the same scenes: a change that helps at a seed in one case
-tends to help at that seed in the other cases, so trials of one seed are not independent. The whole suite is therefore
-compared by seed: before and after are means over the cases that have the score in both measurements at that seed. Rates
-of rare events, missed people and ghosts, are compared by their counts.
-
-A test is made where the mean absolute difference exceeds what is allowed; no other change could count. A change of one
-case makes few tests, because unchanged trials have the difference zero. A loss beyond its tolerance that the number of
-seeds could not have shown to be significant is ``undecided``.
-
-Time is compared by the logarithm of the ratio of each trial's time after and before, both in units of the reference
-kernel. The middle half of a seed's ratios is used, because the machine may have been busy during a trial, and then the
-middle half of the seeds.
-"""
-
-from __future__ import annotations
+"""Comparison of two measurements of one suite, seed by seed, and the result of a gate check."""
 
 import math
 from dataclasses import dataclass
@@ -207,3 +180,94 @@ def _has_target(score: str) -> bool:
 
 def _ratio(value: float, limit: float) -> float:
     return value / limit if limit else math.copysign(math.inf, value) if value else 0.0
+
+
+@dataclass(frozen=True)
+class FailedCase:
+    """Case at a seed that could not be run.
+
+    Attributes:
+        case: name of the setting, :func:`simharness.gate.trial_command.setting_name`.
+        seed: seed.
+        error: message of the error.
+    """
+
+    case: str
+    seed: int
+    error: str
+
+
+@dataclass(frozen=True)
+class GateResult:
+    """Result of a gate check: comparison of a suite with its baseline.
+
+    Attributes:
+        suite: name of the suite.
+        variants: variants of the method.
+        gate: tolerances and level.
+        comparison: changes of all scores from the baseline.
+        failed: trials that could not be run.
+        trials: number of trials; a trial is a setting at a seed.
+        worst: trial to inspect first: one that could not be run, else the one with the largest loss, else the one with
+            the lowest PCP.
+        command: command line that runs this trial.
+        seconds: duration of the run.
+        accept_better: whether unexpected improvements fail nothing.
+    """
+
+    suite: str
+    variants: tuple[str, ...]
+    gate: GateSection
+    comparison: Comparison
+    failed: tuple[FailedCase, ...]
+    trials: int
+    worst: TrialKey
+    command: str
+    seconds: float
+    accept_better: bool = False
+
+    @property
+    def passed(self) -> bool:
+        """Whether no score got worse or, unless that is accepted, unexpectedly better, and every trial ran."""
+        return not (self.failed or self.comparison.with_verdict("worse") or self.refused)
+
+    @property
+    def refused(self) -> tuple[Change, ...]:
+        """Unexpected improvements that nobody has accepted."""
+        return () if self.accept_better else self.comparison.with_verdict("unexpected")
+
+    @property
+    def advice(self) -> str:
+        """What unexpected improvements mean and how to accept them; empty where there are none to accept."""
+        if not self.refused:
+            return ""
+        return (
+            "Unexpected improvements fail the check: either the method became better, or what it is tested with became "
+            "easier. If the change is meant to do that, accept them with --accept-better for this run, or write a new "
+            "baseline with --update-baseline."
+        )
+
+    @property
+    def verdict(self) -> str:
+        """Summary in a few words."""
+        worse, unexpected = (len(self.comparison.with_verdict(kind)) for kind in ("worse", "unexpected"))
+        improvements = f"{unexpected} unexpected improvement{'s' * (unexpected > 1)}" if unexpected else ""
+        parts = [
+            f"{worse} regression{'s' * (worse > 1)}" if worse else "",
+            "" if self.accept_better else improvements,
+            f"{len(self.failed)} of {self.trials} trials could not be run" if self.failed else "",
+        ]
+        verdict = ", ".join(filter(None, parts)) or "no regression"
+        if self.accept_better and improvements:
+            verdict += f", {improvements} accepted"
+        if undecided := self.comparison.undecided:
+            seeds = max(change.n for change in undecided)
+            losses = f"{len(undecided)} loss{'es' * (len(undecided) > 1)} beyond tolerance"
+            verdict += f", but {losses} that {seeds} seeds are too few to judge"
+        return verdict
+
+    @property
+    def worst_description(self) -> str:
+        """Description of the worst trial, which the command runs."""
+        why = "lost most" if self.comparison.with_verdict("worse") else "has the lowest PCP"
+        return f"the trial that {'could not be run' if self.failed else why}: {self.worst}"

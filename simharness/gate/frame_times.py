@@ -15,23 +15,17 @@ A variant with memory gets frames in order, because its time depends on the peop
 seconds, as the repair of a rig does, they are estimated once.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mvpose import Detections, Rig
 from mvpose.arrays import Floats
-from mvpose.estimators import SequenceEstimator
+from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.kernels import njit
+from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.trial.stages.estimation import EstimateFrames
-
-if TYPE_CHECKING:
-    from mvpose import Detections, Rig
-    from mvpose.estimators import Estimator
-    from simharness.trial.stages.detected_sequence import DetectedSequence
 
 REPETITIONS = 3
 """Estimates of a frame of which the quickest counts."""

@@ -4,16 +4,13 @@ The JUnit report has a test case for each case of the suite, the whole suite, an
 text in both and in the terminal.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterator
 from xml.etree import ElementTree
 
 from simharness.gate.baseline import TIME
-from simharness.gate.compare import Change, Verdict
-from simharness.gate.gate_result import GateResult
+from simharness.gate.compare import Change, GateResult, Verdict
 from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES
 

@@ -1,7 +1,5 @@
 """Test of the change of one score: of a mean, of the rate of rare events, of the time of a frame."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -13,10 +11,10 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from simharness.gate.baseline import FRAMES, TIME, Measurement
-from simharness.gate.required_seeds import least_two_sided_p
 from simharness.gate.trial_command import TrialKey
+from simharness.scenario.load import Study
 from simharness.scoring.catalogue import SCORES
-from simharness.statistics.paired_tests import paired, paired_counts
+from simharness.statistics.paired_tests import DRAWS, paired, paired_counts
 from simharness.statistics.resampling import block_weights, interval
 
 PER_FRAME = "per frame"
@@ -190,3 +188,40 @@ def _middle_ends(change: Floats) -> tuple[float, float]:
     drawn = np.stack([np.repeat(np.sort(change), row) for row in weights[:, np.argsort(change)]])
     low, high = interval(_middle(drawn).mean(axis=-1), blocks=len(change))
     return float(low), float(high)
+
+
+def least_two_sided_p(seeds: int) -> float:
+    """Return the least p-value of the two-sided test of a mean: of seeds that all change alike."""
+    return max(2.0 ** (1 - seeds), 1 / (1 + DRAWS))
+
+
+def least_corrected_p(seeds: int, *, cases: int) -> float:
+    """Return the least p-value of a comparison: of one score in which all seeds change alike, and of no other change.
+
+    The whole suite and the single cases share the level.
+    """
+    return (1 + (cases > 1)) * least_two_sided_p(seeds)
+
+
+def least_seeds(level: float, *, cases: int) -> int | None:
+    """Return the smallest number of seeds with which a single test can be significant; None if no number is enough."""
+    counts = range(1, DRAWS.bit_length() + 1)
+    return next((seeds for seeds in counts if least_corrected_p(seeds, cases=cases) <= level), None)
+
+
+def require_seeds(study: Study) -> None:
+    """Check that a suite has enough seeds to find a regression.
+
+    Raises:
+        ValueError: the seeds are so few, or the level so low, that no change could be significant.
+    """
+    level, seeds, cases = study.gate.level, len(study.seeds), len(study.settings)
+    p = least_corrected_p(seeds, cases=cases)
+    if p <= level:
+        return
+    least = least_seeds(level, cases=cases)
+    mend = "a higher level" if least is None else f"at least {least} seeds, or a higher level"
+    raise ValueError(
+        f"{study.path}: no regression can be found: {seeds} seed{'s' * (seeds > 1)} that all get worse have "
+        f"p = {p:.2g}, and gate.level is {level:g}; give it {mend}"
+    )

@@ -1,7 +1,5 @@
 """Names of the trials of a suite, and the command that runs one trial alone, with report and pictures."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """What people look at: pages of runs, studies, rehearsals and validations, with pictures and films; data on disk."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 TEMPLATES = Path(__file__).parent / "templates"

@@ -1,7 +1,5 @@
 """Section of a page on what cost the score: the sentence that decides, and a table with the shares as bars."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -10,8 +10,6 @@ several cameras adds up, and the inverse of the sum is the covariance of the joi
 Hartley & Zisserman, "Multiple View Geometry", section 5.2).
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Candidates: cameras that may hang in a room, by place, direction and lens, and their small changes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

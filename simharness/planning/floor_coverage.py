@@ -3,8 +3,6 @@
 Geometry without people, obstacles or a detector: what :class:`~simharness.planning.fast_layer.FastLayer` begins with.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose import Rig

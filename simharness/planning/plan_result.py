@@ -1,7 +1,5 @@
 """Plan: where the cameras of a room should hang, what that reaches, and how sure it is."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, field
@@ -43,7 +41,7 @@ class Figures:
         }
 
     @classmethod
-    def of(cls, prediction: Prediction, target: TargetKeys) -> Self:
+    def of_prediction(cls, prediction: Prediction, target: TargetKeys) -> Self:
         """Return the figures that the fast layer predicts; places where nobody can stand do not count."""
         figures = prediction.summary()
         within = (prediction.pcp >= target.pcp) & (prediction.error_mm <= target.error)

@@ -7,8 +7,6 @@
 4. Confirmation: the best of them are simulated on the same scenes, beside the rigs that people hang without a plan.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json
@@ -27,14 +25,13 @@ from mvpose.arrays import Floats
 from mvpose.commands.progress import Reporter, Silence
 from simharness.planning.candidates import Candidate, alike, around, candidates_in
 from simharness.planning.fast_layer import FastLayer, Prediction
-from simharness.planning.limits import Limits
 from simharness.planning.plan_result import Alternative, CurvePoint, Figures, PlannedCamera, RigPlan
 from simharness.planning.planned_room import Room
 from simharness.planning.rig_comparison import corner_rig, rig_of, ring_rig, simulate_rigs
 from simharness.planning.rig_value import RigValue
 from simharness.planning.room_file import read_room
-from simharness.planning.scene_results import interval_of
-from simharness.planning.search import CandidateSet, Ledger, exchange_search, refine
+from simharness.planning.search import CandidateSet, Ledger, Limits, exchange_search, refine
+from simharness.planning.simulated_scenes import interval_of
 from simharness.planning.value_fit import VARIANT, fit_value, layer_of
 from simharness.runtime.version import code_version
 
@@ -133,7 +130,7 @@ class _Work:
     ) -> None:
         self.room, self.count, self.effort, self.seed, self.reporter = room, count, effort, seed, reporter
         self.candidates = candidates_in(room, most=effort.candidates)
-        self.limits = Limits.of(room, self.candidates, count)
+        self.limits = Limits.of_room(room, self.candidates, count)
         path = None if folder is None else folder / "search.json"
         self.ledger = Ledger(path, _identity(room, seed, effort.candidates))
         self.seconds: dict[str, float] = {}
@@ -254,7 +251,7 @@ class _Work:
             name = f"curve {self.count} {self.effort.starts} {free}"
             if name not in self.ledger and offset:
                 try:
-                    limits = Limits.of(self.room, self.candidates, free + fixed)
+                    limits = Limits.of_room(self.room, self.candidates, free + fixed)
                     sets = self._search(limits, _CURVE_STARTS, f"{free + fixed} cameras")
                 except ValueError:
                     continue  # the limits of the room do not allow so many
@@ -278,7 +275,7 @@ class _Work:
     def _figures_of(self, rig: Rig) -> tuple[Any, ...]:
         """Return the figures of a rig by the fast layer, as values for the ledger."""
         prediction = self.layer.predict([self.layer.terms(camera) for camera in rig], variant=VARIANT)
-        return Figures.of(prediction, self.room.keys.target).to_row()
+        return Figures.of_prediction(prediction, self.room.keys.target).to_row()
 
     def _judged(self, refined: Sequence[CandidateSet]) -> list[tuple[CandidateSet, Figures]]:
         """Return the refined sets with their figures by the fast layer, best first."""

@@ -1,7 +1,5 @@
 """What a rig is rehearsed for: the volume, its people and what hides them; and whether the rig may hang there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Self
 

@@ -1,7 +1,5 @@
 """Rehearsal of a rig: the fast layer for maps and comparisons, then scenes of the simulator where it matters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -20,12 +18,18 @@ from simharness.planning.rehearsal_result import (
     Estimated,
     ExtraCamera,
     Rehearsal,
+    sentences,
 )
 from simharness.planning.rehearsal_scene import SceneSettings
-from simharness.planning.rehearsal_sentences import sentences
 from simharness.planning.rehearsal_setup import RehearsalSetup
-from simharness.planning.scene_results import Condition, SceneResult, interval_of, loss_of
-from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
+from simharness.planning.simulated_scenes import (
+    Condition,
+    SceneBatch,
+    SceneResult,
+    interval_of,
+    loss_of,
+    simulate_scenes,
+)
 from simharness.planning.tolerance import fault_conditions, tolerances
 from simharness.reality.validation.subsets import camera_subsets
 from simharness.world.rigs.extra_camera import cameras_on_walls
@@ -149,7 +153,7 @@ class _Rehearsing:
         return tuple(range(len(self.rig)))
 
     def _layer(self, *, people: int, coarse: bool) -> FastLayer:
-        return FastLayer.of(
+        return FastLayer.in_volume(
             self.setup.volume,
             detector=self.setup.detector,
             people=people,

@@ -1,7 +1,5 @@
 """Rigs that a plan is compared with, those that people hang without a plan, on the same simulated people."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
@@ -14,8 +12,7 @@ from simharness.planning.candidates import Candidate, candidate, places_in
 from simharness.planning.planned_room import Room
 from simharness.planning.rehearsal_scene import SceneSettings
 from simharness.planning.rehearsal_setup import RehearsalSetup
-from simharness.planning.scene_results import Condition, SceneResult
-from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
+from simharness.planning.simulated_scenes import Condition, SceneBatch, SceneResult, simulate_scenes
 from simharness.planning.value_fit import VARIANT
 from simharness.types.random_streams import stream
 

@@ -3,8 +3,6 @@
 A rig file has the keys of the section ``[cameras]`` of a scenario, which takes it with ``rig = "planned.toml"``.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import tempfile

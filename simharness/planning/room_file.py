@@ -1,7 +1,5 @@
 """Reader of room files (TOML): keys (:mod:`.room_keys`) to a checked room."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace
@@ -14,8 +12,7 @@ from pydantic import ValidationError
 from mvpose import Camera
 from mvpose.arrays import Floats
 from mvpose.files.message_text import all_in_one_line, listed, one_line
-from simharness.planning.mounts import LEAST_AREA, make_mounts
-from simharness.planning.planned_room import LensChoice, Room
+from simharness.planning.planned_room import LEAST_AREA, LensChoice, Room, make_mounts
 from simharness.planning.room_keys import LensKeys, ObstacleKeys, Outline, RoomKeys
 from simharness.scenario.layers import Origins, merge, nested, set_origin
 from simharness.scenario.presets import read_profile
@@ -23,7 +20,7 @@ from simharness.scenario.shipped import shipped_folder
 from simharness.scenario.toml_files import read_toml
 from simharness.scenario.validation_messages import explain_all
 from simharness.types.floor import Volume, simple_outline
-from simharness.world.rigs.lenses import check_lens, intrinsics
+from simharness.world.rigs.projection import check_lens, intrinsics
 from simharness.world.scene.objects.geoms import Box
 
 _DEFAULT_MARGIN = 0.5  # metres from the walls to a volume that the file does not give

@@ -3,8 +3,6 @@
 Metres; angles in degrees; the frame of the file is that of the planned rig: z is up and the floor is at z = 0.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field

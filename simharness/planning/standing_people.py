@@ -5,8 +5,6 @@ in a pose of the pool, and everyone both hides others and is looked at. All came
 cameras are compared on the same people (common random numbers).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -209,7 +207,7 @@ class StandingScenes:
     frame: Integers
 
     @classmethod
-    def of(
+    def posed(
         cls,
         pool: PosePool,
         places: Floats,
@@ -301,7 +299,7 @@ def standing_scenes(
     angle = rng.random(len(places))[target] + np.repeat(rng.permutation(repeats) / repeats, len(places))
     group = _grouped(position, rng.permutation(len(target)), people)
     pose = stream(seed, "planning", "poses").integers(len(pool), size=group.shape)
-    return StandingScenes.of(pool, places, target[group], pose, position[group], 2 * np.pi * (angle[group] + 0.0))
+    return StandingScenes.posed(pool, places, target[group], pose, position[group], 2 * np.pi * (angle[group] + 0.0))
 
 
 def taken_floor(obstacle: Box) -> Floor:
@@ -357,4 +355,4 @@ def _recorded_scenes(tracks: Floats, pool: PosePool, places: Floats, *, repeats:
     local = np.einsum("sqji,sqlj->sqli", _turns(np.nan_to_num(angle)), local)
     pose = pool.nearest(local.reshape(-1, 17, 3)).reshape(present.shape)
     away = ((np.nan_to_num(position)[:, :, None] - places) ** 2).sum(axis=-1)
-    return StandingScenes.of(pool, places, away.argmin(axis=-1), pose, position, angle, frame=chosen)
+    return StandingScenes.posed(pool, places, away.argmin(axis=-1), pose, position, angle, frame=chosen)

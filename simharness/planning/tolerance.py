@@ -4,15 +4,13 @@ Errors of cameras are independent: a level is the standard deviation of the erro
 positions along each axis, or of the clocks. The method does not know them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
-from simharness.planning.scene_results import Condition, SceneResult, interval_of, loss_of
+from simharness.planning.simulated_scenes import Condition, SceneResult, interval_of, loss_of
 from simharness.statistics.intervals import Interval
 
 CLIFF = 5.0

@@ -1,7 +1,5 @@
 """Value of the cameras of a room, with its odds and its correction measured in that room before the search."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -34,7 +32,7 @@ def layer_of(room: Room, *, places: int = _PLACES, repeats: int = 6, seed: int =
         seed: seed of the draws.
     """
     spacing = float(np.clip(np.sqrt(room.volume.area / places), 0.25, 3.0))
-    return FastLayer.of(
+    return FastLayer.in_volume(
         room.volume,
         detector=room.detector,
         people=room.keys.people.count,

@@ -4,8 +4,6 @@ The rule of visibility, the capsules and the outlines are those of the simulator
 (:mod:`simharness.capture.ray_visibility`); only obstacles are boxes here, because a user who plans knows no more.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

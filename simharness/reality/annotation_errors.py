@@ -5,8 +5,6 @@ that stays the same for an actor, and by a random part that changes from frame t
 recording that is to be scored as a real one needs a truth with the same errors; everywhere else the truth is exact.
 """
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass, replace
 from typing import Any, Self

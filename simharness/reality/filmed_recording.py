@@ -5,8 +5,6 @@ replay their joint tracks, so that distances, bearings, speeds, and who hides wh
 and clothes are drawn from the seed. What the recording's room holds is unknown: the twin's room is empty.
 """
 
-from __future__ import annotations
-
 import itertools
 import tempfile
 from collections.abc import Callable
@@ -30,7 +28,7 @@ from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import Simulation, capture_trial
 from simharness.types.sequence import LANDMARKS, Sequence
 from simharness.types.views import Views, Visibility
-from simharness.world.motion.presence import held
+from simharness.world.motion.motion import held
 
 _LONGEST = 4.0  # seconds of a take
 _SHORTEST = 0.6  # seconds; shorter takes are joined with a neighbour

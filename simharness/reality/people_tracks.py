@@ -6,8 +6,6 @@ those that the detector finds (its hips, for example, are above the annotated on
 the consensus of its own views, and the annotation apart from it.
 """
 
-from __future__ import annotations
-
 import itertools
 import warnings
 from collections.abc import Sequence

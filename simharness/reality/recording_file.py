@@ -1,37 +1,163 @@
-"""Reader of recordings: a TOML file (:mod:`.recording_keys`) that says where cameras, detections and truth are.
+"""Reader of recordings: a TOML file that says where cameras, detections and truth are.
 
 ``read_recording("shelf", FOLDER)`` reads a shipped description with the files in FOLDER, and
 ``read_recording("hall.toml")`` one whose files lie beside it.
 """
 
-from __future__ import annotations
-
 import contextlib
 import difflib
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import BeforeValidator, ConfigDict, Field, ValidationError
 
 from mvpose import Rig
 from mvpose.files.message_text import all_in_one_line, one_line
 from mvpose.formats.calibration.calibration_formats import read_calibration
+from mvpose.formats.detections.detection_formats import FORMATS as DETECTION_FORMATS
 from mvpose.formats.detections.recorded_frames import read_frames
-from mvpose.formats.joint_names import JointNames, to_shelf14
+from mvpose.formats.joint_names import KNOWN, JointNames, known_skeleton, to_shelf14
 from mvpose.formats.people.people_files import PeopleFiles
 from mvpose.formats.people.people_formats import FORMATS as PEOPLE_FORMATS
+from mvpose.formats.people.people_formats import readable
 from mvpose.recording import People
 from mvpose.skeleton import HeadMapping
-from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.recording_keys import CalibrationKeys, DeclaredSkeleton, RecordingKeys, TruthKeys
+from simharness.reality.annotated_recording import AnnotatedRecording, DetectorKind
+from simharness.scenario.sections.section import Section
 from simharness.scenario.shipped import shipped_folder
 from simharness.scenario.toml_files import read_toml
 from simharness.scenario.validation_messages import explain_all
+
+Whole = Annotated[int, Field(ge=0, le=10**9)]
+Name = Annotated[str, Field(min_length=1)]
+
+
+def _one_of(registered: Callable[[], Iterable[str]]) -> Any:
+    """Return a validator of names that are registered when the file is read."""
+
+    def check(value: Any) -> Any:
+        names = list(registered())
+        if isinstance(value, str) and value not in names:
+            near = difflib.get_close_matches(value, names, n=1)
+            raise ValueError(f"one of {', '.join(names)}{f' (did you mean {near[0]}?)' if near else ''}")
+        return value
+
+    return BeforeValidator(check)
+
+
+def _tuples(value: Any) -> Any:
+    """Return lists of JSON as tuples, because values that a validator has touched are checked as those of Python."""
+    if isinstance(value, dict):
+        return {key: _tuples(each) for key, each in value.items()}
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+def _known(value: Any) -> Any:
+    """Return the joints of a skeleton that is given by its name."""
+    if isinstance(value, str):
+        try:
+            skeleton = known_skeleton(value)
+        except ValueError:
+            raise ValueError(
+                f"one of {', '.join(KNOWN)}, or a table with joints, the names in the order of the file"
+            ) from None
+        return {"joints": skeleton.joints, "name": skeleton.name}
+    return _tuples(value)
+
+
+def _listed(value: Any) -> Any:
+    """Return a list of one value for a single value."""
+    return _tuples(value if isinstance(value, list) else [value])
+
+
+def _pairs(value: Any) -> Any:
+    """Return a list of one pair for a single pair."""
+    single = isinstance(value, list) and value and not isinstance(value[0], list)
+    return _tuples([value] if single else value)
+
+
+class DeclaredSkeleton(Section):
+    """Skeleton of a file: the names of its joints in their order, and ours for some of them."""
+
+    joints: tuple[Name, ...] = Field((), description="names of the joints, in the order of the file")
+    map: dict[str, Name] = Field({}, description="joints whose name is not ours: ours = theirs")
+    name: str = Field("declared", description="name in messages")
+
+    def joint_names(self, names: JointNames | None) -> JointNames:
+        """Return the joints of a file.
+
+        Args:
+            names: joints of the file by its own names, or by default; None: it has no names.
+
+        Raises:
+            ValueError: the file has no names and none are declared, or the map has a joint that does not exist.
+        """
+        declared = JointNames(self.name, self.joints) if self.joints else names
+        if declared is None:
+            raise ValueError("the file does not name its joints; give skeleton the names: { joints = [...] }")
+        return declared.renamed(self.map)
+
+
+SkeletonKey = Annotated[DeclaredSkeleton, BeforeValidator(_known)]
+
+
+class CalibrationKeys(Section):
+    """[calibration] of a recording."""
+
+    file: Name = Field(description="calibration file of any format that is read")
+    size: Annotated[tuple[tuple[int, int], ...], BeforeValidator(_pairs)] = Field(
+        (), description="width and height of the images, pixels, or one pair for each camera"
+    )
+    cameras: tuple[str, ...] = Field((), description="names of the cameras to take, in this order; all by default")
+
+
+class DetectionKeys(Section):
+    """[detections] of a recording."""
+
+    format: Annotated[str, _one_of(lambda: DETECTION_FORMATS)] = Field(
+        "", description="format of the detections; by default recognised by their content"
+    )
+    path: Name = Field(description="folder of the detections, with a folder or file for each camera")
+    first: Whole = Field(0, description="frame number of the first picture of each camera; not of COCO results")
+    skeleton: SkeletonKey | None = Field(None, description="skeleton of the detections")
+    kind: DetectorKind = Field("bottom-up", description="kind of the detector")
+
+
+class TruthKeys(Section):
+    """[truth] of a recording."""
+
+    format: Annotated[str, _one_of(readable)] = Field(description="format of the true joints")
+    file: Annotated[tuple[Name, ...], BeforeValidator(_listed)] = Field(
+        min_length=1, description="file (of Panoptic the folder), or a list with a file for each person"
+    )
+    skeleton: SkeletonKey | None = Field(None, description="skeleton of the true joints")
+    actors: tuple[Whole, ...] | None = Field(None, description="people whose PCP is averaged; all by default")
+    first: Whole | None = Field(
+        None, description="frame number of the first frame of the file; by default as the file says"
+    )
+    up: Literal["z", "y"] = Field("z", description="axis that points up in TRC, C3D, npz and table files")
+
+
+class RecordingKeys(Section):
+    """Description of a recording."""
+
+    model_config = ConfigDict(title="a recording")
+
+    name: str = Field("", description="name of the recording; by default that of the file")
+    rate: float = Field(gt=0.0, le=1000.0, description="frames per second, Hz")
+    frames: Annotated[tuple[tuple[Whole, Whole], ...], BeforeValidator(_pairs)] = Field(
+        min_length=1, description="ranges of frame numbers, [first, last], both included"
+    )
+    calibration: CalibrationKeys
+    detections: DetectionKeys
+    truth: TruthKeys
+
 
 FILE_NAME = "recording.toml"
 """Name of the description in a folder that holds a whole recording, such as an exported sequence."""
@@ -68,7 +194,7 @@ def read_recording(
             frames,
             first=given.first,
             format=given.format or None,
-            skeleton=None if given.skeleton is None else given.skeleton.of(None),
+            skeleton=None if given.skeleton is None else given.skeleton.joint_names(None),
         )
     with _key(file, "truth"):
         people = _people(place, keys, frames)
@@ -186,7 +312,7 @@ def _people(place: Path, keys: RecordingKeys, frames: NDArray[np.int64]) -> Peop
     """
     truth = keys.truth
     paths = tuple(place / each for each in truth.file)
-    declared = truth.skeleton.of(None) if truth.skeleton is not None and truth.skeleton.joints else None
+    declared = truth.skeleton.joint_names(None) if truth.skeleton is not None and truth.skeleton.joints else None
     read = PEOPLE_FORMATS[truth.format].read
     assert read is not None, "the keys are checked"
     people = read(PeopleFiles(paths, declared, truth.up, keys.rate, frames))
@@ -207,7 +333,7 @@ def _joint_names(keys: TruthKeys, people: People) -> JointNames:
     skeleton = keys.skeleton or DeclaredSkeleton()
     if skeleton.joints and (own.rows(skeleton.joints) >= 0).all():  # named alike: the order in the file counts
         return own.renamed(skeleton.map)
-    names = skeleton.of(own)
+    names = skeleton.joint_names(own)
     if len(names) != len(own):
         raise ValueError(
             f"{keys.file[0]}: has {len(own)} joints, but skeleton {names.name} has {len(names)}; correct the skeleton"

@@ -1,7 +1,5 @@
 """Evaluation of a scenario at many seeds by the protocol of recorded data."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ of its stages. On Linux workers are therefore forked from a server process that 
 nothing else. They are never forked from this process, which may hold threads or a GL context.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import sys
 from collections.abc import Callable, Iterator, Sequence

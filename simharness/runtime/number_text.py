@@ -1,7 +1,5 @@
 """Numbers as text for tables, pages and terminals, without negative zeros."""
 
-from __future__ import annotations
-
 
 def fixed(value: float, digits: int) -> str:
     """Return a number with a fixed number of decimals; what rounds to zero is "0.0", never "-0.0"."""

@@ -1,7 +1,5 @@
 """Parquet tables of files that may be damaged."""
 
-from __future__ import annotations
-
 import io
 
 import polars as pl

@@ -1,7 +1,5 @@
 """Checks of resolved settings: validation against the models, and what their keys cost together."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence

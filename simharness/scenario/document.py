@@ -3,8 +3,6 @@
 Paths in scenario files are relative to the folder of the file; on the command line, to the working directory.
 """
 
-from __future__ import annotations
-
 import difflib
 import os
 import tomllib

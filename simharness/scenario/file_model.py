@@ -3,8 +3,6 @@
 A :class:`~simharness.scenario.sections.scenario.Scenario` remains when presets, bases and sweeps are resolved.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pydantic import Field

@@ -5,8 +5,6 @@ Kinds of presets are rigs, sensor profiles and detector profiles: ``[detector] p
 ``[cameras] rig = "dome12"`` takes ``scenarios/rigs/dome12.toml``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path

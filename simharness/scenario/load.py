@@ -32,8 +32,6 @@ A setting at a seed is a trial; all variants of a trial get the same detections.
 one trial.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

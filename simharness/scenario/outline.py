@@ -1,7 +1,5 @@
 """Outline of a scenario file for people: the varied keys as comments, and the resolved base as TOML."""
 
-from __future__ import annotations
-
 import json
 import textwrap
 from collections.abc import Mapping, Sequence

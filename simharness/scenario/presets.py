@@ -6,8 +6,6 @@
 section change the preset. A preset may begin with another preset by the same key.
 """
 
-from __future__ import annotations
-
 import difflib
 import json
 import os

@@ -4,8 +4,6 @@ It is derived from the models. Rules that a schema cannot express (keys that bel
 checked by :func:`simharness.scenario.load.load` alone.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

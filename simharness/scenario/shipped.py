@@ -1,7 +1,5 @@
 """Shipped scenarios: the folder ``scenarios``, part of the wheel, and names for its files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import simharness

@@ -1,7 +1,5 @@
 """[sweep], [cases] and seeds: values of the keys of a scenario, their combinations, and the keys of each setting."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

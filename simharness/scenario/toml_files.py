@@ -1,7 +1,5 @@
 """TOML files: reader with precise messages, and writers of scenarios and of plain keys."""
 
-from __future__ import annotations
-
 import difflib
 import json
 import re

@@ -1,7 +1,5 @@
 """Messages about mistakes in scenario files, one line each: where, the key, what was expected, what was given."""
 
-from __future__ import annotations
-
 import difflib
 import re
 import types

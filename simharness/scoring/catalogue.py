@@ -3,8 +3,6 @@
 A score is None (null in tables) where it does not apply: the error of pairs without any pair, a share of zero.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 

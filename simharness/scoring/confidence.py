@@ -7,8 +7,6 @@ error against what happened (Brier, Monthly Weather Review 1950), 0 for certain 
 is a proper score: its expectation is least for the true probability (Gneiting & Raftery, JASA 2007).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

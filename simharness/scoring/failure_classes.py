@@ -22,8 +22,6 @@ An estimate that matches no person is a ghost, unless it is the second estimate 
 its wrong people and its ghosts. Phantoms show no person, so a phantom in an estimate does not make it merged.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum

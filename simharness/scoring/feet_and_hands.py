@@ -1,7 +1,5 @@
 """Scores of feet and hands: the joints beyond COCO17 of people who are paired by their bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

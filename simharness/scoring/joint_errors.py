@@ -8,8 +8,6 @@ PCK in 3D is a function of the error limit (Mehta et al., 3DV 2017). Every joint
 without an estimate, or of a missed person, is wrong at any limit.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

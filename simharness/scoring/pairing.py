@@ -4,8 +4,6 @@ People are paired by the Hungarian method on mean joint distance. A distance ove
 Panoptic's recall, Tu et al., ECCV 2020).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

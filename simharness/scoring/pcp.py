@@ -6,8 +6,6 @@ estimate; one estimate may be used for two people, and an unused estimate costs 
 together with the scores of :mod:`simharness.scoring.pairing`.
 """
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 import numpy as np

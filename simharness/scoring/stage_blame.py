@@ -12,8 +12,6 @@ Perfect detections remove most failures, so matching rarely gets the blame. One 
 order: the real detections with the true labels, which shows what a perfect matching alone would remove.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace

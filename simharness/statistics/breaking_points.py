@@ -1,7 +1,5 @@
 """Values of a factor at which a mean score passes a threshold."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Means of scores over scenes with confidence intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType

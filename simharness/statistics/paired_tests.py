@@ -1,7 +1,5 @@
 """Significance of the difference between two measurements of the same scenes, and correction for many tests."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal

@@ -5,8 +5,6 @@ observations", Annals of Statistics 1989); all quantities of a frame are drawn t
 sums over frames are computed for all resamples at once: ``f(weights @ sums)``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

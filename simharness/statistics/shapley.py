@@ -4,8 +4,6 @@ A coalition is a bit mask: bit i is set where player i is in it. The worths of a
 numbers, by bit mask.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from math import factorial
 

@@ -19,8 +19,6 @@ No test of a mean has its level for all distributions (Bahadur & Savage, Annals 
 one scene in ten loses much, one sample of twelve in four does not contain any.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtr, stdtrit

@@ -1,7 +1,5 @@
 """Work of a study on one trial: simulate, estimate, score and blame, or only what is not stored yet."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Plan of a study: its trials, and the identities under which a store keeps them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Run of a study: finished trials are read from the store, missing ones are run, and the result folder is written."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
@@ -17,9 +15,8 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.study.scheduler import Measure, TrialFailure, TrialSuccess, Unit, error_text, run_units
 from simharness.study.stored_trial import StoredTrial
 from simharness.study.stored_trial import run_stored_trial as measure_trial
-from simharness.study.study_folder import Results, document, read_study, write_study
+from simharness.study.study_folder import Results, document, read_study, tables, write_study
 from simharness.study.study_plan import PlannedTrial, plan
-from simharness.study.tables import tables
 from simharness.study.trial_store import Entry, EntryState, Store, StoreError
 from simharness.trial.archive import TrialArchive
 from simharness.trial.identity import code, provenance

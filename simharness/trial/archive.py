@@ -3,8 +3,6 @@
 An archive is a NumPy ``.npz`` file of the arrays that :mod:`simharness.trial.arrays` describes.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field

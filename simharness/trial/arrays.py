@@ -4,8 +4,6 @@ Arrays with a row for each detection or estimate of all T frames have an array `
 row, ascending.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any

@@ -4,8 +4,6 @@ The checks use other code than the simulation: projection by OpenCV, and ids and
 failed check is a fault of the harness, never of the method, and scores of such a trial would have no meaning.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

@@ -5,8 +5,6 @@ cameras new estimates alone. Every error has random draws of its own, so that tw
 are paired.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 

@@ -20,8 +20,6 @@ workers and the machine change nothing; nor does code of the command line, of re
 difference is not detected: ``rendering.renderer = "auto"`` chooses a renderer that depends on the machine.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import importlib.metadata
@@ -37,8 +35,7 @@ import mvpose
 import simharness
 from mvpose.formats.calibration.camera_folder import calibration_files
 from mvpose.formats.people.people_formats import people_files
-from simharness.runtime.code_digest import digest_of_folders
-from simharness.runtime.version import code_version
+from simharness.runtime.version import code_version, digest_of_folders
 from simharness.scenario.sections.scenario import FILE_KEYS, Scenario
 from simharness.trial.stages.estimators import sources_of
 from simharness.world.scene.objects.object_files import object_dependencies

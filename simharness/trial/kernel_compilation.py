@@ -7,8 +7,6 @@ All are written to the cache on disk, from which the processes that film and est
 A process that needs a kernel that another one compiles waits for it.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -21,10 +19,8 @@ from mvpose.estimate import Matching
 from mvpose.estimators import SequenceEstimator
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS
 from mvpose.rays import ordered_rays
-from simharness.types.finish import Finish
-from simharness.types.light_sources import AreaLight, LightSources
-from simharness.types.lighting import Lighting
-from simharness.types.mesh import Mesh
+from simharness.types.lighting import AreaLight, Lighting, LightSources
+from simharness.types.mesh import Finish, Mesh
 
 _PICTURES = "pictures"  # stands for the kernels of pictures among the names of variants
 

@@ -5,8 +5,6 @@ people. Memory is within a factor of two of the measured peak (``tests/simharnes
 a factor of three on such a machine where kernels are compiled; it leaves out user-defined estimators and networks.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass

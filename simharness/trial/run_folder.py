@@ -39,8 +39,6 @@ A result folder holds, for T frames, V cameras, P people, J joints and n detecti
     the headline scores, the duration of each stage of the run, the command.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

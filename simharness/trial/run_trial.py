@@ -5,8 +5,6 @@ Every command runs trials through :func:`run_trial`: ``run``, ``render``, ``expo
 already, such as those of a stored trial, are given as :class:`Known` and left out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Result of one variant in one trial. Stores and pages read it without the simulator."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Ground truth and detections of people on skeletons with feet and hands, beside those on COCO17."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
 from typing import Self

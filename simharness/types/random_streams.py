@@ -1,7 +1,5 @@
 """Keyed random streams: draws depend on the key alone, not on the order of drawing."""
 
-from __future__ import annotations
-
 import hashlib
 
 import numpy as np

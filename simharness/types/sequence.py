@@ -11,8 +11,6 @@ of the body model; head and neck are not computed from COCO joints:
 - ``mid_hip``: midway between the centres of the hip joints; "BodyCenter" in Panoptic.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cache
 

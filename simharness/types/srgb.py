@@ -1,7 +1,5 @@
 """sRGB values and the linear light for which they stand (IEC 61966-2-1)."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

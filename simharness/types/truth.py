@@ -1,7 +1,5 @@
 """Ground truth of one frame: poses of the people, and the person and keypoint errors of each detection."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import IntEnum
 

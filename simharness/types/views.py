@@ -1,7 +1,5 @@
 """Ground truth in the pictures: pixels, visibility and boxes of all people in all views."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, field

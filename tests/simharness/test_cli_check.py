@@ -221,7 +221,7 @@ class TestBadInput:
         def run(*_, **__):
             raise AssertionError("ran")
 
-        monkeypatch.setattr("simharness.gate.gate_check.run_suite", run)
+        monkeypatch.setattr("simharness.gate.suite.run_suite", run)
         monkeypatch.setattr("simharness.gate.suite.run_suite", run)
 
     @pytest.fixture

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from simharness.world.humans.outer_landmarks import DATA
+from simharness.capture.outer_views import DATA
 from tools.body.hands_and_feet import read_groups, weights_of
 
 

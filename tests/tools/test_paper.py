@@ -12,10 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.reality.published_scores import ABLATION, COMPARISON
+from simharness.reality.evaluation import ABLATION
 from simharness.trial.identity import PROVENANCE, provenance
 from tools.paper_tables.__main__ import main
-from tools.paper_tables.tables import INPUTS, VARIANTS, paper_tables, read_inputs, write_tables
+from tools.paper_tables.tables import COMPARISON, INPUTS, VARIANTS, paper_tables, read_inputs, write_tables
 from tools.paper_tables.text import markdown
 
 ON_SHELF = [name for name in VARIANTS if name != "appearance"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mvpose import COCO17
-from simharness.detector.guesses import BEARINGS, poses_in_pictures
+from simharness.detector.reported import POSE_BEARINGS, poses_in_pictures
 from tools.poses.__main__ import moments
 from tools.poses.sample import sample_joints, see
 
@@ -18,7 +18,7 @@ def joints():
 
 def test_the_shipped_distribution_is_that_of_the_simulated_motions(joints):
     """Other bodies, motions and times: means within a few centimetres, and the same spread of every joint."""
-    mean, covariance = moments(see(joints, 7, bearings=BEARINGS))
+    mean, covariance = moments(see(joints, 7, bearings=POSE_BEARINGS))
     shipped = poses_in_pictures()
     assert np.abs(mean - shipped.mean).max() < 0.06
     spread, expected = (np.sqrt(np.einsum("bii->bi", each)) for each in (covariance, shipped.covariance))
@@ -30,7 +30,7 @@ def test_the_shipped_distribution_is_symmetric():
     shipped = poses_in_pictures()
     flip = np.tile([-1.0, 1.0], 17)
     swapped = np.concatenate([[2 * joint, 2 * joint + 1] for joint in MIRROR])
-    opposite = -np.arange(BEARINGS) % BEARINGS
+    opposite = -np.arange(POSE_BEARINGS) % POSE_BEARINGS
     np.testing.assert_allclose(shipped.mean[opposite][:, swapped] * flip, shipped.mean, atol=1e-4)
     mirrored = shipped.covariance[opposite][:, swapped][:, :, swapped] * np.outer(flip, flip)
     np.testing.assert_allclose(mirrored, shipped.covariance, atol=1e-4)

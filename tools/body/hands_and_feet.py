@@ -1,6 +1,6 @@
 """Make the joints of hands and feet from the vertices of the body: ``python -m tools.body.hands_and_feet``.
 
-Writes ``data/hands_and_feet.npz``, which :mod:`simharness.world.humans.outer_landmarks` reads; needs the extra
+Writes ``data/hands_and_feet.npz``, which :mod:`simharness.capture.outer_views` reads; needs the extra
 ``bake``.
 Like the joints of COCO17, each joint is a weighted mean of vertices of the skin:
 
@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from mvpose.arrays import Floats, Integers
-from simharness.world.humans.outer_landmarks import DATA
+from simharness.capture.outer_views import DATA
 
 FEET = ("big_toe", "small_toe", "heel")
 SIDES = ("left", "right")

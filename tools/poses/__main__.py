@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.detector.guesses import BEARINGS, DATA
+from simharness.detector.reported import DATA, POSE_BEARINGS
 from tools.poses.sample import PosesInPictures, sample_joints, see
 
 SEED = 0
@@ -20,14 +20,14 @@ FRAMES = 20
 
 def moments(poses: PosesInPictures) -> tuple[Floats, Floats]:
     """Return means (BEARINGS, 34) and covariances (BEARINGS, 34, 34) of the poses about each bearing, metres."""
-    place = np.rint(poses.bearing * (BEARINGS / (2 * np.pi))).astype(int) % BEARINGS
-    groups = [poses.places[place == number].reshape(-1, 34) for number in range(BEARINGS)]
+    place = np.rint(poses.bearing * (POSE_BEARINGS / (2 * np.pi))).astype(int) % POSE_BEARINGS
+    groups = [poses.places[place == number].reshape(-1, 34) for number in range(POSE_BEARINGS)]
     return np.stack([group.mean(axis=0) for group in groups]), np.stack([np.cov(group.T) for group in groups])
 
 
 def main() -> None:
     """Sample the poses and write the file."""
-    poses = see(sample_joints(SEED, bodies=BODIES, frames=FRAMES), SEED, bearings=BEARINGS)
+    poses = see(sample_joints(SEED, bodies=BODIES, frames=FRAMES), SEED, bearings=POSE_BEARINGS)
     mean, covariance = moments(poses)
     DATA.parent.mkdir(exist_ok=True)
     np.savez_compressed(DATA, mean=mean.astype(np.float32), covariance=covariance.astype(np.float32))

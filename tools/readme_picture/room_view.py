@@ -16,7 +16,7 @@ from simharness.outputs.run.pictures import PagePicture
 from simharness.outputs.study.replay import Replay
 from simharness.trial.stages.capture import renderer_of
 from simharness.world.rigs.layouts import look_at
-from simharness.world.rigs.lenses import intrinsics
+from simharness.world.rigs.projection import intrinsics
 from simharness.world.scene.playback import Playback
 
 _BEARING, _PITCH = np.radians(-40.0), np.radians(24.0)  # direction from the room to the camera

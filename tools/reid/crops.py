@@ -18,7 +18,7 @@ from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.joint_visibility import label_joints
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.sensor import develop
-from simharness.detector.view_geometry import hidden_shares
+from simharness.detector.viewing_conditions import hidden_shares
 from simharness.types.random_streams import stream
 from tools.reid.filming_sites import Site, make_site
 from tools.reid.identities import DressedPerson, Group, dressed_people

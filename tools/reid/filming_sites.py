@@ -17,7 +17,7 @@ from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.rigs.layouts import look_at
-from simharness.world.rigs.lenses import intrinsics
+from simharness.world.rigs.projection import intrinsics
 from simharness.world.scene.objects.geoms import Box
 from tools.reid.site_rooms import draw_room, furnish
 from tools.reid.site_sensors import draw_profile, draw_sensor

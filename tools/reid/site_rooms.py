@@ -14,8 +14,8 @@ from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.solids import Solid
+from simharness.world.scene.placement.clutter import place_furniture
 from simharness.world.scene.placement.free_space import FreeSpace
-from simharness.world.scene.placement.furniture import place_furniture
 from simharness.world.scene.rooms.kinds import settled
 from simharness.world.scene.rooms.lamps import area_lights
 from simharness.world.scene.rooms.openings import draw_openings, room_walls

@@ -4,8 +4,6 @@ It is drawn once for a camera that stays too. So NumPy is fast enough for the pi
 background colour of the lighting or its panorama, and nothing is compiled for them.
 """
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from dataclasses import dataclass
 
@@ -38,7 +36,7 @@ class LitBackground:
             :func:`~simharness.capture.rendering.shadow_maps.shadow_places`; empty with sources.
         shadow_depth: inverse depth of each pixel from the light, (h, w) float32; empty with sources.
         runs: runs of pixels over the blocks of :class:`~simharness.capture.rendering.lit_scene.ShadowGrid`, (n, 5): see
-            :func:`~simharness.capture.rendering.moving_shadows.runs_below`; empty without sources.
+            :func:`~simharness.capture.rendering.shaded_pixels.runs_below`; empty without sources.
     """
 
     lighting: Lighting

@@ -4,8 +4,6 @@ A node of the tree has a box and either two children or up to ``_LEAF`` triangle
 Möller and Trumbore ("Fast, minimum storage ray/triangle intersection", 1997), from both sides.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

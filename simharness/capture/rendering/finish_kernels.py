@@ -17,8 +17,6 @@ The light around a figure is taken as one direction and an even rest: a row of :
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 
@@ -27,7 +25,7 @@ from numpy.typing import NDArray
 
 from mvpose.kernels import njit
 from simharness.capture.rendering.surface_kernels import NORMAL_X, NORMAL_Y, NORMAL_Z, PIXELS, SECOND, THIRD
-from simharness.types.finish import Material
+from simharness.types.mesh import Material
 
 _FOLD_PERIOD, _FOLD_STEPS = 0.36, 256  # metres and entries of the profile of folds
 _HAIR_STEPS = 512
@@ -95,7 +93,7 @@ class FinishArrays(NamedTuple):
         lights: light around the meshes, see :func:`.finishes.figure_light`, (meshes, 7).
         pixel: size of a pixel at each mesh, metres, (meshes,) float32.
         grain: see :func:`.finishes.grain_of`, (v, 4).
-        place: see :class:`simharness.types.finish.Finish`, (v,).
+        place: see :class:`simharness.types.mesh.Finish`, (v,).
         around: period of the place of hair, metres.
     """
 

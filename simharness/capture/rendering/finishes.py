@@ -33,7 +33,7 @@ _RED, _GREEN, _BLUE = LUMINANCE
 
 @dataclass(frozen=True)
 class Finishes:
-    """Finishes of m faces and v vertices of moving meshes; see :class:`simharness.types.finish.Finish`.
+    """Finishes of m faces and v vertices of moving meshes; see :class:`simharness.types.mesh.Finish`.
 
     Attributes:
         material: material of every face, (m,) int8.
@@ -138,7 +138,7 @@ def grain_of(vertices: np.ndarray, toward: np.ndarray, rest: np.ndarray, loosene
         vertices: positions, (n, 3) float32.
         toward: vertex that each points to, (n,).
         rest: distance to it at rest, metres, (n,) float32.
-        looseness: see :class:`simharness.types.finish.Finish`, (n,) float32.
+        looseness: see :class:`simharness.types.mesh.Finish`, (n,) float32.
     """
     grain = np.zeros((len(vertices), 4), np.float32)
     for i in range(len(vertices)):

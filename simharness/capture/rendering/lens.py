@@ -5,8 +5,6 @@ everywhere. Colours are interpolated; depth, ids and parts are those of the near
 distorted picture away from the exact position.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache

@@ -1,9 +1,7 @@
 """Compiled kernels of the light that reaches still surfaces and places in the air.
 
-Irradiance is in the unit of :mod:`simharness.types.light_sources`: under a hemisphere of radiance L it is L.
+Irradiance is in the unit of :mod:`simharness.types.lighting`: under a hemisphere of radiance L it is L.
 """
-
-from __future__ import annotations
 
 import math
 from typing import NamedTuple

@@ -5,8 +5,6 @@ sample (i, j), ``i + j <= n``, is at the share i / n of the way to the second co
 triangle has samples at its corners, which it shares with its neighbours if it is smooth.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

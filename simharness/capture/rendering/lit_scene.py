@@ -17,19 +17,10 @@ from simharness.capture.rendering import tone
 from simharness.capture.rendering.backgrounds import Background, LitBackground, fill_empty
 from simharness.capture.rendering.finishes import MATTE, Finishes, PosedFinishes
 from simharness.capture.rendering.moving_light import MovingMeshes, capsules, moving_light
-from simharness.capture.rendering.moving_shadows import (
-    BLOCK,
-    BlockGrid,
-    ShadowLayer,
-    ShadowLayers,
-    UpwardLight,
-    cast,
-    dim,
-    runs_below,
-    touched_blocks,
-)
+from simharness.capture.rendering.moving_shadows import BLOCK, ShadowLayer, UpwardLight, cast, touched_blocks
 from simharness.capture.rendering.room_light import RoomLight, last_light, room_light
 from simharness.capture.rendering.scene_geometry import SceneGeometry
+from simharness.capture.rendering.shaded_pixels import BlockGrid, ShadowLayers, dim, runs_below
 from simharness.capture.rendering.shading_kernels import FaceLight, shade_lit
 from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
 from simharness.capture.rendering.vertex_kernels import picture_spans

@@ -8,8 +8,6 @@ and "Capsule ambient occlusion", 2006 and 2013).
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -7,10 +7,9 @@ Meshes that stay where they are (``Mesh.still``) are drawn first, and the others
 of the former can be kept for its next picture; a picture is the same to the bit whether it was kept or not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from simharness.capture.rendering.backgrounds import Background, Backgrounds, Li
 from simharness.capture.rendering.lens import through_lens
 from simharness.capture.rendering.lit_scene import LitScene
 from simharness.capture.rendering.raster_kernels import LONGEST_SIDE, draw_projected, rasterise
-from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, check_count
+from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, Renderer, Unavailable, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.shading_kernels import DistantLight, shade
 from simharness.capture.rendering.shadow_maps import NO_SHADOW, SHADOW_SIZE, LightView, shadow_places
@@ -177,3 +176,31 @@ def _distant(lighting: Lighting, seen: LightView) -> DistantLight:
         seen.projection,
         seen.bias,
     )
+
+
+RendererName = Literal["auto", "raster", "gl"]
+
+
+def make_renderer(name: RendererName = "raster") -> Renderer:
+    """Return the renderer of this name.
+
+    Args:
+        name: ``"raster"`` (numba, runs everywhere), ``"gl"`` (pyrender on EGL), or ``"auto"``: gl where it works, else
+            raster.
+
+    Raises:
+        Unavailable: ``"gl"`` was requested and no context can be created.
+        ValueError: an unknown name.
+    """
+    if name not in ("raster", "gl", "auto"):
+        raise ValueError(f"renderer must be 'raster', 'gl' or 'auto', got {name!r}")
+    if name == "raster":
+        return RasterRenderer()
+    from simharness.capture.rendering.gl import GlRenderer  # needs OpenGL, which not every machine has
+
+    try:
+        return GlRenderer()
+    except Unavailable:
+        if name == "gl":
+            raise
+        return RasterRenderer()

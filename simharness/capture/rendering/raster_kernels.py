@@ -15,8 +15,6 @@ next. Half of the triangles of a body lie between the pixel centres: they are dr
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.kernels import njit

@@ -1,7 +1,5 @@
 """Renderer interface: colour, depth and mesh index of every pixel from a camera and meshes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol

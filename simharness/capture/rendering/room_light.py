@@ -5,8 +5,6 @@ diffuse surfaces (radiosity), gathered along fixed rays from every sample. It is
 scene and depends on nothing else, so it is the same in every process and for every camera.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +24,7 @@ from simharness.capture.rendering.light_kernels import (
 from simharness.capture.rendering.light_samples import Floats, LightSamples, light_samples
 from simharness.capture.rendering.moving_light import AirLight
 from simharness.capture.rendering.scene_topology import SceneTopology, same_meshes
-from simharness.types.light_sources import LightSources
+from simharness.types.lighting import LightSources
 from simharness.types.mesh import Mesh
 from simharness.types.srgb import LUMINANCE
 

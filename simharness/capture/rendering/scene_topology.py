@@ -1,7 +1,5 @@
 """Faces of a whole scene: merged triangles, their colours, labels and textures."""
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass

@@ -16,8 +16,6 @@ Kernels of this package may not reorder sums, contract products or approximate q
 may do): a loop runs in vectors where its arrays are apart in memory, else not, and both must round alike.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

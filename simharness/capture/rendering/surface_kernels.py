@@ -12,8 +12,6 @@ Memory has one dimension and rows of ``PIXELS`` numbers: the compiler knows that
 same length. Of fewer pixels the others are those of an earlier call; nothing is indexed by them.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ version) with a lower white, so that it is mild: a short toe, a nearly straight 
 and sunlit places from clipping. It is scaled to keep middle grey, 18 %, where it is.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -8,8 +8,6 @@ meshes, which follow from the codes; what is outside of them is as in the backgr
 at.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.kernels import njit

@@ -6,8 +6,6 @@ contacts are in group 3. Lenses have no distortion, and a picture that colours m
 most a few dozen colours.
 """
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ Cameras have names that loaders of Panoptic know, and the sequence is described 
 ``simharness evaluate`` and the other commands on recordings.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import time
@@ -29,9 +27,7 @@ from mvpose.formats.people import write_people
 from mvpose.formats.people.panoptic_poses import body_scene
 from mvpose.recording import People
 from mvpose.skeleton import PANOPTIC19
-from simharness.outputs.benchmark.joint_confidences import confidences
-from simharness.outputs.benchmark.layout import FORMAT, Layout
-from simharness.outputs.benchmark.manifest import manifest
+from simharness.outputs.benchmark.layout import FORMAT, Layout, confidences, manifest
 from simharness.reality.annotation_errors import annotate_simulation
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_files import dumps, dumps_keys

@@ -1,7 +1,5 @@
 """Page of a plan, and the preview of a room before any search, each as one self-contained HTML file."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

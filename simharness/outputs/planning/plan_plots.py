@@ -1,7 +1,5 @@
 """Plots of a plan: the room from above and from the side, figures at each place, fewer and more cameras."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Page of a rehearsal as one self-contained HTML file, to print and to take to the room."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -19,12 +17,12 @@ from simharness.outputs.planning.rehearsal_plots import (
     ellipse_map,
     floor_map,
     matching_curve,
+    rig_view_3d,
     simulated_map,
     subset_curve,
     tolerance_bottom,
     tolerance_curve,
 )
-from simharness.outputs.planning.rig_view_3d import rig_view_3d
 from simharness.planning.rehearsal_result import HEIGHTS, Estimated, ExtraCamera, Rehearsal
 from simharness.runtime.number_text import fixed, signed
 from simharness.statistics.intervals import Interval

@@ -13,8 +13,6 @@ How to add a figure:
 2. Add the name of the module to :data:`MODULES`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Headline scores of a summary: titles, units and number formats."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any

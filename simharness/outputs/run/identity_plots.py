@@ -1,11 +1,16 @@
-"""Identities of a run through time, and their plots as SVG: a time line of each person, and tracks from above."""
+"""Identities of a run through time, and their plots as SVG: a time line of each person, and tracks from above.
+
+Columns of the report's tables for variants with identities are here as well.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
@@ -14,10 +19,12 @@ from mvpose.arrays import Floats
 from mvpose.report.palette import UNMATCHED, css, identity_color
 from mvpose.report.recording_plots import BAR, draw_bar, half_step, label_ends, runs_of, thinned
 from mvpose.report.svg_plots import FAINT, INK, Color, legend_above, svg_plot
-from simharness.scoring.tracking.clear_mot import ABSENT, MISSED, ClearMot, clear_mot
+from simharness.outputs.run.headline import Column
+from simharness.scoring.catalogue import SCORES
 from simharness.scoring.tracking.identity_figures import DISTANCE
-from simharness.scoring.tracking.identity_scores import identity_scores
+from simharness.scoring.tracking.identity_scores import ABSENT, MISSED, ClearMot, clear_mot, identity_scores
 from simharness.scoring.tracking.tracked_frames import TrackedFrames, ids_of, roots, tracked_frames
+from simharness.trial.run_folder import Record
 
 _ROWS, _ROW = 3.4, (0.25, 0.55)  # height of all rows together, and least and greatest height of one, inches
 _MOST_GHOST_ROWS = 8
@@ -249,3 +256,66 @@ def _stretches(frames: NDArray[np.int64]) -> list[tuple[int, int]]:
 
 
 Labels = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class TrackedVariant:
+    """Plots of a variant with identities."""
+
+    variant: str
+    timeline: Markup
+    trajectories: Markup
+
+
+def tracked_variants(record: Record) -> list[TrackedVariant]:
+    """Return the plots of all variants that track people."""
+    truth = np.stack([true.joints for true in record.truth])
+    found = []
+    for number, (variant, estimates) in enumerate(record.estimates.items()):
+        identities = identities_of(truth, estimates, record.time)
+        if identities is not None:
+            drawn = (draw(f"{draw.__name__}-{number}", identities) for draw in (timeline, trajectories))
+            found.append(TrackedVariant(variant, *map(Markup, drawn)))
+    return found
+
+
+def _identity(key: str, scale: float = 1.0) -> Callable[[Mapping[str, Any]], float | None]:
+    """Return a function that reads a figure of identities at the distance of the columns from a summary."""
+
+    def value(scores: Mapping[str, Any]) -> float | None:
+        at = scores["tracking"]["mean_joint"]
+        figure = None if at is None else at[f"{DISTANCE:g}"][key]
+        return None if figure is None else scale * figure
+
+    return value
+
+
+def _jerk(scores: Mapping[str, Any]) -> float | None:
+    jerk = scores["tracking"]["jerk_m_s3"]
+    return jerk["estimate"] / jerk["truth"] if jerk["truth"] else None
+
+
+def has_identities(scores: Mapping[str, Any]) -> bool:
+    """Return whether a variant gives identities, from its summary."""
+    return (scores.get("tracking") or {}).get("mean_joint") is not None
+
+
+def _column(key: str, value: Callable[[Mapping[str, Any]], float | None]) -> Column:
+    info = SCORES[key]
+    return Column(info.title, info.unit, info.about, value, info.digits)
+
+
+IDENTITY_COLUMNS: tuple[Column, ...] = (
+    *(_column(key, _identity(key, 100.0)) for key in ("hota", "idf1")),
+    *(_column(key, _identity(key)) for key in ("id_switches", "switches_per_minute")),
+)
+"""Columns of the terminal, of variants with identities only."""
+
+TRACKING_COLUMNS: tuple[Column, ...] = (
+    *(_column(key, _identity(key, 100.0)) for key in ("hota", "deta", "assa", "idf1", "mota")),
+    *(_column(key, _identity(key)) for key in ("id_switches", "fragmentations")),
+    _column("pcp_tracked", lambda scores: scores["tracking"]["pcp_tracked"]),
+    _column("velocity_mm_s", lambda scores: scores["tracking"]["velocity_mm_s"]),
+    _column("jerk_ratio", _jerk),
+)
+"""Columns of the table of variants."""

@@ -1,7 +1,5 @@
 """Report of a run as one self-contained HTML file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -20,10 +18,9 @@ from simharness.outputs.blame_section import blame_section
 from simharness.outputs.run import plots, standard_figures
 from simharness.outputs.run.figures import draw_figures
 from simharness.outputs.run.headline import COLUMNS, WHOLE_BODY_COLUMNS, has_whole_body
-from simharness.outputs.run.pictures import PagePicture
-from simharness.outputs.run.run_film import RunFilm
+from simharness.outputs.run.identity_plots import TRACKING_COLUMNS, tracked_variants
+from simharness.outputs.run.pictures import PagePicture, RunFilm
 from simharness.outputs.run.standard_figures import person_errors, presence
-from simharness.outputs.run.tracked_people import TRACKING_COLUMNS, tracked_variants
 from simharness.scenario.toml_files import dumps
 from simharness.scoring.pairing import pair
 from simharness.scoring.pcp import GROUPS, Part

@@ -1,7 +1,5 @@
 """Plots of one run, as SVG."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

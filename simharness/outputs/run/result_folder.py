@@ -1,7 +1,5 @@
 """Run a scenario and write its result folder: data, report, pictures and film."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,15 +11,14 @@ import polars as pl
 from mvpose.commands.output_files import check_writable, make_folder
 from mvpose.commands.progress import Reporter, Silence, Stages
 from mvpose.files.atomic_files import atomic_folder
-from simharness.outputs.run.pictures import draw_pictures, outlines
-from simharness.outputs.run.run_film import filmed_frames, make_film
+from simharness.outputs.run.pictures import draw_pictures, filmed_frames, make_film, outlines
 from simharness.scenario.load import fingerprint
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES
 from simharness.scoring.score_summary import VariantScores, summarize
 from simharness.scoring.tracking.identity_figures import tracking_summary
 from simharness.scoring.tracking.tracked_frames import ids_of
-from simharness.study.causes.blame_file import write_blame
+from simharness.study.causes.blame_text import write_blame
 from simharness.study.causes.cause_shares import blame
 from simharness.trial.arrays import Arrays, estimate_arrays, whole_arrays
 from simharness.trial.needs import require_memory

@@ -1,7 +1,5 @@
 """Figures of the report of a run, and the sentences above its figures that say what they show."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

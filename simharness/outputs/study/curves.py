@@ -1,18 +1,27 @@
-"""Robustness curves of a study: scores against its factors, and their breaking points."""
+"""Robustness curves of a study: scores against its factors, and their breaking points.
 
-from __future__ import annotations
+On axes keys have plain names with units. Losses say where a study loses its score: along a factor, as numbers and as
+a sentence, and by cause in the worst setting.
+"""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
 import polars as pl
+from pydantic import BaseModel
 
 from mvpose.arrays import Floats
-from simharness.scoring.catalogue import SCORES
+from mvpose.commands.progress import Reporter
+from simharness.runtime.number_text import fixed
+from simharness.scenario.sections.scenario import Scenario
+from simharness.scoring.catalogue import SCORES, ScoreInfo
 from simharness.statistics.breaking_points import BreakingPoint, breaking_point
 from simharness.statistics.intervals import Interval, mean_interval
+from simharness.study.causes.cause_shares import Blame, blame
 from simharness.study.study_folder import Results
 
 
@@ -188,3 +197,198 @@ def factor_breaking_points(
         swept = (float(values[0]), float(values[-1]))
         points.append(FactorBreakingPoint(factor.key, variant, score, threshold, rising, point, swept))
     return points
+
+
+NAMES: Mapping[str, str] = MappingProxyType(
+    {
+        "cameras.count": "cameras",
+        "cameras.preset": "rig",
+        "cameras.spread": "angle from the first camera to the last",
+        "clutter.coverage": "share of hidden joints",
+        "detector.keypoints.quality": "factor of the profile's keypoint errors",
+        "detector.phantoms.life": "mean lifetime of a phantom",
+        "detector.phantoms.rate": "phantoms per view and frame",
+        "detector.profile": "detector profile",
+        "faults.center": "error of principal points",
+        "faults.clock_jitter": "error of each picture's time",
+        "faults.clock_offset": "error of each camera's clock",
+        "faults.dropped": "probability that a picture is lost",
+        "faults.focal": "error of focal lengths",
+        "faults.rolling_shutter": "time from the first row to the last",
+        "faults.rotation": "error of camera orientations",
+        "faults.rotation_drift": "drift of camera orientations",
+        "faults.translation": "error of camera positions",
+        "faults.translation_drift": "drift of camera positions",
+        "people.count": "people",
+        "people.hidden": "time hidden from all cameras",
+        "people.look_alike": "similarity of clothes, 1: one uniform",
+        "people.passing": "distance between people who pass",
+        "sensor.profile": "quality of the pictures",
+    }
+)
+"""Names of the keys that the studies of this project sweep: the descriptions of keys are too long for an axis."""
+
+_UNITS = (  # patterns in descriptions of keys, and the unit of each; the first match counts
+    (r"degrees per minute", "degrees per minute"),
+    (r"metres per minute", "m per minute"),
+    (r"degrees", "degrees"),
+    (r"metres", "m"),
+    (r"seconds|^s(?=,)", "s"),
+    (r"frames per second", "Hz"),
+    (r"pixels|^px(?=,)", "px"),
+    (r"newtons", "N"),
+    (r"stops", "stops"),
+    (r"relative", "relative"),
+)
+
+
+def axis_label(key: str) -> str:
+    """Return the axis label of a key: its name in :data:`NAMES`, else the key itself, with the unit of its values."""
+    unit = unit_of(key)
+    return f"{NAMES.get(key, key)}, {unit}" if unit else NAMES.get(key, key)
+
+
+def unit_of(key: str) -> str:
+    """Return the unit in the scenario's description of a dotted key; empty where the description has none."""
+    description = _description(key)
+    return next((unit for pattern, unit in _UNITS if re.search(rf"\b(?:{pattern})\b", description)), "")
+
+
+def _description(key: str) -> str:
+    """Return the description of a scenario key; empty for keys that are not in a scenario, such as a profile's name."""
+    section: object = Scenario
+    description = None
+    for part in key.split("."):
+        if not (isinstance(section, type) and issubclass(section, BaseModel)) or part not in section.model_fields:
+            return ""
+        field = section.model_fields[part]
+        section, description = field.annotation, field.description
+    return description or ""
+
+
+LOST = 5.0
+"""Points of a percentage whose loss is reported."""
+
+_ALIKE = 0.02  # relative difference of breaking points that one number describes
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What a factor costs one variant.
+
+    Attributes:
+        variant: name of the variant.
+        best, worst: values of the factor with the best and the worst mean score; of a numeric factor its two ends.
+        at_best, at_worst: the scores there.
+        point: value of a numeric factor at which :data:`LOST` points are lost against the best end, seed by seed; None
+            for other factors, and for scores that are no percentages.
+        rising: whether the score gets worse as the factor grows.
+    """
+
+    variant: str
+    best: Any
+    worst: Any
+    at_best: Interval
+    at_worst: Interval
+    point: BreakingPoint | None
+    rising: bool
+
+
+def losses(factor: Factor, variants: Sequence[str], score: str) -> list[Loss]:
+    """Return what a factor costs each variant; variants without the score at two values are left out."""
+    info = SCORES[score]
+    sign = 1.0 if info.better == "higher" else -1.0
+    found = []
+    for variant in variants:
+        table = factor.table(variant, score)
+        known = np.flatnonzero(np.isfinite(table).any(axis=0))
+        if len(known) < 2:
+            continue
+        means = sign * np.array([table[np.isfinite(table[:, k]), k].mean() for k in known])
+        if factor.numeric:
+            rising = bool(means[-1] <= means[0])
+            best, worst = (known[0], known[-1]) if rising else (known[-1], known[0])
+        else:
+            rising, best, worst = False, known[means.argmax()], known[means.argmin()]
+        point = None
+        if factor.numeric and info.unit == "%":
+            change = sign * (table - table[:, [best]])
+            _, point = breaking_along(np.array(factor.values, float), change, -LOST, better="higher", rising=rising)
+        at_best, at_worst = (mean_interval(table[:, k], unit=info.unit) for k in (best, worst))
+        found.append(Loss(variant, factor.values[best], factor.values[worst], at_best, at_worst, point, rising))
+    return found
+
+
+def finding(factor: Factor, variants: Sequence[str], score: str) -> str:
+    """Return what was found along a factor as a sentence without its full stop; empty without data."""
+    info, found = SCORES[score], losses(factor, variants, score)
+    if not found:
+        return ""
+    points = {each.variant: each.point for each in found if each.point is not None and each.point.value is not None}
+    if found[0].point is None or (found[0].at_best.mean == found[0].at_worst.mean and not points):
+        return _ends(found[0], info)
+    low, high = short(factor.values[0]), short(factor.values[-1])
+    if not points:
+        who = "No variant loses" if len(found) > 1 else f"{found[0].variant} does not lose"
+        return f"{who} {LOST:g} points of {info.title} between {low} and {high}"
+    side = {each.variant: "above" if each.rising else "below" for each in found}
+    spared = [each.variant for each in found if each.variant not in points]
+    head = f"{LOST:g} points of {info.title} are lost "
+    if len(found) == 1:
+        (variant,) = points
+        return f"{variant} loses {LOST:g} points of {info.title} {side[variant]} {short(points[variant].value)}"
+    return head + _listed(points, side) + (f"; not by {', '.join(spared)}" if spared else "")
+
+
+def _listed(points: Mapping[str, BreakingPoint], side: Mapping[str, str]) -> str:
+    """Return breaking points with their variants; variants with nearly the same point have one number."""
+    groups: list[tuple[str, float, list[str]]] = []
+    for variant, point in points.items():
+        value = float(point.value or 0.0)
+        for where, other, names in groups:
+            if where == side[variant] and abs(value - other) <= _ALIKE * max(abs(value), abs(other)):
+                names.append(variant)
+                break
+        else:
+            groups.append((side[variant], value, [variant]))
+    return ", ".join(f"{where} {short(value)} ({', '.join(names)})" for where, value, names in groups)
+
+
+def _ends(loss: Loss, info: ScoreInfo) -> str:
+    unit = f" {info.unit}" if info.unit else ""
+    one, other = (fixed(each.mean, info.digits) for each in (loss.at_best, loss.at_worst))
+    return f"{info.title} of {loss.variant}: {one}{unit} at {short(loss.best)}, {other}{unit} at {short(loss.worst)}"
+
+
+def short(value: Any) -> str:
+    """Return the text of a value of a factor with at most three digits."""
+    if value is None:
+        return "–"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def blame_study(results: Results, *, seeds: int, workers: int = 1, reporter: Reporter | None = None) -> Blame:
+    """Return what cost the first variant its PCP in the setting of the lowest PCP.
+
+    Args:
+        results: the study.
+        seeds: number of seeds, from the first of the study on.
+        workers: processes that share the seeds.
+        reporter: receiver of progress.
+
+    Raises:
+        ValueError: no trial finished, or the trial cannot be built any more.
+        RunError: any other error.
+    """
+    variant = next((name for name in results.info["variants"] if name in set(results.trials["variant"])), None)
+    rows = results.trials.filter((pl.col("variant") == variant) & pl.col("pcp").is_not_null())
+    if not len(rows):
+        raise ValueError(f"{results.folder}: no trial of this study finished, so that there is no score to explain")
+    keys = [*(("case",) if any(rows["case"]) else ()), *results.info["factors"]]
+    means = rows.group_by("case", *results.info["factors"], maintain_order=True).agg(
+        pl.col("pcp").mean(), pl.col("trial").first(), pl.col("seed").min()
+    )
+    worst = means.row(means["pcp"].arg_min(), named=True)
+    scenario = results.scenario_of(worst["trial"]).model_copy(update={"seed": worst["seed"]})
+    setting = ", ".join(f"{key} {worst[key]}" for key in keys)
+    return blame(scenario, variant=variant, seeds=seeds, setting=setting, workers=workers, reporter=reporter)

@@ -1,7 +1,5 @@
 """Report of a study as one self-contained HTML file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,19 +16,22 @@ from simharness.outputs.blame_section import blame_section
 from simharness.outputs.run.plots import stage_times
 from simharness.outputs.study import plots, tables
 from simharness.outputs.study.curves import (
+    LOST,
     Factor,
     FactorBreakingPoint,
+    Loss,
     factor_breaking_points,
     factors_by_case,
+    finding,
     grid,
+    losses,
     panels,
 )
-from simharness.outputs.study.failure_section import failure_section
-from simharness.outputs.study.losses import LOST, Loss, finding, losses
+from simharness.outputs.study.tables import failure_section
 from simharness.outputs.study.worst_frames import WorstFramePictures, show, worst_frames
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scoring.catalogue import SCORES
-from simharness.study.causes.blame_file import read_blame
+from simharness.study.causes.blame_text import read_blame
 from simharness.study.causes.cause_shares import Blame
 from simharness.study.study_folder import Results
 

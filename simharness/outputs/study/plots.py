@@ -1,7 +1,5 @@
 """Plots of a study, as SVG."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,7 +10,7 @@ from matplotlib.ticker import FuncFormatter
 
 from mvpose.arrays import Floats
 from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, svg_plot
-from simharness.outputs.study.factor_names import axis_label
+from simharness.outputs.study.curves import axis_label
 from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import ScoreInfo
 from simharness.statistics.intervals import Interval

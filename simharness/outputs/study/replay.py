@@ -1,7 +1,5 @@
 """Replay of a trial for pictures: scene, detections and estimates, which tables of scores do not hold."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,10 +1,8 @@
 """Export of a trial for the rerun viewer (https://rerun.io): truth and estimates in 3D and in the pictures."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,13 +11,10 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 from mvpose.report.limbs import COCO17_LIMBS
 from mvpose.report.palette import TRUTH, Color, person_color
+from simharness.capture.picture import ScenePictures
+from simharness.outputs.study.replay import Replay
 from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback
-
-if TYPE_CHECKING:
-    from simharness.capture.picture import ScenePictures
-    from simharness.outputs.study.replay import Replay
-
 
 _THICK, _THIN = 0.02, 0.006  # metres, radii of estimated and of true limbs
 _DOT = 3.0  # pixels, radius of a keypoint

@@ -4,8 +4,6 @@ Radii of bodies are about those of the median circumferences of men and women in
 averaged along each limb: they make a person of joints recognisable, and measure nothing.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.arrays import Floats

@@ -1,7 +1,5 @@
 """Worst frames of a study: selection, and pictures of their trials run again."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass

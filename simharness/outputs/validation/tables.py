@@ -1,7 +1,5 @@
 """Tables of the page of a validation: rows of text."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

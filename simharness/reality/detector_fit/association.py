@@ -4,9 +4,7 @@ Recordings have people who are not annotated. Detections of no annotated person 
 assigned to such people, and only the rest counts as false positives: an upper bound of their number.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,14 +127,7 @@ def _distances(keypoints: Floats, pixels: Floats, size: Floats) -> Floats:
 
 def _only(found: Detections, kept: Bools) -> Detections:
     """Return the detections (m,) that are ``kept``, without descriptors and heat maps."""
-    return Detections(
-        found.view[kept],
-        found.keypoints[kept],
-        found.scores[kept],
-        found.boxes[kept],
-        found.box_scores[kept],
-        found.skeleton,
-    )
+    return replace(found.select(kept), descriptors=None)
 
 
 def _padded(people: list[Floats]) -> Floats:

@@ -6,8 +6,6 @@ predicted from the other views alone (leave-one-out), and the noise of the predi
 all views share, a bias of the detector, cannot be seen in this way; it is found beside the annotation.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import combinations
 

@@ -10,8 +10,6 @@ Face: data sets do not annotate it. The bodies that re-enact a recording have fa
 is left between the two, on average, is how the detector's joints of the face differ from the landmarks of the bodies.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

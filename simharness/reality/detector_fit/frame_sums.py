@@ -1,7 +1,5 @@
 """Sums of each frame from which all parameters are estimated: a bootstrap resample costs one matrix product."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

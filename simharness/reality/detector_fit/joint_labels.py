@@ -4,8 +4,6 @@ Errors are measured against the consensus of the other views (:mod:`simharness.r
 hides what comes from the bodies that re-enact the people, as it will in a twin, or else from capsules about skeletons.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -16,8 +14,15 @@ from mvpose import Rig
 from mvpose.arrays import Bools, Floats
 from simharness.detector.draws import PARENT
 from simharness.detector.error_classes import MIRROR, classify, distinguishable, opposite_hits
-from simharness.detector.view_geometry import head_bearings, image_axes
-from simharness.detector.viewing_conditions import OUTSIDE, OVERLAP_MIN, VISIBLE, oks_units, overlaps
+from simharness.detector.viewing_conditions import (
+    OUTSIDE,
+    OVERLAP_MIN,
+    VISIBLE,
+    head_bearings,
+    image_axes,
+    oks_units,
+    overlaps,
+)
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.association import Association, associate
 from simharness.reality.detector_fit.consensus import Consensus, find_consensus

@@ -5,8 +5,6 @@ near side is in front of it; for a bone of the same person, in front by more tha
 unknown, so joints that they hide count as visible.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -4,8 +4,6 @@ Every function takes sums of R resamples, arrays (R, ...), and returns parameter
 parameters are named as the keys of ``[detector]``.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import expit, logit, ndtr
 

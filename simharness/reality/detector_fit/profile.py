@@ -1,7 +1,5 @@
 """Detector profile from a measurement: a file of [detector] parameters with intervals and notes on their source."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterator, Mapping
 from typing import Any

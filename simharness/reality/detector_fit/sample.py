@@ -1,7 +1,5 @@
 """Input of a measurement, recorded or simulated: people whose places are known, and the detections of a detector."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,6 +98,6 @@ def sample_of(recording: AnnotatedRecording, people: People, film: FilmedRecordi
         recording.detections,
         recording.kind,
         staged=None if film is None else film.joints,
-        occlusion=None if film is None else Conditions.of(film.views).occlusion,
+        occlusion=None if film is None else Conditions.of_views(film.views).occlusion,
         measured=measured if measured.any() else None,
     )

@@ -6,8 +6,6 @@ pairs this is the expected number of joint occurrences; the estimate is the rho 
 (the tetrachoric correlation, one value for many pairs of probabilities).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri

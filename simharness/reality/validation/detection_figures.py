@@ -4,8 +4,6 @@ They need no estimates of the method. Each is a ratio of sums over frames, so th
 or the variation of bone lengths.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, cast

@@ -12,8 +12,7 @@ from scipy.stats import rankdata
 
 from mvpose.arrays import Floats
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.validation.passes import RecordingChange, Tallies
-from simharness.reality.validation.score_sums import ScoreSums
+from simharness.reality.validation.passes import RecordingChange, ScoreSums, Tallies
 from simharness.statistics.intervals import Interval, mean_interval
 from simharness.statistics.resampling import block_weights, interval
 
@@ -87,7 +86,7 @@ class Evidence:
     twins: tuple[Sums, ...]
 
     @classmethod
-    def of(
+    def of_tallies(
         cls,
         recording: AnnotatedRecording,
         real: Mapping[RecordingChange, Tallies],

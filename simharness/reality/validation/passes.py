@@ -2,22 +2,122 @@
 
 One pass estimates every annotated frame of one changed recording by all variants. A validation is a list of passes,
 which processes share.
+
+Sums of their scores over frames give the figures of a recording, and of its bootstrap resamples.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Protocol
 
 import numpy as np
 
 from mvpose import preset
+from mvpose.arrays import Floats
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.validation.score_sums import ScoreSums
 from simharness.runtime.frame_pool import map_frames
-from simharness.scoring.frame_scores import ByRule, score_by_rules
+from simharness.scoring.frame_scores import RULES, ByRule, HeadRule, score_by_rules
+from simharness.scoring.pcp import Part
+from simharness.statistics.resampling import resampled
 from simharness.trial.conditioned_trial import estimate_frames
+
+DEFAULT_RULE = RULES[0]
+
+
+@dataclass(frozen=True)
+class ScoreSums:
+    """Sums of a variant's scores over frames, by the H rules of ``RULES``.
+
+    The leading axes (...) are the frames, the resamples of a bootstrap, or absent.
+
+    Attributes:
+        correct: number of correct parts of each scored actor, (..., H, S).
+        defined: number of parts that the truth defines, (..., H, S).
+        error: sum over pairs of the MPJPE, (..., H), mm.
+        found: number of pairs of true and estimated people, (..., H).
+        people: number of annotated people, (...).
+        estimates: number of estimates, (...).
+        frames: number of frames, (...).
+    """
+
+    correct: Floats
+    defined: Floats
+    error: Floats
+    found: Floats
+    people: Floats
+    estimates: Floats
+    frames: Floats
+
+    @classmethod
+    def of_scores(cls, scores: ByRule, actors: Sequence[int]) -> ScoreSums:
+        """Return the sums of each frame alone.
+
+        Args:
+            scores: scores of F frames by rule.
+            actors: indices of the S actors whose PCP is averaged.
+        """
+        by_rule = [scores[rule] for rule in RULES]
+        first = by_rule[0]  # who is there, and how many estimates, does not depend on the rule
+        parts = np.stack([each.parts[:, list(actors)] for each in by_rule], axis=1)
+        error = np.stack([np.where(each.found, each.error, 0.0) for each in by_rule])
+        return cls(
+            correct=(parts == Part.CORRECT).sum(axis=-1, dtype=float),
+            defined=(parts != Part.UNDEFINED).sum(axis=-1, dtype=float),
+            error=1000.0 * error.sum(axis=-1).T,
+            found=np.stack([each.found.sum(axis=-1, dtype=float) for each in by_rule], axis=-1),
+            people=first.present.sum(axis=-1, dtype=float),
+            estimates=first.estimates.astype(float),
+            frames=np.ones(len(first)),
+        )
+
+    def total(self) -> ScoreSums:
+        """Return the sums over the first axis."""
+        return ScoreSums(*(getattr(self, field.name).sum(axis=0) for field in fields(self)))
+
+    def resampled(self, weights: Floats) -> ScoreSums:
+        """Return the sums of R resamples of F frames, from :func:`~simharness.statistics.resampling.block_weights`."""
+        return ScoreSums(*(resampled(getattr(self, field.name), weights) for field in fields(self)))
+
+    def pcp(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
+        """Return PCP, percent (...), mean over the scored actors who are annotated in some frame."""
+        at = RULES.index(rule)
+        return _mean(100.0 * _ratio(self.correct[..., at, :], self.defined[..., at, :]))
+
+    def pcp_actors(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
+        """Return PCP of each scored actor, percent (..., S)."""
+        at = RULES.index(rule)
+        return 100.0 * _ratio(self.correct[..., at, :], self.defined[..., at, :])
+
+    def mpjpe(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
+        """Return the mean over pairs of the mean joint error, mm (...)."""
+        at = RULES.index(rule)
+        return _ratio(self.error[..., at], self.found[..., at])
+
+    def recall(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
+        """Return the share of annotated people with a pair, 0 to 1 (...)."""
+        return _ratio(self.found[..., RULES.index(rule)], self.people)
+
+    def precision(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
+        """Return the share of estimates with a pair, 0 to 1 (...)."""
+        return _ratio(self.found[..., RULES.index(rule)], self.estimates)
+
+    def ghosts(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
+        """Return the number of estimates without a pair, per frame (...)."""
+        return _ratio(self.estimates - self.found[..., RULES.index(rule)], self.frames)
+
+
+def _ratio(numerator: Floats, denominator: Floats) -> Floats:
+    """Return the ratio; NaN where the denominator is 0."""
+    return np.where(denominator > 0, numerator / np.where(denominator > 0, denominator, 1.0), np.nan)
+
+
+def _mean(values: Floats) -> Floats:
+    """Return the mean over the last axis without NaN; NaN where all are NaN."""
+    known = np.isfinite(values)
+    return _ratio(np.where(known, values, 0.0).sum(axis=-1), known.sum(axis=-1).astype(float))
+
 
 VARIANTS = ("full", "fast", "no-3dps", "no-matching")
 """Presets of :class:`mvpose.Pipeline` that a validation compares."""
@@ -152,5 +252,6 @@ class _Passes:
         for index in frames:
             change, recording = divmod(index, len(self.recordings))
             changed = self.changes[change](self.recordings[recording])
-            done.append({name: ScoreSums.of(frame_scores(changed, name), changed.scored) for name in self.variants})
+            scores = {name: frame_scores(changed, name) for name in self.variants}
+            done.append({name: ScoreSums.of_scores(each, changed.scored) for name, each in scores.items()})
         return done

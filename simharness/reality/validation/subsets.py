@@ -1,7 +1,5 @@
 """Subsets of the cameras of a rig, and the PCP that a variant reaches with so many cameras."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter

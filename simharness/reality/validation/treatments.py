@@ -4,8 +4,6 @@ Draws are keyed by treatment, frame and view, never by the recording, so that re
 and by neither level nor share, so that a higher level adds to the errors of a lower one. A level of 0 changes nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -232,17 +230,8 @@ def _moved(detections: Detections, place: Floats, size: Floats, *, mirrored: boo
 
 
 def _kept(detections: Detections, which: Bools | int) -> Detections:
-    """Return some detections, by mask or index, without heat maps."""
-    rows = np.atleast_1d(np.arange(len(detections))[which])
-    return Detections(
-        detections.view[rows],
-        detections.keypoints[rows],
-        detections.scores[rows],
-        detections.boxes[rows],
-        detections.box_scores[rows],
-        detections.skeleton,
-        None if detections.descriptors is None else detections.descriptors[rows],
-    )
+    """Return some detections, by mask or index, without heat maps and times."""
+    return replace(detections.select(np.atleast_1d(which)), time=None)
 
 
 def _joined(frames: list[Detections]) -> Detections:

@@ -1,23 +1,17 @@
 """Results of a validation, ready for JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mvpose import SHELF14
 from simharness.reality.validation.detection_figures import AFFINITY_EDGES
-from simharness.reality.validation.dose import DoseResponse
 from simharness.reality.validation.evidence import Compared, number
 from simharness.reality.validation.subsets import SubsetComparison
-from simharness.reality.validation.validation import Validation
-from simharness.reality.validation.variant_comparison import SCORES
+from simharness.reality.validation.validation import HalfPrediction, Validation
+from simharness.reality.validation.variant_comparison import SCORES, DoseResponse
 from simharness.reality.validation.verdicts import BoundVerdict, VerdictState
 from simharness.scoring.frame_scores import RULES, HeadRule
 from simharness.statistics.intervals import Interval
-
-if TYPE_CHECKING:
-    from simharness.reality.validation.unseen_prediction import HalfPrediction
 
 _SIDES = ("real", "twin")
 

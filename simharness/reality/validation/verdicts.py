@@ -5,8 +5,6 @@ Three states: a figure within its bound *holds*. One outside *fails*, unless the
 of recording and twins.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -15,10 +13,10 @@ import numpy as np
 
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.validation.detection_figures import BONES, TREE
-from simharness.reality.validation.dose import DoseResponse
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.subsets import SubsetComparison
 from simharness.reality.validation.treatments import KINDS
+from simharness.reality.validation.variant_comparison import DoseResponse
 from simharness.scoring.frame_scores import HeadRule
 from simharness.statistics.intervals import Interval
 

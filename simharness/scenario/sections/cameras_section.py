@@ -1,7 +1,5 @@
 """[cameras], [faults] and [sensor]: the rig, its faults, and the quality of its pictures."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """[method]: the variants under test, presets of ``mvpose.Pipeline`` and user-defined estimators."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterator

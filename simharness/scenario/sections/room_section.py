@@ -1,7 +1,5 @@
 """[room], [clutter] and [decoys]: the room and the objects in it."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator

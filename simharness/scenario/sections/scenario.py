@@ -3,8 +3,6 @@
 Metres and seconds as everywhere. Angles are in degrees here, because people write and read these files.
 """
 
-from __future__ import annotations
-
 from functools import reduce
 from pathlib import Path
 from typing import Literal

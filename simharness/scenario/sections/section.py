@@ -1,7 +1,5 @@
 """Base class and value types of all sections of a scenario file."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

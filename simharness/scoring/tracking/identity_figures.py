@@ -2,22 +2,18 @@
 ``summary.json`` at every distance and place. A figure that does not apply is None.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mvpose import COCO17, SHELF14, Estimate
 from mvpose.arrays import Floats
 from mvpose.skeleton import HeadMapping, coco17_to_shelf14
 from simharness.scoring.pairing import pair
-from simharness.scoring.score_registry import ScoreInfo, ScoreInput, scores
-from simharness.scoring.tracking.clear_mot import clear_mot
-from simharness.scoring.tracking.hota import hota
-from simharness.scoring.tracking.identity_scores import identity_scores, pose_figures
-from simharness.scoring.tracking.motion_scores import rms_jerk, velocity_error
+from simharness.scoring.score_registry import ScoreInfo, ScoreInput, finite_mean, score, scores
+from simharness.scoring.tracking.identity_scores import clear_mot, hota, identity_scores, pose_figures
 from simharness.scoring.tracking.tracked_frames import DISTANCES, PLACES, TrackedFrames, ids_of, tracked_frames
 
 Figures = dict[str, float | None]
@@ -170,3 +166,95 @@ def tracking_of_some(
         found[place] = {key: {name: each[name] for name in OF_SOME_PEOPLE} for key, each in figures.items()}
     frames = tracked_frames(truth, joints, ids, skeleton=SHELF14)
     return found | pose_figures(frames, truth, joints, distance=DISTANCE, actors=actors)
+
+
+def velocity(positions: ArrayLike, time: ArrayLike) -> Floats:
+    """Return the velocities between frames, (T - 1, ..., 3), m/s; NaN where one of two positions is missing.
+
+    Args:
+        positions: positions over time, (T, ..., 3), metres; NaN where missing.
+        time: times of the frames, (T,), seconds, increasing.
+    """
+    return _slopes(np.asarray(positions, float), np.asarray(time, float), 1)
+
+
+def jerk(positions: ArrayLike, time: ArrayLike) -> Floats:
+    """Return the third derivative of positions, (T - 3, ..., 3), m/s³; NaN where one of four positions is missing.
+
+    It is six times the third divided difference: exact for cubic motion, at any times.
+
+    Args:
+        positions: positions over time, (T, ..., 3), metres; NaN where missing.
+        time: times of the frames, (T,), seconds, increasing.
+    """
+    positions, time = np.asarray(positions, float), np.asarray(time, float)
+    for order in (1, 2, 3):
+        positions = order * _slopes(positions, time, order)
+    return positions
+
+
+def velocity_error(truth: ArrayLike, estimate: ArrayLike, time: ArrayLike) -> float | None:
+    """Return the mean length of the difference of velocities, m/s; None without two frames in a row.
+
+    Args:
+        truth: true positions, (T, ..., 3), metres; NaN where undefined.
+        estimate: estimated positions, (T, ..., 3), metres; NaN where missing.
+        time: times of the frames, (T,), seconds, increasing.
+    """
+    return finite_mean(np.linalg.norm(velocity(estimate, time) - velocity(truth, time), axis=-1))
+
+
+def rms_jerk(truth: ArrayLike, estimate: ArrayLike, time: ArrayLike) -> tuple[float, float] | None:
+    """Return the RMS of the jerk of the estimate and of the truth, m/s³, where both are known in four frames in a row.
+
+    Args:
+        truth: true positions, (T, ..., 3), metres; NaN where undefined.
+        estimate: estimated positions, (T, ..., 3), metres; NaN where missing.
+        time: times of the frames, (T,), seconds, increasing.
+
+    Returns:
+        Both, or None without four such frames.
+    """
+    squares = [(jerk(each, time) ** 2).sum(axis=-1) for each in (estimate, truth)]
+    both = np.isfinite(squares).all(axis=0)
+    if not both.any():
+        return None
+    found, true = (float(np.sqrt(each[both].mean())) for each in squares)
+    return found, true
+
+
+_STILL = 1e-3  # m/s³, a thousandth of a slow walk's: positions of nobody who moves differ by rounding alone
+
+
+def jerk_ratio(truth: ArrayLike, estimate: ArrayLike, time: ArrayLike) -> float | None:
+    """Return the RMS jerk of the estimate over that of the truth; None without four frames, or if nobody moves.
+
+    The arguments are those of :func:`rms_jerk`.
+    """
+    rms = rms_jerk(truth, estimate, time)
+    return rms[0] / rms[1] if rms and rms[1] > _STILL else None
+
+
+_VELOCITY = "mean error of the velocity of joints of people found, from frame to frame"
+
+
+@score(ScoreInfo("velocity_mm_s", "Velocity error", "mm/s", _VELOCITY, "lower", 0))
+def velocity_column(given: ScoreInput) -> float | None:
+    """Return the mean error of velocities, mm/s."""
+    error = velocity_error(given.truth, given.paired, given.recording.time)
+    return None if error is None else 1000.0 * error
+
+
+_JERK = "RMS jerk of joints of people found over that of the truth; 1 is as smooth as people are"
+
+
+@score(ScoreInfo("jerk_ratio", "Jerk", "", _JERK, "lower", 2, target=1.0))
+def jerk_column(given: ScoreInput) -> float | None:
+    """Return the ratio of the jerk of the estimates to that of the truth."""
+    return jerk_ratio(given.truth, given.paired, given.recording.time)
+
+
+def _slopes(values: Floats, time: Floats, apart: int) -> Floats:
+    """Return the differences of values over the time between frames that are ``apart``, (n - 1, ...)."""
+    steps = time[apart:] - time[:-apart]
+    return np.diff(values, axis=0) / steps.reshape(-1, *[1] * (values.ndim - 1))

@@ -1,12 +1,26 @@
-"""IDF1, IDP and IDR, and the identity of each true person (Ristani et al., ECCV workshops 2016).
+"""Scores of identities: IDF1, CLEAR MOT and HOTA. Ours are the numbers of ``trackeval``.
 
-Over the whole sequence each true person gets at most one identity, and each identity at most one person, so that the
-estimate of a person's identity is within the distance in as many frames as possible. Every other frame of a person is
-missed, and every other estimate is false: a person whose identity changes halfway is missed half of the time. Joints,
-PCP and MPJPE of people under their identities count alike: an estimate under another identity is missed, however near.
+IDF1, IDP and IDR, and the identity of each true person (Ristani et al., ECCV workshops 2016): over the whole sequence
+each true person gets at most one identity, and each identity at most one person, so that the estimate of a person's
+identity is within the distance in as many frames as possible. Every other frame of a person is missed, and every other
+estimate is false: a person whose identity changes halfway is missed half of the time. Joints, PCP and MPJPE of people
+under their identities count alike: an estimate under another identity is missed, however near.
+
+HOTA: higher order tracking accuracy (Luiten et al., IJCV 2021), with its parts DetA, AssA and LocA. At each of 19
+thresholds of similarity, 0.05 to 0.95, people and estimates of a frame are paired one to one. DetA is the Jaccard index
+of people and estimates, ``TP / (TP + FN + FP)``. AssA is the mean over all pairs, each of a person and an identity, of
+the Jaccard index of the frames of both; frames where they are paired are common. HOTA is the geometric mean of DetA and
+AssA, and LocA the mean similarity of pairs. Scores are means over the thresholds. The pairs of a frame maximise the
+similarity, weighted by how well the whole tracks of the two agree (section 4.4 of the paper). Without any pair at a
+threshold LocA is 1 there, and without any estimate, or any person, HOTA is 0.
+
+CLEAR MOT: MOTA, identity switches and fragmentations (Bernardin & Stiefelhagen, EURASIP JIVP 2008). In each frame
+people and estimates within the distance are paired one to one: pairs of the frame before are kept, and else the sum of
+similarities is largest. A person's identity switches where it is paired with another identity than the last time,
+however long ago that was. A track is fragmented where a person is paired again after frames without a pair. Frames
+without any person or without any estimate are passed over, so that a gap of all people at once is no fragmentation; and
+a person who was absent and comes back starts a fragment as one who was missed does.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,6 +37,7 @@ from simharness.scoring.score_registry import finite_mean
 from simharness.scoring.tracking.tracked_frames import TrackedFrames
 
 _THRESHOLD = 0.5  # of similarity: the estimate is within the distance
+_EPSILON = float(np.finfo(float).eps)  # a similarity at the threshold counts
 
 
 @dataclass(frozen=True)
@@ -135,3 +150,155 @@ def pose_figures(
         "pcp_tracked": finite_mean(np.array(shares, float)),
         "mpjpe_tracked_mm": finite_mean(of_person[known.any(axis=-1)]),
     }
+
+
+THRESHOLDS: Floats = np.arange(0.05, 0.99, 0.05)
+"""Thresholds of similarity, (19,)."""
+
+
+@dataclass(frozen=True)
+class Hota:
+    """HOTA and its parts at each of the 19 thresholds, all 0 to 1 and (19,).
+
+    Attributes:
+        detection: DetA.
+        association: AssA.
+        location: LocA.
+        pairs: number of pairs, TP.
+    """
+
+    detection: Floats
+    association: Floats
+    location: Floats
+    pairs: NDArray[np.int64]
+
+    @property
+    def hota(self) -> Floats:
+        """HOTA at each threshold."""
+        return np.sqrt(self.detection * self.association)
+
+
+def hota(frames: TrackedFrames, *, distance: float) -> Hota:
+    """Return HOTA of estimated identities.
+
+    Args:
+        frames: people and identities.
+        distance: distance at which the similarity is 0.5, metres.
+    """
+    people, tracks = frames.frames_of_people, frames.frames_of_tracks
+    similarities = frames.similarities(distance)
+    agreement = _agreement(frames, similarities)
+    joint = np.zeros((len(THRESHOLDS), frames.people, len(frames.ids)))  # frames in which both are paired
+    similarity_sum = np.zeros(len(THRESHOLDS))
+    for present, track, similarity in zip(frames.present, frames.tracks, similarities, strict=True):
+        rows, columns = linear_sum_assignment(-agreement[np.ix_(present, track)] * similarity)
+        paired = similarity[rows, columns] >= THRESHOLDS[:, None] - _EPSILON
+        joint[:, present[rows], track[columns]] += paired
+        similarity_sum += paired @ similarity[rows, columns]
+    pairs = joint.sum(axis=(1, 2))
+    either = people[:, None] + tracks - joint
+    association = (joint * joint / np.maximum(1.0, either)).sum(axis=(1, 2)) / np.maximum(1.0, pairs)
+    return Hota(
+        detection=pairs / np.maximum(1.0, people.sum() + tracks.sum() - pairs),
+        association=association,
+        location=np.maximum(1e-10, similarity_sum) / np.maximum(1e-10, pairs),
+        pairs=pairs.astype(np.int64),
+    )
+
+
+def _agreement(frames: TrackedFrames, similarities: list[Floats]) -> Floats:
+    """Return the soft Jaccard index of the tracks of each person and identity, before any pairs are made, (P, K)."""
+    shared = np.zeros((frames.people, len(frames.ids)))
+    for present, track, similarity in zip(frames.present, frames.tracks, similarities, strict=True):
+        total = similarity.sum(axis=0) + similarity.sum(axis=1, keepdims=True) - similarity
+        share = np.divide(similarity, total, out=np.zeros_like(similarity), where=total > _EPSILON)
+        shared[np.ix_(present, track)] += share
+    return shared / (frames.frames_of_people[:, None] + frames.frames_of_tracks - shared)
+
+
+ABSENT, MISSED = -2, -1
+"""Entries of :attr:`ClearMot.track` without a pair."""
+
+_KEPT = 1000.0  # weight of a pair of the frame before: more than all similarities of a frame
+
+
+@dataclass(frozen=True)
+class ClearMot:
+    """Pairs of people and identities in each frame, and what they count.
+
+    Attributes:
+        track: index into ``TrackedFrames.ids`` of the identity that each true person is paired with, (T, P);
+            :data:`MISSED` where it has none, :data:`ABSENT` where the person is not there.
+        switched: where a person's identity is another one than the last time, (T, P).
+        fragmentations: how often people are paired again after frames without a pair.
+        missed: number of people without a pair in all frames.
+        false: number of estimates without a pair in all frames.
+    """
+
+    track: NDArray[np.int64]
+    switched: NDArray[np.bool_]
+    fragmentations: int
+    missed: int
+    false: int
+
+    @property
+    def switches(self) -> int:
+        """Number of identity switches."""
+        return int(self.switched.sum())
+
+    @property
+    def interruptions(self) -> int:
+        """Number of times that a person is paired again after frames in which it was there without a pair.
+
+        Unlike :attr:`fragmentations`, times of absence do not interrupt a track, and those without any estimate do.
+        """
+        count = 0
+        for person in self.track.T:
+            paired = person[person != ABSENT] >= 0
+            count += int((np.diff(np.flatnonzero(paired)) > 1).sum())
+        return count
+
+    @property
+    def mota(self) -> float:
+        """MOTA, at most 1: 1 - (missed + false + switches) / people; 0 without people or without estimates."""
+        pairs = int((self.track >= 0).sum())
+        people = pairs + self.missed
+        return (pairs - self.false - self.switches) / people if people and pairs + self.false else 0.0
+
+
+def clear_mot(frames: TrackedFrames, *, distance: float) -> ClearMot:
+    """Return the pairs of people and identities of each frame.
+
+    Args:
+        frames: people and identities.
+        distance: largest distance of a pair, metres.
+    """
+    track = np.full((len(frames), frames.people), ABSENT)
+    switched = np.zeros(track.shape, bool)
+    before, last = np.full((2, frames.people), MISSED)  # identity in the frame before, and in the last frame with one
+    fragments = np.zeros(frames.people, np.int64)
+    for frame, (present, tracks, similarity) in enumerate(
+        zip(frames.present, frames.tracks, frames.similarities(distance), strict=True)
+    ):
+        track[frame, present] = MISSED
+        if not similarity.size:
+            continue
+        weight = np.where(tracks == before[present, None], _KEPT + similarity, similarity)
+        weight[similarity < _THRESHOLD - _EPSILON] = 0.0
+        rows, columns = linear_sum_assignment(weight, maximize=True)
+        paired = weight[rows, columns] > 0.0
+        people, identities = present[rows[paired]], tracks[columns[paired]]
+        switched[frame, people] = (last[people] >= 0) & (last[people] != identities)
+        fragments[people] += before[people] < 0
+        last[people] = identities
+        before[:] = MISSED
+        before[people] = identities
+        track[frame, people] = identities
+    pairs = int((track >= 0).sum())
+    return ClearMot(
+        track=track,
+        switched=switched,
+        fragmentations=int(np.maximum(fragments - 1, 0).sum()),
+        missed=int(frames.frames_of_people.sum()) - pairs,
+        false=int(frames.frames_of_tracks.sum()) - pairs,
+    )

@@ -1,9 +1,12 @@
-"""Sentences and numbers of a blame, for pages and terminals."""
+"""Sentences, numbers and files of a blame, for pages, terminals and result folders."""
 
-from __future__ import annotations
+import json
+from pathlib import Path
 
 import numpy as np
 
+from mvpose.files.atomic_files import write_atomic
+from mvpose.files.input_files import read_json_object
 from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval
@@ -77,3 +80,27 @@ def _ends(interval: Interval, digits: int) -> str:
 
 def _minus(number: str) -> str:
     return number.replace("-", "−")
+
+
+FILE = "blame.json"
+"""Name of the file in a result folder."""
+
+
+def write_blame(found: Blame, folder: Path) -> None:
+    """Write the file into a result folder."""
+    write_atomic(folder / FILE, (json.dumps(found.json(), indent=1, allow_nan=False) + "\n").encode())
+
+
+def read_blame(folder: Path) -> Blame | None:
+    """Read the file of a result folder; None where it has none.
+
+    Raises:
+        ValueError: a damaged file.
+    """
+    path = folder / FILE
+    if not path.is_file():
+        return None
+    try:
+        return Blame.of_json(read_json_object(path, what="what cost the score"))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}; remove it, or write it again with --blame") from None

@@ -31,8 +31,7 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import SCALES, Interval, Scale, mean_interval
 from simharness.statistics.shapley import joining_orders, shapley_values, smallest_coalition, values_over_orders
-from simharness.study.causes.cause_catalogue import CAUSES, Cause, causes_by_name, present_causes
-from simharness.study.causes.mended_trial import MendedTrial
+from simharness.study.causes.cause_catalogue import CAUSES, Cause, MendedTrial, causes_by_name, present_causes
 from simharness.trial.conditioned_trial import takes_labels
 from simharness.trial.run_trial import with_variants
 from simharness.trial.stages.build_trial import build_variants

@@ -1,7 +1,5 @@
 """Build stage: build and check everything that a scenario describes, before any other stage runs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

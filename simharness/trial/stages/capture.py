@@ -1,25 +1,22 @@
 """Capture stage: the pictures and visibility of every camera, frame by frame, in any process."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from mvpose.arrays import Floats
-    from mvpose.skeleton import Skeleton
-    from simharness.capture.filming import Observer
-    from simharness.capture.outer_views import OuterJointFilm
-    from simharness.capture.picture import ScenePictures
-    from simharness.capture.rendering.renderer import Renderer
-    from simharness.capture.rendering.renderer_names import RendererName
-    from simharness.scenario.sections.scenario import Scenario
-    from simharness.types.outer_joints import OuterViews
-    from simharness.types.views import Views
-    from simharness.world.rigs.exposure_schedule import ExposureSchedule
-    from simharness.world.scene.build import Scene
-    from simharness.world.scene.playback import Playback
+from mvpose.arrays import Floats
+from mvpose.skeleton import Skeleton
+from simharness.capture.filming import Observer, PictureObserver, film
+from simharness.capture.outer_views import OuterJointFilm
+from simharness.capture.picture import ScenePictures
+from simharness.capture.ray_visibility import RayObserver
+from simharness.capture.rendering.raster import RendererName, make_renderer
+from simharness.capture.rendering.renderer import Renderer
+from simharness.scenario.sections.scenario import Scenario
+from simharness.types.outer_joints import OuterViews
+from simharness.types.views import Views
+from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.scene.build import Scene
+from simharness.world.scene.playback import Playback
 
 
 @dataclass(frozen=True)
@@ -42,8 +39,6 @@ class CaptureFrames:
 
     def __call__(self, frames: range) -> Views:
         """Return the views of these frames."""
-        from simharness.capture.filming import film
-
         return film(
             self._playback,
             self.exposures,
@@ -56,8 +51,6 @@ class CaptureFrames:
     @functools.cached_property
     def _playback(self) -> Playback:
         """The playback of the scene in this process."""
-        from simharness.world.scene.playback import Playback
-
         return Playback(self.scene)
 
     @functools.cached_property
@@ -91,17 +84,11 @@ class FilmOuterJoints:
     @functools.cached_property
     def _film(self) -> OuterJointFilm:
         """The film of this process."""
-        from simharness.capture.outer_views import OuterJointFilm
-        from simharness.world.scene.playback import Playback
-
         return OuterJointFilm(Playback(self.scene), self.skeleton)
 
 
 def observer_of(scenario: Scenario, playback: Playback) -> Observer:
     """Return the method by which a scenario determines visibility: rendered pictures or cast rays."""
-    from simharness.capture.filming import PictureObserver
-    from simharness.capture.ray_visibility import RayObserver
-
     if scenario.rendering.renderer == "rays":
         return RayObserver(playback)
     return PictureObserver(playback, renderer_of(scenario.rendering.renderer))
@@ -109,8 +96,6 @@ def observer_of(scenario: Scenario, playback: Playback) -> Observer:
 
 def picture_source_of(scenario: Scenario, playback: Playback) -> ScenePictures:
     """Return the source of a scenario's colour pictures; the rasteriser where the scenario itself renders none."""
-    from simharness.capture.picture import ScenePictures
-
     name = "raster" if scenario.rendering.renderer == "rays" else scenario.rendering.renderer
     return ScenePictures(playback, renderer_of(name), sensor=scenario.sensor, seed=scenario.seed)
 
@@ -121,6 +106,4 @@ def renderer_of(name: RendererName) -> Renderer:
 
     Each renderer is made once, because two GL contexts cannot share a scene, and shaders need to be loaded only once.
     """
-    from simharness.capture.rendering.renderer_names import make_renderer
-
     return make_renderer(name)

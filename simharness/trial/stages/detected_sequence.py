@@ -1,7 +1,5 @@
 """Detections of a trial, which the method is given, with their truth."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

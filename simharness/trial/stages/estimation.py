@@ -4,24 +4,19 @@ Variants without memory share the frames among all processes, in any order. A va
 (:class:`mvpose.estimators.SequenceEstimator`) gets all frames in order in one process, beside the others.
 """
 
-from __future__ import annotations
-
 import contextlib
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from mvpose import Detections, Estimate, Rig
 from mvpose.commands.errors import RunError, naming_frame
 from mvpose.commands.progress import Stages
 from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.presets import PRESETS, READ_HEATMAPS, without_repair
+from simharness.detector.detect import Detected
 from simharness.runtime.frame_pool import chunks_of, map_jobs
-
-if TYPE_CHECKING:
-    from simharness.detector.detect import Detected
-    from simharness.trial.stages.detected_sequence import DetectedSequence
+from simharness.trial.stages.detected_sequence import DetectedSequence
 
 
 @dataclass(frozen=True)

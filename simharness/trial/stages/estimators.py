@@ -17,8 +17,6 @@ An estimator with memory, such as a tracker, has ``track(rig, frames)`` (:class:
 instead or as well: it yields one estimate for each frame, and gets all frames of a trial in order in one process.
 """
 
-from __future__ import annotations
-
 import difflib
 import functools
 import hashlib

@@ -1,20 +1,22 @@
 """Network stage: pose heads and re-ID networks that read the rendered pictures; models of their descriptors."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import numpy as np
+
+from mvpose.networks import PoseHead, ReId
+from mvpose.networks.crops import Images
+from mvpose.networks.reid import DEFAULT
+from simharness.detector.descriptors import DescriptorModel, DescriptorSettings
+from simharness.detector.detect import Detected
+from simharness.detector.error_classes import classify
+from simharness.detector.viewing_conditions import oks_units
+from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.capture import picture_source_of
-
-if TYPE_CHECKING:
-    from mvpose.networks import PoseHead, ReId
-    from simharness.detector.descriptors import DescriptorSettings
-    from simharness.detector.detect import Detected
-    from simharness.scenario.sections.scenario import Scenario
-    from simharness.world.rigs.exposure_schedule import ExposureSchedule
-    from simharness.world.scene.build import Scene
+from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.scene.build import Scene
+from simharness.world.scene.playback import Playback
 
 
 @dataclass(frozen=True)
@@ -40,9 +42,6 @@ class ReadFrames:
 
     def __call__(self, frames: range) -> list[Detected]:
         """Return the detections of these frames with the networks' keypoints and descriptors."""
-        from simharness.detector.network_readout import read_descriptors, read_keypoints
-        from simharness.world.scene.playback import Playback
-
         picture_source = picture_source_of(self.scenario, Playback(self.scene))
         head = pose_head(self.scenario) if self.scenario.detector.onnx else None
         network = re_id(self.scenario) if self.scenario.appearance.source == "pictures" else None
@@ -67,8 +66,6 @@ def pose_head(scenario: Scenario) -> PoseHead:
     Raises:
         ValueError: the file is no pose head; the message names the key.
     """
-    from mvpose.networks import PoseHead
-
     try:
         return PoseHead(scenario.detector.onnx, likelihoods=scenario.detector.heatmaps.size != "none")
     except ValueError as error:
@@ -81,8 +78,6 @@ def re_id(scenario: Scenario) -> ReId:
     Raises:
         ValueError: the file is no re-ID network; the message names the key.
     """
-    from mvpose.networks import ReId
-
     try:
         return ReId(scenario.appearance.network) if scenario.appearance.network else ReId()
     except ValueError as error:
@@ -97,12 +92,32 @@ def descriptor_settings(scenario: Scenario) -> DescriptorSettings | None:
     """
     if scenario.appearance.source != "drawn":
         return None
-    from mvpose.networks.reid import DEFAULT
-    from simharness.detector.descriptor_model import DescriptorModel
-    from simharness.detector.descriptors import DescriptorSettings
-
     try:
         model = DescriptorModel.of_network(Path(scenario.appearance.network or DEFAULT))
     except ValueError as error:
         raise ValueError(f"appearance.network: {error}") from None
     return DescriptorSettings(model, scenario.people.look_alike, scenario.people.alike)
+
+
+def read_keypoints(head: PoseHead, detected: Detected, images: Images) -> Detected:
+    """Return the same boxes and descriptors with the keypoints that a pose head reads, classified by distance.
+
+    Args:
+        head: a top-down head for COCO-17.
+        detected: simulated detections of one frame; everything except the boxes and their descriptors is replaced.
+        images: picture of each view, (h, w, 3) uint8, or None where none arrives.
+    """
+    boxes = detected.detections
+    read = head.detect(images, boxes.view, boxes.boxes, box_scores=boxes.box_scores)
+    truth = detected.truth
+    real = truth.person >= 0
+    shown = truth.boxes[boxes.view, truth.person]
+    target = np.where(real[:, None, None], truth.pixels[boxes.view, truth.person], np.nan)
+    error = classify(read.keypoints, target, oks_units(shown))
+    error[~real] = np.where(read.scores[~real] > 0, truth.error[~real], error[~real])
+    return Detected(replace(read, descriptors=boxes.descriptors), replace(truth, error=error))
+
+
+def read_descriptors(network: ReId, detected: Detected, images: Images) -> Detected:
+    """Return the same detections with the descriptors that a re-ID network reads in their boxes."""
+    return replace(detected, detections=network.describe(detected.detections, images))

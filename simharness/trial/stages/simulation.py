@@ -1,7 +1,5 @@
 """Simulation of a built trial: true poses, what the cameras record, and detections."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ on head and shoulders, nor on how their hair is cut or tied.
 Straps of bags are taut: they lie on the convex hull of the trunk in a plane, and move with the skin below them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

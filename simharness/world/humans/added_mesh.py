@@ -107,7 +107,7 @@ class FacePoints:
     scalp: Floats
 
     @classmethod
-    def of(cls, body: Body) -> FacePoints:
+    def of_body(cls, body: Body) -> FacePoints:
         """Find the places on a dressed or bare body."""
         at = {name: body.keypoints[LANDMARKS.index(name), :, :3].sum(axis=0) for name in _NAMES}
         crown = float(at["head_top"][2])

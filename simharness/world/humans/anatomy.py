@@ -9,8 +9,6 @@ The segments are the fourteen of de Leva (J. Biomechanics 29, 1996) with the tru
 the head, the shoulder girdle to the torso, the toes to the foot.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from types import MappingProxyType

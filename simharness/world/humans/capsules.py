@@ -6,8 +6,6 @@ points, and this is repeated. No size is absolute, so that a child is fitted as 
 belong to the skin here, because they are what is seen and touched.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal

@@ -2,70 +2,35 @@
 
 Of 14,221 tops of a fashion shop, 25 % are black, 23 % white and 13 % red (statistics of the data set of Ping et al.,
 "Fashion-AttGAN: attribute-aware fashion editing", arXiv 1904.07460). Black (with charcoal), white (with cream) and the
-reds (red, burgundy, pink) of ``TOPS`` have these shares. The shares of the other colours, of trousers and of shoes
+reds (red, burgundy, pink) of tops have these shares. The shares of the other colours, of trousers and of shoes
 are an assumption: no published counts were found for them. The albedos are chosen by eye.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from types import MappingProxyType
+from functools import lru_cache
+from pathlib import Path
+
+from pydantic import TypeAdapter
+
+from mvpose.files.input_files import parse_toml
 
 Color = tuple[float, float, float]
 Palette = Mapping[str, tuple[str, float]]
+"""Hexadecimal sRGB albedo and share in per cent of each colour."""
 
-# Name: hexadecimal sRGB albedo, share in per cent. Similar colours are neighbours, so that people whose places in the
-# order are far apart look different.
-TOPS: Palette = MappingProxyType(
-    {
-        "black": ("222225", 20.0),
-        "charcoal": ("3d3e43", 5.2),
-        "navy": ("28304a", 9.0),
-        "blue": ("4a6791", 5.5),
-        "teal": ("33656a", 0.7),
-        "green": ("456550", 1.8),
-        "olive": ("5b5d42", 2.0),
-        "brown": ("6d503c", 2.3),
-        "burgundy": ("642836", 4.3),
-        "red": ("a23336", 4.8),
-        "orange": ("bd6b42", 0.5),
-        "purple": ("62507a", 0.9),
-        "pink": ("d2a3a8", 4.0),
-        "yellow": ("cfae58", 0.6),
-        "beige": ("c8b799", 2.6),
-        "grey": ("818287", 5.8),
-        "pale blue": ("a3b8cf", 3.5),
-        "pale grey": ("b7b7b5", 3.5),
-        "cream": ("ddd6c6", 4.0),
-        "white": ("e6e5e1", 19.0),
-    }
-)
-TROUSERS: Palette = MappingProxyType(
-    {
-        "black": ("222326", 24.0),
-        "charcoal": ("3b3c41", 7.0),
-        "navy": ("293149", 8.0),
-        "dark denim": ("2f3d5c", 16.0),
-        "denim": ("4c658c", 16.0),
-        "pale denim": ("8699b2", 6.0),
-        "grey": ("74767b", 6.0),
-        "olive": ("595b42", 3.0),
-        "brown": ("5e4a3b", 3.0),
-        "khaki": ("ab9a7c", 9.0),
-        "white": ("dbd9d3", 2.0),
-    }
-)
-SHOES: Palette = MappingProxyType(
-    {
-        "black": ("1e1e21", 40.0),
-        "brown": ("6b4a33", 15.0),
-        "red": ("8a3131", 3.0),
-        "navy": ("303a50", 5.0),
-        "grey": ("77797d", 12.0),
-        "white": ("dcdad5", 25.0),
-    }
-)
+_FILE = Path(__file__).parent / "data" / "palettes.toml"
+
 _LIGHTNESS, _WARMTH = 0.07, 0.012  # largest variation of a colour: relative, and between red and blue
+
+
+@lru_cache(maxsize=1)
+def _palettes() -> Mapping[str, Palette]:
+    return TypeAdapter(dict[str, Palette]).validate_python(parse_toml(_FILE.read_text(encoding="utf-8")))
+
+
+def palette(name: str) -> Palette:
+    """Return the colours of "tops", "trousers", "shoes", "frames" (of glasses), "hats", "bags" or "masks"."""
+    return _palettes()[name]
 
 
 def draw_color(palette: Palette, place: float, lightness: float, warmth: float) -> Color:

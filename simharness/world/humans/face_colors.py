@@ -6,8 +6,6 @@ up; a speaking mouth is open; a frown lowers the brows and draws the corners dow
 the lips, and lids shade the upper part of the eyes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType

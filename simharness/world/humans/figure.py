@@ -4,15 +4,12 @@ Hair runs from the whorl at the crown over the head and down. Cloth folds across
 lies at rest on the body, and is irregular in all directions, so that no fold is a ring.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mvpose.arrays import Floats
-from simharness.types.finish import Finish, Material
-from simharness.types.mesh import Mesh
+from simharness.types.mesh import Finish, Material, Mesh
 from simharness.world.humans.body import Body, FacePart, body_model
 from simharness.world.humans.clothing import Garment, garments, paint
 from simharness.world.humans.face_colors import places_of_head
@@ -88,7 +85,7 @@ def finish_of(body: Body, look: Look) -> Finish:
 
 
 def materials_of(body: Body, look: Look) -> NDArray[np.int8]:
-    """Return the :class:`~simharness.types.finish.Material` of every face of a body, (k,) int8.
+    """Return the :class:`~simharness.types.mesh.Material` of every face of a body, (k,) int8.
 
     What a person wears is made of cloth or leather; bare arms and legs, and all else of the body, of skin.
     """

@@ -3,8 +3,6 @@
 Each is fitted to the face and hair of the dressed head at rest, so nothing below it comes through.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -32,7 +30,7 @@ _TALLER = {"cap": 0.006, "beanie": 0.016, "brimmed": 0.022}  # height of a hat o
 
 def glasses(body: Body, *, kind: str) -> list[AddedMesh]:
     """Make frame and temples of glasses, over a mask if there is one, and the dark lenses of sunglasses."""
-    face = FacePoints.of(body)
+    face = FacePoints.of_body(body)
     scale = face.scale
     half_width, half_height, power = (value * k for value, k in zip(_LENS[kind], (scale, scale, 1.0), strict=True))
     middle = np.array([max(face.eye[1], half_width + 0.006 * scale), face.eye[2] - 0.002 * scale])
@@ -91,7 +89,7 @@ def _temple(face: FacePoints, side: float, hinge: Floats) -> Sheet:
 
 def mask(body: Body) -> list[AddedMesh]:
     """Make a mask over nose, mouth and chin with its ear loops."""
-    face = FacePoints.of(body)
+    face = FacePoints.of_body(body)
     scale = face.scale
     axis = np.array([face.ear[0] + 0.012 * scale, 0.0])
     heights = face.nose[2] + scale * np.array([0.014, 0.005, -0.008, -0.025, -0.045, -0.066, -0.084])
@@ -118,7 +116,7 @@ def mask(body: Body) -> list[AddedMesh]:
 
 def hat(body: Body, *, kind: str) -> list[AddedMesh]:
     """Make a cap with its visor, a beanie, or a hat with a brim."""
-    face = FacePoints.of(body)
+    face = FacePoints.of_body(body)
     height = face.crown - face.eye[2]
     front, behind = (face.eye[2] + share * height for share in _EDGE[kind])
     ahead, back = face.face[:, 0].max(), face.scalp[:, 0].min()

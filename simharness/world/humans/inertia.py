@@ -6,8 +6,6 @@ measured there between skin landmarks that are not joints, so their centre and i
 capsules at uniform density.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

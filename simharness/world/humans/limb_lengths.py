@@ -4,8 +4,6 @@ In anny the limb lengths follow from the other phenotypes, and the forearms of i
 lengths are separate parameters here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 

@@ -5,8 +5,6 @@ The local frame of every bone is aligned with the world in the rest pose, so its
 into the anatomical neutral pose, in which all joint angles are zero.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

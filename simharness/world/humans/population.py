@@ -12,8 +12,6 @@ deviation is that of weight at a given stature.
 Children: WHO growth reference for 5 to 19 years, de Onis et al., Bulletin of the WHO 85, 2007.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Shape parameters of a human body."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from types import MappingProxyType

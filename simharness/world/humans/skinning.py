@@ -1,7 +1,5 @@
 """Compiled kernels of the body model: blend shapes, linear blend skinning, volume, and the motion of skirts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ two thighs: every vertex has a direction and lies on the thigh that extends furt
 So a ring is the hull of two round sections, like cloth around both legs, and no thigh comes through during a stride.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.arrays import Floats
@@ -171,7 +169,7 @@ _CURLS = 0.006  # height of curls, metres
 
 def bob(body: Body, *, volume: float) -> AddedMesh:
     """Make the mesh of hair cut at the chin: it covers the ears and the nape."""
-    face = FacePoints.of(body)
+    face = FacePoints.of_body(body)
     eyes, height = face.eye[2], face.crown - face.eye[2]
     center = np.array([0.5 * (face.scalp[:, 0].min() + face.scalp[:, 0].max()), 0.0])
     bearing = np.radians(np.linspace(*_BOB, 23))
@@ -195,7 +193,7 @@ def bob(body: Body, *, volume: float) -> AddedMesh:
 
 def ponytail(body: Body, *, volume: float, low: bool = False) -> AddedMesh:
     """Make the mesh of a ponytail, from the back of the head or ``low`` from the nape to the shoulder blades."""
-    face = FacePoints.of(body)
+    face = FacePoints.of_body(body)
     eyes, height = face.eye[2], face.crown - face.eye[2]
     start = eyes + (-0.25 if low else 0.45) * height
     behind = float(face.scalp[np.abs(face.scalp[:, 2] - start) < 0.015, 0].min())

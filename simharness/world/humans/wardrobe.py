@@ -10,8 +10,6 @@ Shares of accessories and their sources:
 - Which kind of hat, masks (3 %), hair styles and all colours are assumptions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from types import MappingProxyType
@@ -20,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from simharness.types.random_streams import stream
-from simharness.world.humans.clothing_colors import SHOES, TOPS, TROUSERS, Color, Palette, draw_color
+from simharness.world.humans.clothing_colors import Color, draw_color, palette
 from simharness.world.humans.face_colors import EXPRESSIONS
 from simharness.world.humans.population import draw_sex
 
@@ -38,42 +36,6 @@ _BAGS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     {"female": {"backpack": 0.08, "shoulder": 0.20}, "male": {"backpack": 0.12, "shoulder": 0.10}}
 )
 _ACCESSORY_DRAWS = 24
-
-# Name: hexadecimal sRGB albedo, share in per cent.
-_FRAMES: Palette = MappingProxyType(
-    {
-        "black": ("18181a", 50),
-        "brown": ("4a2f20", 25),
-        "metal": ("8d8e92", 15),
-        "red": ("6e2a2c", 5),
-        "blue": ("2b3c5e", 5),
-    }
-)
-_HAT_COLORS: Palette = MappingProxyType(
-    {
-        "black": ("232326", 35),
-        "navy": ("28304a", 18),
-        "grey": ("77787c", 13),
-        "beige": ("b8a684", 10),
-        "white": ("dedcd6", 8),
-        "red": ("96302f", 6),
-        "olive": ("565a40", 5),
-        "blue": ("4a6791", 5),
-    }
-)
-_BAG_COLORS: Palette = MappingProxyType(
-    {
-        "black": ("202023", 48),
-        "charcoal": ("414248", 10),
-        "navy": ("29324c", 12),
-        "brown": ("5d4130", 11),
-        "tan": ("9a7049", 6),
-        "olive": ("585b42", 5),
-        "red": ("8d3232", 4),
-        "teal": ("34656b", 4),
-    }
-)
-_MASK_COLORS: Palette = MappingProxyType({"blue": ("a9c6d8", 50), "white": ("e4e5e4", 30), "black": ("242427", 20)})
 
 
 @dataclass(frozen=True)
@@ -101,10 +63,10 @@ def draw_accessories(rng: np.random.Generator, *, female: bool) -> Accessories:
         hat=_choice(_HATS, drawn[2]),
         mask=_choice({"medical": _MASK}, drawn[3]),
         bag=_choice(_BAGS[sex], drawn[4]),
-        frame_color=draw_color(_FRAMES, drawn[5], drawn[6], drawn[7]),
-        hat_color=draw_color(_HAT_COLORS, drawn[8], drawn[9], drawn[10]),
-        bag_color=draw_color(_BAG_COLORS, drawn[11], drawn[12], drawn[13]),
-        mask_color=draw_color(_MASK_COLORS, drawn[14], drawn[15], drawn[16]),
+        frame_color=draw_color(palette("frames"), drawn[5], drawn[6], drawn[7]),
+        hat_color=draw_color(palette("hats"), drawn[8], drawn[9], drawn[10]),
+        bag_color=draw_color(palette("bags"), drawn[11], drawn[12], drawn[13]),
+        mask_color=draw_color(palette("masks"), drawn[14], drawn[15], drawn[16]),
     )
 
 
@@ -251,15 +213,15 @@ def draw_look(rng: np.random.Generator, *, female: bool = False, place: float | 
     lower_garment = _pick(
         ("trousers", "trousers", "skirt", "dress", "coat") if female else (*("trousers",) * 7, "coat"), drawn[12]
     )
-    top = draw_color(TOPS, place % 1, drawn[4], drawn[5])
+    top = draw_color(palette("tops"), place % 1, drawn[4], drawn[5])
     return Look(
         skin=skin,
         hair=_color(_pick(_HAIR, drawn[1] + (1 - drawn[1]) * drawn[2])),
         lips=mix(skin, (0.62, 0.22, 0.22), 0.45),
         eyes=_color(_pick(_EYES, drawn[3])),
         top=top,
-        trousers=draw_color(TROUSERS, drawn[6], drawn[20], drawn[21]),
-        shoes=draw_color(SHOES, drawn[7], drawn[22], drawn[23]),
+        trousers=draw_color(palette("trousers"), drawn[6], drawn[20], drawn[21]),
+        shoes=draw_color(palette("shoes"), drawn[7], drawn[22], drawn[23]),
         accent=_contrasting(top, drawn[13]),
         sleeves="long" if lower_garment == "coat" else _pick(("short", "short", "half", "long", "long"), drawn[8]),
         legs="long" if lower_garment == "coat" else _pick(("shorts", "cropped", *("long",) * 4), drawn[9]),

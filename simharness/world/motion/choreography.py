@@ -14,10 +14,9 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.motion.activity_registry import Activity, configured_activities, solo
 from simharness.world.motion.contact import ContactModel, SampledBody
-from simharness.world.motion.motion import Motion, Performance, Prop
+from simharness.world.motion.motion import ALWAYS, Motion, Performance, Presence, Prop
 from simharness.world.motion.paths import Loop, RecordedPath, Spot, Track, rotation_2d
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.presence import ALWAYS, Presence
 from simharness.world.motion.routes import Route
 from simharness.world.motion.track_planning import (
     LoopRequest,

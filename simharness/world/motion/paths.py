@@ -3,8 +3,6 @@
 Routes, which people walk with stops, are in :mod:`simharness.world.motion.routes`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
+from simharness.world.motion.motion import ALWAYS, Presence
 from simharness.world.motion.poses.timing import ease
-from simharness.world.motion.presence import ALWAYS, Presence
 
 _RAMP = 0.8  # seconds: people reach their speed, and stop, within about two steps
 _TURN = 1.4  # radians per second: rate of a turn on the spot; at usual cadences a step turns a foot by up to 45 degrees

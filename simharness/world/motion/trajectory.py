@@ -1,7 +1,5 @@
 """Trajectories of rigid objects: sampled poses and their smooth interpolation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Visits: routes of people who come in through a door, stop here and there, and go out again."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,8 +10,7 @@ from mvpose.arrays import Bools, Floats
 from simharness.scenario.sections.people_section import TrafficSection
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
-from simharness.world.motion.motion import Prop
-from simharness.world.motion.presence import Presence
+from simharness.world.motion.motion import Presence, Prop
 from simharness.world.motion.routes import Itinerary, Route, turning_time, walking_time
 from simharness.world.motion.trajectory import Trajectory
 

@@ -2,8 +2,6 @@
 gap between the bearings of the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

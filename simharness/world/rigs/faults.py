@@ -7,8 +7,6 @@ twice as large, a higher chance adds events to those that a lower one has, and o
 others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Clearance of cameras from floor, walls and objects."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

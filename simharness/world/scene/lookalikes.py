@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +10,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Bools, Floats
 from mvpose.skeleton import COCO17
 from simharness.types.mirror import Mirror
-
-if TYPE_CHECKING:
-    from simharness.world.scene.build import Scene
-
+from simharness.world.scene.build import Scene
 
 SURFACE_DEPTH = 0.3  # metres: largest distance of the surface of a figure in front of its joints
 _GLASS_DEPTH = 0.03  # metres: the same for the glass of a mirror; its frame stands out slightly

@@ -1,7 +1,5 @@
 """Kinematic playback: the motions drive the MuJoCo model, which gives positions of people and objects at any time."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -14,8 +12,8 @@ from mvpose.skeleton import COCO17
 from simharness.types.sequence import LANDMARKS, Sequence
 from simharness.world.humans.body import body_model
 from simharness.world.humans.mujoco_model import bone_transforms
+from simharness.world.motion.motion import presence_at
 from simharness.world.motion.poses.kinematics import Addresses
-from simharness.world.motion.presence import presence_at
 from simharness.world.scene.build import Scene
 
 _NOWHERE = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, -1.0]])

@@ -108,8 +108,8 @@ AROUND = {
     "mvpose/formats/people/people_tables.py": "bytes that were read",
     "simharness/runtime/parquet_tables.py": "bytes that were read",
     "simharness/planning/search.py": "text that was just written",
-    "simharness/outputs/run/run_film.py": "a film that was just written",
-    "simharness/runtime/code_digest.py": "code",
+    "simharness/outputs/run/pictures.py": "a film that was just written",
+    "simharness/runtime/version.py": "code",
     "simharness/trial/needs.py": "what the kernel says of the machine",
     "simharness/trial/identity.py": "digests of regular files, read in blocks",
     "simharness/trial/stages/estimators.py": "code",
@@ -121,8 +121,9 @@ AROUND = {
     "simharness/outputs/study/page.py": "a file of a result folder, if regular",
 }
 SHIPPED = {
-    "simharness/world/rigs/published_rigs.py", "simharness/world/humans/body.py", "simharness/detector/guesses.py",
-    "simharness/world/humans/outer_landmarks.py", "simharness/world/scene/rooms/kinds.py",
+    "simharness/world/rigs/layouts.py", "simharness/world/humans/body.py", "simharness/detector/reported.py",
+    "simharness/capture/outer_views.py", "simharness/world/scene/rooms/kinds.py",
+    "simharness/world/humans/clothing_colors.py",
     "simharness/trial/kernel_compilation.py",
 }  # fmt: skip
 CALLS = re.compile(

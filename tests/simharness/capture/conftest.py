@@ -7,8 +7,8 @@ from functools import cache
 
 import pytest
 
+from simharness.capture.rendering.raster import make_renderer
 from simharness.capture.rendering.renderer import Unavailable
-from simharness.capture.rendering.renderer_names import make_renderer
 
 
 @cache

@@ -9,8 +9,8 @@ import pytest
 from mesh_shapes import ball, box, chequered, sheet
 from test_renderers import SLANTING, VIEWS, camera_at
 
+from simharness.capture.picture import reflected
 from simharness.capture.rendering import backgrounds
-from simharness.capture.rendering.mirrors import reflected
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.types.mirror import Mirror
 

@@ -13,10 +13,8 @@ from simharness.capture.rendering.finish_kernels import FINISHING, GLOSS, Finish
 from simharness.capture.rendering.finishes import Finishes, grain_of
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.rendering.surface_kernels import NORMAL_X, NORMAL_Y, NORMAL_Z, PIXELS, memory
-from simharness.types.finish import Finish, Material
-from simharness.types.light_sources import AreaLight, LightSources
-from simharness.types.lighting import Lighting
-from simharness.types.mesh import Mesh
+from simharness.types.lighting import AreaLight, Lighting, LightSources
+from simharness.types.mesh import Finish, Material, Mesh
 
 LAMP = AreaLight((0.0, 0.0, 2.9), (0.0, 0.2, 0.0), (0.2, 0.0, 0.0), (20.0, 20.0, 20.0))
 LIGHT = Lighting(sources=LightSources((LAMP,), sky=(0.3, 0.3, 0.3)))

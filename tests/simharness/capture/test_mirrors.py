@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from mesh_shapes import ball, box, room
 
 from mvpose import Camera
-from simharness.capture.rendering.mirrors import reflected, with_mirrors
+from simharness.capture.picture import reflected, with_mirrors
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh

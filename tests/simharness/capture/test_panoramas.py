@@ -9,13 +9,11 @@ import pytest
 from mesh_shapes import ball, sheet
 from test_renderers import axis_rays, camera_at
 
+from simharness.capture.picture import with_mirrors
 from simharness.capture.rendering import tone
-from simharness.capture.rendering.mirrors import with_mirrors
 from simharness.capture.rendering.raster import RasterRenderer
-from simharness.types.light_sources import LightSources
-from simharness.types.lighting import Lighting
+from simharness.types.lighting import Lighting, LightSources, Panorama, directions
 from simharness.types.mirror import Mirror
-from simharness.types.panorama import Panorama, directions
 from simharness.types.srgb import from_linear, to_linear
 
 LOWEST = -0.5

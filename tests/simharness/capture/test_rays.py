@@ -12,7 +12,7 @@ from mvpose.camera import Rig
 from simharness.capture.filming import PictureObserver
 from simharness.capture.ray_casting import RayCaster
 from simharness.capture.ray_visibility import RayObserver
-from simharness.capture.rendering.renderer_names import make_renderer
+from simharness.capture.rendering.raster import make_renderer
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.views import Visibility
 from simharness.world.rigs.layouts import build_rig

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from mesh_shapes import _mesh, ball, box, chequered, crowd, disc, room, sheet, with_parts
 
+from simharness.capture.rendering.raster import make_renderer
 from simharness.capture.rendering.renderer import NEAR
-from simharness.capture.rendering.renderer_names import make_renderer
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.types.lighting import Lighting
 from simharness.world.rigs.layouts import build_rig, intrinsics, look_at

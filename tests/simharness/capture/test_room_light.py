@@ -17,8 +17,7 @@ from simharness.capture.rendering.moving_light import capsules
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.rendering.room_light import _REFLECTED, _SPECK, _reflected, room_light
 from simharness.capture.rendering.scene_geometry import StillGeometry
-from simharness.types.light_sources import AreaLight, LightSources, Sun
-from simharness.types.lighting import Lighting
+from simharness.types.lighting import AreaLight, Lighting, LightSources, Sun
 from simharness.types.srgb import to_linear
 
 PANEL = AreaLight((0.3, -0.2, 2.5), (0.0, 0.5, 0.0), (0.4, 0.0, 0.0), (2.0, 2.0, 2.0))

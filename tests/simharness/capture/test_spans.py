@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simharness.capture.rendering.moving_shadows import BlockGrid, ShadowLayers, dim, runs_below
+from simharness.capture.rendering.shaded_pixels import BlockGrid, ShadowLayers, dim, runs_below
 from simharness.capture.rendering.surface_kernels import PixelRays
 from simharness.capture.rendering.tone import dimming
 from simharness.capture.rendering.vertex_kernels import (

@@ -7,9 +7,8 @@ import pytest
 from scipy.stats import binom
 
 from mvpose import Camera, Rig
-from simharness.detector.decoy_hits import draw_decoy_hits
 from simharness.detector.draws import KeyedDraws
-from simharness.detector.false_positives import MIN_JOINTS
+from simharness.detector.false_positives import MIN_JOINTS, draw_decoy_hits
 from simharness.scenario.sections.detector_section import DecoyHitsSection
 from simharness.types.truth import KeypointError
 from simharness.types.views import LookalikeViews, Views

@@ -9,10 +9,9 @@ import pytest
 from worlds import world
 
 from mvpose.networks.reid import DEFAULT
-from simharness.detector.descriptor_model import DescriptorModel
-from simharness.detector.descriptors import DescriptorSettings
+from simharness.detector.descriptors import DescriptorModel, DescriptorSettings
 from simharness.detector.detect import detect
-from simharness.detector.view_geometry import bearings, hidden_shares
+from simharness.detector.viewing_conditions import bearings, hidden_shares
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.views import LookalikeViews, Visibility
 

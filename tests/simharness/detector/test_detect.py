@@ -117,7 +117,7 @@ def test_the_posefix_profile_has_the_published_rates():
     frames = detect(where.sequence, where.views, where.rig, read_profile("posefix"), seed=0)
     error = np.stack([frame.truth.error[np.lexsort((frame.truth.person, frame.detections.view))] for frame in frames])
     error = error.reshape(4000, 2, 2, 17)
-    true, conditions = where.views.pixels, Conditions.of(where.views)
+    true, conditions = where.views.pixels, Conditions.of_views(where.views)
     reach = MISS_FROM * conditions.unit
     mirror = np.array([0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15])
     for name, joints in JOINTS.items():

@@ -6,7 +6,7 @@ from scipy.stats import multivariate_normal
 from worlds import find, standing, within, world
 
 from simharness.detector.draws import IN_TREE, PARENT, with_parents
-from simharness.detector.view_geometry import head_bearings
+from simharness.detector.viewing_conditions import head_bearings
 from simharness.types.truth import KeypointError
 from simharness.types.views import Visibility
 

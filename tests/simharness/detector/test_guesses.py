@@ -7,7 +7,7 @@ import pytest
 from worlds import find, standing, within, world
 
 from mvpose import COCO17
-from simharness.detector.guesses import BEARINGS, guess_places, pixels_per_metre, poses_in_pictures
+from simharness.detector.reported import POSE_BEARINGS, guess_places, pixels_per_metre, poses_in_pictures
 from simharness.detector.viewing_conditions import Conditions
 from simharness.types.truth import MISS_FROM, KeypointError
 from simharness.types.views import Visibility
@@ -45,7 +45,7 @@ class TestPlaces:
         poses = drawn_poses(number, 20)
         localised = rng.random((20, 17)) < 0.6
         got = guess_places(
-            poses, localised, bearings=np.full(20, 2 * np.pi * number / BEARINGS), scale=np.ones(20),
+            poses, localised, bearings=np.full(20, 2 * np.pi * number / POSE_BEARINGS), scale=np.ones(20),
             center=np.zeros((20, 2)),
         )  # fmt: skip
         everywhere = prior.covariance[number] + np.tile(np.eye(2), (17, 17))  # the place is known to a metre
@@ -166,7 +166,7 @@ class TestGuessedKeypoints:
     def test_guesses_of_a_usual_pose_are_near(self):
         where = standing(visibility=hide(ELBOWS))
         found = find(where, guess={"occluded": 1.0})
-        away = np.linalg.norm(found.pixels - where.views.pixels, axis=-1) / Conditions.of(where.views).unit
+        away = np.linalg.norm(found.pixels - where.views.pixels, axis=-1) / Conditions.of_views(where.views).unit
         assert away[..., ELBOWS].max() < MISS_FROM
         assert away[..., ELBOWS].min() > 0.01
 
@@ -181,7 +181,7 @@ class TestGuessedKeypoints:
     def test_scatter_of_guesses_is_in_units(self):
         where = self.odd(frames=600)
         plain, spread = (find(where, guess={"occluded": 1.0, "scatter": s}) for s in (0.0, 0.7))
-        off = (spread.pixels - plain.pixels)[..., ELBOWS, :] / Conditions.of(where.views).unit[..., ELBOWS, None]
+        off = (spread.pixels - plain.pixels)[..., ELBOWS, :] / Conditions.of_views(where.views).unit[..., ELBOWS, None]
         assert off.std() == pytest.approx(0.7, rel=0.06)
         assert abs(off.mean()) < 0.06
         visible = [j for j in range(17) if j not in ELBOWS + WRISTS]

@@ -24,7 +24,7 @@ def scored(where=None, *, seed=1, parameters=None, **config):
         "swap": 0.2,
         "drop": {"visible": 0.1},
     }
-    conditions, tie = Conditions.of(where.views), CorrelationSection()
+    conditions, tie = Conditions.of_views(where.views), CorrelationSection()
     draws = KeyedDraws(seed, where.sequence.time, len(where.rig))
     found = find_keypoints(
         where.views, conditions, where.sequence, where.rig, KeypointsSection.model_validate(parameters), tie, draws

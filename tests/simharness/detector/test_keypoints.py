@@ -17,7 +17,7 @@ MIRROR = np.array(COCO17.mirror)
 
 def units(where, found):
     """Return the distance of keypoints from the truth, in units of OKS sigma x sqrt(area)."""
-    unit = Conditions.of(where.views).unit
+    unit = Conditions.of_views(where.views).unit
     return np.linalg.norm(found.pixels - where.views.pixels, axis=-1) / unit
 
 
@@ -45,7 +45,7 @@ def test_each_error_occurs_at_the_configured_rate(parameter, correlation):
     where = world(frames=400, people=2, together=parameter == "swap")
     error = find(where, correlation=correlation, **{parameter: 0.2}).error
     true = where.views.pixels
-    conditions = Conditions.of(where.views)
+    conditions = Conditions.of_views(where.views)
     possible = np.ones(error.shape, bool)
     if parameter == "inversion":  # an inversion to a near counterpart is none
         possible = np.linalg.norm(true - true[..., MIRROR, :], axis=-1) >= MISS_FROM * conditions.unit
@@ -64,7 +64,7 @@ def test_shares_are_of_the_joints_left_by_earlier_classes():
     where = world(frames=1500, views=2, people=2, together=True)
     shares = {"swap": 0.1, "inversion": 0.2, "miss": 0.15, "jitter": 0.3}
     found = find(where, drop={"visible": 0.05}, **shares)
-    true, conditions = where.views.pixels, Conditions.of(where.views)
+    true, conditions = where.views.pixels, Conditions.of_views(where.views)
     # Where all classes are distinguishable.
     apart = np.linalg.norm(true - true[..., MIRROR, :], axis=-1) >= MISS_FROM * conditions.unit
     apart &= np.linalg.norm(true - true[:, :, ::-1], axis=-1) >= MISS_FROM * conditions.unit
@@ -112,7 +112,7 @@ def test_joints_outside_the_image_are_never_reported():
 
 def test_joints_a_little_outside_the_image_are_reported_at_its_border():
     where = standing(20, cameras=(0.0, 1.0), distance=2.0)
-    unit = Conditions.of(where.views).unit
+    unit = Conditions.of_views(where.views).unit
     last = np.array([1279.0, 719.0])
     beyond = np.linalg.norm(where.views.pixels - np.clip(where.views.pixels, 0, last), axis=-1) / unit
     seen = np.where(beyond > 0, Visibility.OUTSIDE, Visibility.VISIBLE)
@@ -241,7 +241,7 @@ def test_people_with_few_joints_and_crowds_have_separate_rates():
     seen = np.full((200, 3, 2, 17), Visibility.VISIBLE)
     seen[:, :, 0, 10:] = Visibility.OCCLUDED_BY_PERSON
     where = world(frames=200, visibility=seen, together=True)
-    crowded = Conditions.of(where.views).crowded
+    crowded = Conditions.of_views(where.views).crowded
     assert crowded[:, :, 0].mean() > 0.5
     assert not crowded[:, :, 1].any()
     error = find(where, swap=0.0, swap_crowded=1.0).error
@@ -285,7 +285,7 @@ def test_shared_scatter_is_a_displacement_in_space():
     offsets = {}
     for shared in (0.0, 0.5, 1.0):
         found = find(where, scatter=0.3, correlation={"scatter_views": shared})
-        offsets[shared] = (found.pixels - where.views.pixels) / Conditions.of(where.views).unit[..., None]
+        offsets[shared] = (found.pixels - where.views.pixels) / Conditions.of_views(where.views).unit[..., None]
         assert offsets[shared].std() == pytest.approx(0.3, rel=0.03)
     # The cameras stand side by side with the same orientation: down is equal in both, right nearly equal.
     down = {shared: np.corrcoef(each[:, 0, ..., 1].ravel(), each[:, 1, ..., 1].ravel())[0, 1]

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from mvpose import Camera, Rig
-from simharness.detector.birth_death import BirthDeathProcess, assign_slots, frames_alive
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.false_positives import NORMALS, postures, project_upright
-from simharness.detector.phantoms import draw_phantoms, viewed_area
+from simharness.detector.phantoms import BirthDeathProcess, assign_slots, draw_phantoms, frames_alive, viewed_area
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.detector_section import PhantomsSection
 from simharness.types.truth import KeypointError

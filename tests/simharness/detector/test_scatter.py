@@ -12,7 +12,7 @@ from simharness.types.views import Visibility
 def offsets(where, **correlation):
     """Return the scatter in units, (T, V, P, 17, 2)."""
     found = find(where, scatter=0.3, correlation=correlation)
-    return (found.pixels - where.views.pixels) / Conditions.of(where.views).unit[..., None]
+    return (found.pixels - where.views.pixels) / Conditions.of_views(where.views).unit[..., None]
 
 
 def correlated(one, other):
@@ -65,7 +65,7 @@ def test_hidden_joints_have_their_own_scatter():
     seen = np.where(np.arange(17) < 9, Visibility.VISIBLE, Visibility.SELF_OCCLUDED)
     where = standing(2000, visibility=seen)
     plain, more = (find(where, scatter=0.2, scatter_hidden=factor) for factor in (1.0, 2.0))
-    unit = Conditions.of(where.views).unit[..., None]
+    unit = Conditions.of_views(where.views).unit[..., None]
     off = (more.pixels - where.views.pixels) / unit
     assert off[..., 9:, :].std() == pytest.approx(0.4, rel=0.05)
     np.testing.assert_array_equal(more.pixels[..., :9, :], plain.pixels[..., :9, :])
@@ -75,7 +75,7 @@ def test_hidden_joints_have_their_own_scatter():
 
 def test_hidden_joints_of_each_kind_have_their_scatter():
     where = standing(2000, visibility=np.full(17, Visibility.SELF_OCCLUDED))
-    unit = Conditions.of(where.views).unit[..., None]
+    unit = Conditions.of_views(where.views).unit[..., None]
     found, usual = (find(where, scatter=0.2, scatter_hidden=hidden) for hidden in ({"hips": 2.0}, {}))
     off, plain = ((each.pixels - where.views.pixels) / unit for each in (found, usual))
     hips = [11, 12]

@@ -53,7 +53,7 @@ def find(where, *, seed=3, correlation=None, kind="top-down", **parameters):
     config = KeypointsSection.model_validate(parameters)
     draws = KeyedDraws(seed, where.sequence.time, len(where.rig))
     tie = CorrelationSection.model_validate(correlation or {})
-    conditions = Conditions.of(where.views)
+    conditions = Conditions.of_views(where.views)
     return find_keypoints(where.views, conditions, where.sequence, where.rig, config, tie, draws, kind=kind)
 
 

@@ -26,7 +26,7 @@ from mvpose.formats.people import FORMATS, PeopleFiles, write_people
 from mvpose.networks import Session
 from mvpose.recording import People
 from mvpose.skeleton import PANOPTIC19
-from simharness.detector.descriptor_model import DescriptorModel
+from simharness.detector.descriptors import DescriptorModel
 from simharness.gate.baseline import KEPT, Measurement, read_baseline, write_baseline
 from simharness.gate.trial_command import TrialKey
 from simharness.outputs.benchmark.layout import check_place

@@ -10,9 +10,8 @@ from rich.console import Console
 
 from simharness.cli.check_command import _print
 from simharness.gate.baseline import FRAMES, GATED, TIME, Measurement
-from simharness.gate.compare import compare
+from simharness.gate.compare import FailedCase, GateResult, compare
 from simharness.gate.gate_reports import SPEED, WHOLE, difference, junit, markdown
-from simharness.gate.gate_result import FailedCase, GateResult
 from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.scoring.catalogue import SCORES

@@ -4,9 +4,8 @@ import pytest
 
 from simharness.gate.baseline import KEPT, Measurement, write_baseline
 from simharness.gate.compare import compare
-from simharness.gate.gate_check import baseline_of
-from simharness.gate.required_seeds import least_corrected_p, least_seeds
-from simharness.gate.suite import fingerprint
+from simharness.gate.score_tests import least_corrected_p, least_seeds
+from simharness.gate.suite import baseline_of, fingerprint
 from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
 from simharness.scenario.load import load_study
 from simharness.scenario.sections.gate_section import GateSection

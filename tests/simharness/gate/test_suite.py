@@ -13,9 +13,8 @@ from mvpose.presets import TRACKING
 from simharness.gate import frame_times, suite
 from simharness.gate.baseline import FRAMES, GATED, KEPT, TIME
 from simharness.gate.frame_times import reference_work, relative_times
-from simharness.gate.gate_check import baseline_of
-from simharness.gate.required_seeds import least_corrected_p
-from simharness.gate.suite import fingerprint, run_suite
+from simharness.gate.score_tests import least_corrected_p
+from simharness.gate.suite import baseline_of, fingerprint, run_suite
 from simharness.scenario.load import load_study
 from simharness.scoring.catalogue import SCORES
 from simharness.trial.run_trial import run_trial

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from simharness.outputs.study.factor_names import NAMES, axis_label, unit_of
+from simharness.outputs.study.curves import NAMES, axis_label, unit_of
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 

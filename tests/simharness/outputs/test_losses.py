@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_study import make_study
 
-from simharness.outputs.study.curves import factors
-from simharness.outputs.study.losses import finding, losses
+from simharness.outputs.study.curves import factors, finding, losses
 from simharness.outputs.study.plots import spread_apart
 
 

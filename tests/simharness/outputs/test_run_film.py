@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.outputs.run.run_film import encode_mp4, filmed_frames
+from simharness.outputs.run.pictures import encode_mp4, filmed_frames
 
 RED, GREEN, BLUE = ((220, 30, 30), (30, 200, 30), (30, 30, 220))
 

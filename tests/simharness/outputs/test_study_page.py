@@ -16,7 +16,7 @@ from simharness.outputs.study.page import render_study, write_report
 from simharness.outputs.study.worst_frames import worst_frames
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval
-from simharness.study.causes.blame_file import FILE, read_blame, write_blame
+from simharness.study.causes.blame_text import FILE, read_blame, write_blame
 from simharness.study.causes.cause_shares import Blame, Mending, Share
 
 GRID = {"cameras.count": [2, 3, 5], "detector.profile": ["poor", "good"]}

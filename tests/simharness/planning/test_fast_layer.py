@@ -35,7 +35,7 @@ def corners():
 
 @pytest.fixture(scope="module")
 def layer():
-    return FastLayer.of(Volume.box(4, 4), detector=read_profile("typical"), people=3, spacing=1.0)
+    return FastLayer.in_volume(Volume.box(4, 4), detector=read_profile("typical"), people=3, spacing=1.0)
 
 
 class TestScenes:
@@ -74,10 +74,10 @@ class TestScenes:
 
     def test_nobody_stands_in_an_obstacle(self):
         shelf = Box((0.5, 0.0, 1.0), (0.5, 1.0, 1.0), yaw=0.4)
-        layer = FastLayer.of(Volume.box(4, 4), detector=PERFECT, people=2, obstacles=[shelf])
+        layer = FastLayer.in_volume(Volume.box(4, 4), detector=PERFECT, people=2, obstacles=[shelf])
         assert not taken_floor(shelf).contains(layer.scenes.position[..., :2]).any()
         with pytest.raises(ValueError, match="nobody can stand"):
-            FastLayer.of(Volume.box(1, 1), detector=PERFECT, obstacles=[Box((0.0, 0.0, 1.0), (2.0, 2.0, 1.0))])
+            FastLayer.in_volume(Volume.box(1, 1), detector=PERFECT, obstacles=[Box((0.0, 0.0, 1.0), (2.0, 2.0, 1.0))])
 
 
 class TestVisibility:
@@ -161,7 +161,7 @@ class TestInformation:
 
 class TestPrediction:
     def test_a_perfect_detector_places_everyone_exactly(self, corners):
-        layer = FastLayer.of(Volume.box(2, 2), detector=PERFECT, people=1, spacing=1.0)
+        layer = FastLayer.in_volume(Volume.box(2, 2), detector=PERFECT, people=1, spacing=1.0)
         terms = [layer.terms(each) for each in corners]
         for variant in ("", "full"):
             made = layer.predict(terms, variant=variant)
@@ -171,7 +171,7 @@ class TestPrediction:
             assert made.summary()["pcp"].mean > 99.9
 
     def test_people_whom_fewer_than_two_cameras_see_are_missed(self, corners):
-        layer = FastLayer.of(Volume.box(2, 2), detector=PERFECT, people=1, spacing=1.0)
+        layer = FastLayer.in_volume(Volume.box(2, 2), detector=PERFECT, people=1, spacing=1.0)
         away = [camera(4, k, at=(9, k, 1), name=f"away {k}") for k in range(2)]
         made = layer.predict([layer.terms(each) for each in (corners[0], *away)])
         assert made.recall.max() == 0
@@ -181,7 +181,7 @@ class TestPrediction:
 
     def test_the_same_seed_gives_the_same_prediction_and_another_seed_another(self, corners):
         made = [
-            FastLayer.of(Volume.box(2, 2), detector=read_profile("typical"), people=2, spacing=1.0, seed=seed)
+            FastLayer.in_volume(Volume.box(2, 2), detector=read_profile("typical"), people=2, spacing=1.0, seed=seed)
             for seed in (1, 1, 2)
         ]
         one, again, other = (each.predict([each.terms(view) for view in corners]).error_mm for each in made)
@@ -190,7 +190,7 @@ class TestPrediction:
 
     def test_a_symmetric_rig_has_a_symmetric_map(self):
         corners = [camera(4 * x, 4 * y, 2.2, name=f"{x}{y}", focal=700) for x in (-1, 1) for y in (-1, 1)]
-        layer = FastLayer.of(Volume.box(5, 5), detector=PERFECT, people=1, spacing=1.0, orientations=16, draws=8)
+        layer = FastLayer.in_volume(Volume.box(5, 5), detector=PERFECT, people=1, spacing=1.0, orientations=16, draws=8)
         views = layer.predict([layer.terms(each) for each in corners]).views.reshape(5, 5)
         # The difference of two means of 128 draws of 0 to 4 cameras has a standard deviation of at most 0.125.
         assert np.ptp(views) > 1.0
@@ -199,7 +199,7 @@ class TestPrediction:
 
     def test_more_cameras_are_better_and_more_people_are_worse(self, corners):
         def pcp(people, count):
-            layer = FastLayer.of(Volume.box(3, 3), detector=read_profile("typical"), people=people, spacing=0.75)
+            layer = FastLayer.in_volume(Volume.box(3, 3), detector=read_profile("typical"), people=people, spacing=0.75)
             made = layer.predict([layer.terms(each) for each in corners[:count]], variant="full")
             return made.summary()["pcp"]
 
@@ -229,7 +229,7 @@ class TestSightings:
                 "correlation": CorrelationSection(scatter_views=1.0, gross_views=1.0, views=1.0),
             }
         )
-        layer = FastLayer.of(Volume.box(1, 1), detector=shared, people=1, spacing=1.0, orientations=32)
+        layer = FastLayer.in_volume(Volume.box(1, 1), detector=shared, people=1, spacing=1.0, orientations=32)
         views = [camera(5, 0, name="one"), camera(5, 0.02, name="two")]
         terms = [layer.terms(view) for view in views]
         labels = [see(view, layer.scenes).visibility[:, 0] for view in views]
@@ -252,7 +252,7 @@ class TestSightings:
                 "phantoms": PERFECT.phantoms,
             }
         )
-        layer = FastLayer.of(Volume.box(2, 2), detector=scatter_only, people=1, spacing=1.0, orientations=64)
+        layer = FastLayer.in_volume(Volume.box(2, 2), detector=scatter_only, people=1, spacing=1.0, orientations=64)
         view = camera(6, 0)
         terms = layer.terms(view)
         visible = see(view, layer.scenes).visibility[:, 0] == VISIBLE

@@ -16,8 +16,7 @@ from simharness.planning.room_file import read_room
 from simharness.planning.standing_people import taken_floor
 from simharness.scenario.presets import read_profile
 from simharness.types.floor import Volume
-from simharness.world.rigs.layouts import look_at
-from simharness.world.rigs.published_rigs import preset_rig
+from simharness.world.rigs.layouts import look_at, preset_rig
 from simharness.world.scene.objects.geoms import Box
 
 

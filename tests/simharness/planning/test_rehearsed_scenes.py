@@ -11,8 +11,7 @@ from mvpose import Rig
 from simharness.planning.rehearsal_scene import SceneSettings
 from simharness.planning.rehearsal_setup import RehearsalSetup
 from simharness.planning.rig_file import read_rig
-from simharness.planning.scene_results import Condition, loss_of
-from simharness.planning.simulated_scenes import SceneBatch, simulate_scenes
+from simharness.planning.simulated_scenes import Condition, SceneBatch, loss_of, simulate_scenes
 from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.types.floor import Volume

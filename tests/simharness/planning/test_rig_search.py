@@ -12,11 +12,10 @@ import pytest
 
 from mvpose.arrays import Floats
 from simharness.planning.candidates import Candidate, candidates_in, far_enough
-from simharness.planning.limits import Limits
 from simharness.planning.planned_room import Room
 from simharness.planning.room_file import make_room
 from simharness.planning.room_keys import RoomKeys
-from simharness.planning.search import CandidateSet, Ledger, exchange_search, refine
+from simharness.planning.search import CandidateSet, Ledger, Limits, exchange_search, refine
 
 SEEDS = range(6)
 
@@ -69,7 +68,7 @@ def best_of_all(values: Coverage, terms: Sequence[Floats], limits: Limits) -> fl
 def test_search_finds_the_best_of_all_sets(seed: int) -> None:
     room, values = small_room(), Coverage()
     candidates = few(room, 14, seed)
-    terms, limits = [values.terms(each) for each in candidates], Limits.of(room, candidates, 3)
+    terms, limits = [values.terms(each) for each in candidates], Limits.of_room(room, candidates, 3)
     found = exchange_search(values, terms, limits, starts=6, seed=seed)
     assert found[0][1] == pytest.approx(best_of_all(values, terms, limits))
     assert found[0][1] == pytest.approx(values.value([terms[k] for k in found[0][0]]))
@@ -88,13 +87,13 @@ def test_exchange_leaves_the_first_choice_of_a_greedy_start() -> None:
     terms = [
         np.isin(np.arange(10), seen).astype(float) for seen in ([0, 1, 2, 3, 4, 5], [0, 1, 2, 6, 7], [3, 4, 5, 8, 9])
     ]
-    assert exchange_search(Union(), terms, Limits.of(room, candidates, 2), starts=1, seed=0) == [((1, 2), 10.0)]
+    assert exchange_search(Union(), terms, Limits.of_room(room, candidates, 2), starts=1, seed=0) == [((1, 2), 10.0)]
 
 
 def test_budget_spacing_and_kinds_hold_in_every_set() -> None:
     room, values = small_room(budget=5.0, spacing=1.5), Coverage()
     candidates = few(room, 40, 1)
-    terms, limits = [values.terms(each) for each in candidates], Limits.of(room, candidates, 3)
+    terms, limits = [values.terms(each) for each in candidates], Limits.of_room(room, candidates, 3)
     for chosen, _ in exchange_search(values, terms, limits, starts=6, seed=0):
         rig = [candidates[k] for k in chosen]
         assert len(rig) == 3
@@ -105,7 +104,7 @@ def test_budget_spacing_and_kinds_hold_in_every_set() -> None:
 def test_budget_without_a_number_buys_as_many_as_it_can() -> None:
     room, values = small_room(budget=4.0), Coverage()
     cheap = [each for each in few(room, 60, 1) if each.lens == 1]
-    limits = Limits.of(room, cheap, None)
+    limits = Limits.of_room(room, cheap, None)
     found = exchange_search(values, [values.terms(each) for each in cheap], limits, starts=2, seed=0)
     assert len(found[0][0]) == 4
 
@@ -122,7 +121,7 @@ def test_least_numbers_of_a_kind_are_kept() -> None:
         )
     )
     values, candidates = Coverage(), candidates_in(room, spacing=2.0)
-    terms, limits = [values.terms(each) for each in candidates], Limits.of(room, candidates, 4)
+    terms, limits = [values.terms(each) for each in candidates], Limits.of_room(room, candidates, 4)
     for chosen, _ in exchange_search(values, terms, limits, starts=3, seed=0):
         assert [room.mounts[candidates[k].mount].kind for k in chosen].count("ceiling") == 2
 
@@ -154,7 +153,7 @@ class Interrupted(Coverage):
 def test_interrupted_search_goes_on_and_gives_the_same(tmp_path: Path) -> None:
     room = small_room()
     candidates = few(room, 12, 4)
-    terms, limits = [Coverage().terms(each) for each in candidates], Limits.of(room, candidates, 3)
+    terms, limits = [Coverage().terms(each) for each in candidates], Limits.of_room(room, candidates, 3)
     whole = exchange_search(Coverage(), terms, limits, starts=4, seed=9)
     path = tmp_path / "search.json"
     with pytest.raises(KeyboardInterrupt):

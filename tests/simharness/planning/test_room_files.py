@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from simharness.planning.candidates import candidates_in, moved, places_in
-from simharness.planning.limits import Limits
 from simharness.planning.plan_rig import plan_rig
 from simharness.planning.planned_room import Room
 from simharness.planning.room_file import make_room, read_room
 from simharness.planning.room_keys import RoomKeys
+from simharness.planning.search import Limits
 
 BOX: dict[str, Any] = {"room": {"size": (6.0, 5.0, 3.0)}, "volume": {"size": (3.0, 3.0)}}
 
@@ -153,4 +153,4 @@ def test_no_number_of_cameras() -> None:
 def test_limits_that_no_rig_fulfils(cameras: dict[str, Any], message: str) -> None:
     small = room(cameras=cameras)
     with pytest.raises(ValueError, match=message):
-        Limits.of(small, candidates_in(small), 4)
+        Limits.of_room(small, candidates_in(small), 4)

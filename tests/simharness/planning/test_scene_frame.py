@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simharness.planning.rehearsal_scene import SceneFrame
-from simharness.world.rigs.published_rigs import preset_rig
+from simharness.world.rigs.layouts import preset_rig
 
 
 def test_an_upright_rectangle_keeps_its_axes():

@@ -45,7 +45,7 @@ class FilmedPeople:
         kind = parameters.get("kind", "top-down")
         found = self.detections(seed=seed, **parameters)
         joints = self.sequence.joints
-        occlusion = Conditions.of(self.views).occlusion if staged else None
+        occlusion = Conditions.of_views(self.views).occlusion if staged else None
         bodies = joints if staged else None
         return Sample("filmed", self.rig, self.sequence.time, joints, found, kind, staged=bodies, occlusion=occlusion)
 

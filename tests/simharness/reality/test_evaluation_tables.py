@@ -8,10 +8,10 @@ import numpy as np
 from rich.console import Console
 from small_recording import PERSON, Fixed, small_recording
 
-from simharness.cli.evaluation_tables import print_evaluation, print_twin_comparison
+from simharness.cli.score_tables import print_evaluation, print_twin_comparison
 from simharness.reality.evaluation import evaluate
 from simharness.reality.seed_evaluation import PcpInterval
-from simharness.reality.twin_comparison import TwinComparison
+from simharness.reality.twin import TwinComparison
 
 
 def printed(evaluation):

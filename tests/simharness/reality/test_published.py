@@ -5,7 +5,8 @@ import re
 import pytest
 
 from mvpose.presets import PRESETS
-from simharness.reality.published_scores import ABLATION, COMPARISON
+from simharness.reality.evaluation import ABLATION
+from tools.paper_tables.tables import COMPARISON
 
 ROWS = [
     (data, name, row) for table in (ABLATION, COMPARISON) for data, rows in table.items() for name, row in rows.items()

@@ -12,8 +12,7 @@ from simharness.reality.detector_fit.detector_measurement import agreement
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS
 from simharness.reality.seed_evaluation import PcpInterval
-from simharness.reality.twin import TwinModel, detected_twin, simulate_twins
-from simharness.reality.twin_comparison import TwinComparison, compare
+from simharness.reality.twin import TwinComparison, TwinModel, compare, detected_twin, simulate_twins
 from simharness.scenario.sections.detector_section import BiasSection, DetectorSection
 
 DETECTOR = DetectorSection.model_validate(
@@ -125,7 +124,7 @@ def test_a_twin_measures_as_its_recording(filmed):
         bias={"hips": [0.0, 0.01, 0.03]},
     )  # fmt: skip
     fitted = fit(recording, resamples=100)
-    (twin,) = simulate_twins(TwinModel.of(recording, fitted), count=1)
+    (twin,) = simulate_twins(TwinModel.of_fit(recording, fitted), count=1)
     again = fit(twin, resamples=100)
     different, compared = agreement(fitted.real, again.real)
     assert compared > 90

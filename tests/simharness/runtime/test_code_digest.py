@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from simharness.runtime import code_digest
-from simharness.runtime.code_digest import digest_of_folders
+from simharness.runtime import version
+from simharness.runtime.version import digest_of_folders
 
 SOURCE = '"""A module."""\n\nVALUE = 1  # a comment\n'
 
@@ -48,13 +48,13 @@ class TestKeptTrees:
 
     @staticmethod
     def in_a_new_process(package):
-        code_digest._known_trees.cache_clear()
-        code_digest._meaning.cache_clear()
+        version._known_trees.cache_clear()
+        version._meaning.cache_clear()
         return digest_of_folders(package, [""])
 
     def test_a_module_is_parsed_once(self, package, monkeypatch):
         first = self.in_a_new_process(package)
-        monkeypatch.setattr(code_digest.ast, "parse", lambda _: pytest.fail("the module is parsed again"))
+        monkeypatch.setattr(version.ast, "parse", lambda _: pytest.fail("the module is parsed again"))
         assert self.in_a_new_process(package) == first
 
     def test_an_edit_counts_even_with_the_size_and_time_of_before(self, package):

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scoring.average_precision import average_precision, nearest_people
+from simharness.scoring.assessment import average_precision, nearest_people
 
 
 def ap(claims, people, threshold=0.1):

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.study.tables import factor_column, tables
+from simharness.study.study_folder import factor_column, tables
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import picture_source_of
 from simharness.trial.stages.simulation import capture_trial, detect_trial
 from simharness.types.views import Visibility
-from simharness.world.motion.presence import ALWAYS, Presence, held
+from simharness.world.motion.motion import ALWAYS, Presence, held
 from simharness.world.scene.playback import Playback
 
 FRAMES, GONE = 6, 3  # frames, and the first one in which person 1 is absent

@@ -10,7 +10,7 @@ import pytest
 
 import mvpose
 import simharness
-from simharness.runtime.code_digest import files_of
+from simharness.runtime.version import files_of
 from simharness.scenario.load import load, load_study
 from simharness.scenario.sections.section import Section
 from simharness.study.study_plan import plan

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simharness.types.light_sources import AreaLight, LightSources, Sun
+from simharness.types.lighting import AreaLight, LightSources, Sun
 
 PANEL = AreaLight((0, 0, 3), (0, 0.3, 0), (0.6, 0, 0), (2, 2, 2))
 

@@ -1,7 +1,5 @@
 """Activity "carry": lift a box, step aside with it, and put it down."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -28,8 +26,7 @@ from simharness.world.motion.poses.inverse_kinematics import (
     solve_legs,
 )
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import Curves, blend, limbs, relaxed_posture
-from simharness.world.motion.poses.timing import cycle_time, minimum_jerk
+from simharness.world.motion.poses.timing import Curves, blend, cycle_time, limbs, minimum_jerk, relaxed_posture
 from simharness.world.motion.trajectory import Trajectory
 
 _GRIP, _NEARER = (

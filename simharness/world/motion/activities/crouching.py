@@ -1,7 +1,5 @@
 """Activities "squat", "kneel" (on one knee) and "crouch": lowering the body and rising again."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.arrays import Floats
@@ -12,8 +10,16 @@ from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import PEELING, foot_path, hip_position, pelvis_from_hips, stance
 from simharness.world.motion.poses.inverse_kinematics import pose_angles, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import Curves, blend, limb, limbs, relaxed_posture
-from simharness.world.motion.poses.timing import cycle_time, minimum_jerk, smooth_noise
+from simharness.world.motion.poses.timing import (
+    Curves,
+    blend,
+    cycle_time,
+    limb,
+    limbs,
+    minimum_jerk,
+    relaxed_posture,
+    smooth_noise,
+)
 
 _ON_TOES, _TIPPED = np.radians(
     [-88.0, -94.5]

@@ -1,7 +1,5 @@
 """Activity "dance": step-touch from side to side on the beat, with arms that are raised now and then."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.arrays import Floats
@@ -12,8 +10,7 @@ from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import Footprint, foot_path, spot_to_world, stance
 from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import blend, limb, relaxed_posture
-from simharness.world.motion.poses.timing import minimum_jerk, smooth_noise
+from simharness.world.motion.poses.timing import blend, limb, minimum_jerk, relaxed_posture, smooth_noise
 
 _BAR = 4  # beats per bar: step, touch, step back, touch
 _STRAIGHTEST = np.radians(16.0)  # smallest knee flexion

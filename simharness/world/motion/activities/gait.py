@@ -8,8 +8,6 @@ length and the pitch and swing of its feet. ``walking.py`` then places the feet 
 that the curves are met on a straight path and approximated on a bend.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,12 +17,10 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
 from mvpose.arrays import Floats
-from simharness.world.motion.activities.footprints import leftward
-from simharness.world.motion.poses.foot_roll import FootRoll
+from simharness.world.motion.poses.foot_placement import leftward
 from simharness.world.motion.poses.inverse_kinematics import Pelvis
-from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import Curves
-from simharness.world.motion.poses.timing import smoothstep
+from simharness.world.motion.poses.kinematics import FootRoll, Kinematics
+from simharness.world.motion.poses.timing import Curves, smoothstep
 
 Knots = tuple[tuple[float, float], ...]  # (fraction of the stride, degrees)
 

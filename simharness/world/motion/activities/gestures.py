@@ -3,8 +3,6 @@
 A gesture is a function that changes joint angle curves (degrees) in place, decorated with ``_gesture``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -17,8 +15,15 @@ from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import foot_path, spot_to_world, stance
 from simharness.world.motion.poses.inverse_kinematics import Pelvis, pose_angles, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import Curves, blend, draw_side, limb, relaxed_posture
-from simharness.world.motion.poses.timing import gesture_envelope, smooth_noise
+from simharness.world.motion.poses.timing import (
+    Curves,
+    blend,
+    draw_side,
+    gesture_envelope,
+    limb,
+    relaxed_posture,
+    smooth_noise,
+)
 
 _STRAIGHTEST = np.radians(8.0)  # smallest knee flexion
 _FURTHEST = 0.034  # metres: largest offset of the pelvis from the spot along either axis

@@ -1,7 +1,5 @@
 """Activity "lie": squat, sit on the floor, roll onto the back, stretch the legs, and get up again."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
@@ -21,8 +19,16 @@ from simharness.world.motion.poses.foot_placement import (
 )
 from simharness.world.motion.poses.inverse_kinematics import arm_angles, pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import Curves, blend, limbs, relaxed_posture
-from simharness.world.motion.poses.timing import cycle_time, ease, minimum_jerk, smooth_noise
+from simharness.world.motion.poses.timing import (
+    Curves,
+    blend,
+    cycle_time,
+    ease,
+    limbs,
+    minimum_jerk,
+    relaxed_posture,
+    smooth_noise,
+)
 
 _SITTING = 0.68  # distance from ankles to hips when sitting on the floor with bent knees, in leg lengths
 _BACK = 0.05  # additional distance when lying, in leg lengths

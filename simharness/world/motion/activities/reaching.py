@@ -1,7 +1,5 @@
 """Activity "reach": reach for objects high up and low down."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.arrays import Floats
@@ -18,8 +16,15 @@ from simharness.world.motion.poses.foot_placement import (
 )
 from simharness.world.motion.poses.inverse_kinematics import arm_angles, pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import blend, draw_side, limb, relaxed_posture
-from simharness.world.motion.poses.timing import cycle_time, minimum_jerk, smooth_noise
+from simharness.world.motion.poses.timing import (
+    blend,
+    cycle_time,
+    draw_side,
+    limb,
+    minimum_jerk,
+    relaxed_posture,
+    smooth_noise,
+)
 
 
 @solo_activity("reach", clearance=0.2)

@@ -4,12 +4,13 @@ The gait is that of ``walking.py``. Its amplitudes follow the speed, so that a p
 while the cadence is kept: a slow step is a short one. Steps are in proportion to the legs. The height of the pelvis
 follows the feet: high over a standing person, lower while steps are long. A footprint lies where the pelvis passes over
 it; a foot is lifted only in a stride that moves its footprint.
+
+Activities: "visit", coming in, walking from place to place, and going out again; and "hide", walking through a booth
+with curtains, in which no camera sees the person for a while.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -17,10 +18,14 @@ from scipy.interpolate import BSpline
 from scipy.ndimage import minimum_filter1d
 
 from mvpose.arrays import Floats
+from simharness.scenario.sections.people_section import PeopleSection
+from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.activities.footprints import Footprints
 from simharness.world.motion.activities.gait import Gait, make_gait, similar_walk_ratio, walking_posture
-from simharness.world.motion.motion import Motion
+from simharness.world.motion.activity_registry import Activity, activity
+from simharness.world.motion.motion import Motion, Performance, Prop
+from simharness.world.motion.paths import Spot
+from simharness.world.motion.poses.foot_placement import Footprints, spot_to_world
 from simharness.world.motion.poses.inverse_kinematics import (
     Foot,
     Pelvis,
@@ -30,9 +35,9 @@ from simharness.world.motion.poses.inverse_kinematics import (
     solve_legs,
 )
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import blend, limbs, relaxed_posture
-from simharness.world.motion.poses.timing import smoothstep
-from simharness.world.motion.routes import Route
+from simharness.world.motion.poses.timing import blend, limbs, relaxed_posture, smoothstep
+from simharness.world.motion.routes import Itinerary, Route, turning_time
+from simharness.world.motion.trajectory import Trajectory
 
 LOOKAHEAD = 3.0
 """Seconds for which a route must be known beyond the last time: poses depend on the steps that follow."""
@@ -231,3 +236,61 @@ def following_height(
     lowest = minimum_filter1d(np.min(allowed, axis=0) - pelvis.bob, 2 * reach + 1)[reach:-reach:_SAMPLES]
     knots = np.arange(first - 2, last + 3) * apart
     return np.asarray(BSpline(knots, lowest, 3)(time))
+
+
+@activity("visit", track=Route)
+def visit(
+    performers: Sequence[Kinematics], route: Route, time: Floats, *, rng: np.random.Generator, pace: float
+) -> Performance:
+    """Walk along a route and stand where it stops; absent where the route is outside of the room."""
+    (mover,) = performers
+    return Performance((walk_route(mover, route, time, rng=rng, pace=pace),), presence=(route.presence,))
+
+
+_DEPTH, _WIDTH = 1.4, 1.1  # metres: size of the booth, along the way and across
+_STRIDE = 0.3  # metres from the pelvis to the foremost part of a walking body, which must be behind the curtain
+_OVER_HEAD = 0.25  # metres between the top of the head and the roof
+_ENDS = 1.45  # metres from the middle of the booth to the places where people turn
+_FROUDE = 0.33
+_GRAVITY = 9.81
+_REST = (0.3, 2.0)  # seconds of standing beside the booth
+
+
+def _configured(each: Activity, people: PeopleSection) -> Activity:
+    return replace(each, perform=partial(_perform, hidden=people.hidden))
+
+
+@activity("hide", clearance=_ENDS, configured=_configured)
+def hide(
+    performers: Sequence[Kinematics], spot: Spot, time: np.ndarray, *, rng: np.random.Generator, pace: float
+) -> Performance:
+    """Walk through the booth, turn round on the other side, and come back, again and again."""
+    return _perform(performers, spot, time, rng=rng, pace=pace, hidden=PeopleSection().hidden)
+
+
+def _perform(
+    performers: Sequence[Kinematics],
+    spot: Spot,
+    time: np.ndarray,
+    *,
+    rng: np.random.Generator,
+    pace: float,
+    hidden: float,
+) -> Performance:
+    (mover,) = performers
+    speed = _FROUDE * float(np.sqrt(_GRAVITY * mover.leg_length))
+    offset, sense = rng.uniform(), rng.choice([-1.0, 1.0])
+    rests = stream(int(rng.integers(1 << 31)), "hide")  # a longer time takes more draws, and changes no other
+    inside = (_ENDS - _DEPTH / 2 + _STRIDE, _ENDS + _DEPTH / 2 - _STRIDE, hidden)
+    walker = Itinerary(spot_to_world(spot, [-_ENDS, 0.0]), spot.bearing, speed)
+    walker.time = -2.0 - offset * (hidden + turning_time(np.pi) + 2.0)
+    legs = 0
+    while walker.time < time[-1] + LOOKAHEAD:
+        legs += 1
+        walker.walk(2 * _ENDS, slow=inside).turn(spot.bearing + legs * np.pi, sense=sense)
+        walker.stand(rests.uniform(*_REST))
+    motion = walk_route(mover, walker.route(), time, rng=rng, pace=pace)
+    half = spot.bearing / 2
+    pose = np.array([[*spot.place, 0.0, np.cos(half), 0.0, 0.0, np.sin(half)]])
+    size = (_DEPTH, _WIDTH, round(mover.body.stature + _OVER_HEAD, 2))
+    return Performance((motion,), (Prop("booth", size, Trajectory(np.zeros(1), pose)),))

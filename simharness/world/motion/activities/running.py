@@ -6,20 +6,18 @@ degrees in stance and 90 in swing, hip flexion from 45 to -7, ankle dorsiflexion
 they are smooth curves. Slower runners use the same curves with a smaller amplitude.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.activities.footprints import leftward
 from simharness.world.motion.activities.gait import Gait, Knots, flatten_stance, periodic, pin_ends
 from simharness.world.motion.activities.walking import footsteps, laps
 from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
+from simharness.world.motion.poses.foot_placement import leftward
 from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease

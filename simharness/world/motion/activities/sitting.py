@@ -1,7 +1,5 @@
 """Activity "sit": sit down on a chair, and stand up again."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,8 +19,7 @@ from simharness.world.motion.poses.foot_placement import (
 )
 from simharness.world.motion.poses.inverse_kinematics import pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import blend, limbs, relaxed_posture
-from simharness.world.motion.poses.timing import cycle_time, ease, minimum_jerk
+from simharness.world.motion.poses.timing import blend, cycle_time, ease, limbs, minimum_jerk, relaxed_posture
 from simharness.world.motion.trajectory import Trajectory
 
 _SHANK = np.radians(5.0)  # forward tilt of a seated shank

@@ -1,28 +1,25 @@
 """Activities "turn" (turning on the spot) and "step" (onto a low block and down again)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.activities.footprints import leftward
 from simharness.world.motion.activity_registry import activity, solo_activity
 from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.poses.foot_placement import (
     Footprint,
     foot_path,
+    leftward,
     relaxed_pelvis_height,
     spot_to_world,
     stance,
 )
 from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_legs, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import blend, limb, relaxed_posture
-from simharness.world.motion.poses.timing import bump, cycle_time, minimum_jerk
+from simharness.world.motion.poses.timing import blend, bump, cycle_time, limb, minimum_jerk, relaxed_posture
 from simharness.world.motion.trajectory import Trajectory
 
 Steps = Mapping[str, list[tuple[float, float, Footprint]]]  # by side: take-off time, landing time, footprint

@@ -1,19 +1,17 @@
 """Activity "walk": footprints beside a loop, a pelvis that follows it, and arms and trunk that counter the legs."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.activities.footprints import Footprints
 from simharness.world.motion.activities.gait import Gait, make_gait, walking_posture
 from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
+from simharness.world.motion.poses.foot_placement import Footprints
 from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import limbs
+from simharness.world.motion.poses.timing import limbs
 
 _GRAVITY = 9.81
 _STRAIGHTEST = np.radians(4.0)

@@ -5,8 +5,6 @@ half at the other, and all are in the middle at the same time: two people pass e
 through each other. Who passes closer than shoulders are wide turns them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -3,8 +3,6 @@
 They pass an object back and forth, a bottle with one hand or a box with both, or shake their right hands.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

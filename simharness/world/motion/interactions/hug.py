@@ -1,7 +1,5 @@
 """Activity "hug": two people step up to each other, close their arms, hold, let go and step back."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -25,8 +23,7 @@ from simharness.world.motion.poses.inverse_kinematics import (
     solve_standing,
 )
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import Curves, limbs, relaxed_posture
-from simharness.world.motion.poses.timing import bump, cycle_time, ease
+from simharness.world.motion.poses.timing import Curves, bump, cycle_time, ease, limbs, relaxed_posture
 
 Role = Literal["over", "under"]
 

@@ -1,7 +1,5 @@
 """Two people face to face: distance, lean, gaze and reach, so that their hands meet."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

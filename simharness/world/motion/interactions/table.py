@@ -1,7 +1,5 @@
 """Activity "table": two people sit or stand at a table and talk, write, or reach for objects on it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -25,8 +23,7 @@ from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import foot_path, pelvis_from_hips, spot_to_world, stance
 from simharness.world.motion.poses.inverse_kinematics import pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import blend, relaxed_posture
-from simharness.world.motion.poses.timing import gesture_envelope, smooth_noise
+from simharness.world.motion.poses.timing import blend, gesture_envelope, relaxed_posture, smooth_noise
 from simharness.world.motion.trajectory import Trajectory
 
 _SEATED = 0.65  # probability that they sit

@@ -5,8 +5,6 @@ applied about fixed axes in the order in which the file lists them, the rotation
 Source: J. Lander, "Working with Motion Capture File Formats", Game Developer, January 1998.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

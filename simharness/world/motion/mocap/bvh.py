@@ -5,8 +5,6 @@ of the root replace its offset; those of other joints are ignored, because bones
 Source: M. Meredith and S. Maddock, "Motion Capture File Formats Explained", University of Sheffield, 2001.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 

@@ -4,8 +4,6 @@ The clip starts at time 0 and is played back and forth, so that people keep movi
 jumps. At either end, and at a start in the first frame, the motion stops and reverses within ``TURN`` seconds.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from functools import cached_property

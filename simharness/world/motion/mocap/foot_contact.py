@@ -6,8 +6,6 @@ from one stance to the next. Heights are given as the clearance between sole and
 never below the floor; uneven ground under the recorded feet becomes flat.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Mapping of the joints of a recorded skeleton to a person, by joint names and hierarchy."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from itertools import pairwise

@@ -5,8 +5,6 @@ its hinges, so that the angles are the same. If the directions do not determine 
 or allow two solutions (a raised arm), the smoother solution is taken.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Line reader for text files of motion; error messages name file and line."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path

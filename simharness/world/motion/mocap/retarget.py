@@ -6,8 +6,6 @@ the feet are placed on the floor (``foot_contact.py``), the pelvis is lowered wh
 legs are solved for the feet. All angles stay within their ranges.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """MocapSkeleton and joint rotations of a motion file."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

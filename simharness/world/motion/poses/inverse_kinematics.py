@@ -1,7 +1,5 @@
 """Inverse kinematics of a body: legs for a given pelvis and feet, and arms that reach for given positions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 

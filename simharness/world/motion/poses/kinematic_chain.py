@@ -4,8 +4,6 @@ Product of exponentials: Lynch and Park, "Modern Robotics", 2017, sections 4.1 (
 Jacobian) and 6.2 (numerical inverse kinematics). A whole motion is solved at once, one row per frame.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

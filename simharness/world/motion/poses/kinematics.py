@@ -1,19 +1,20 @@
-"""Forward kinematics of one body, computed with the MuJoCo model of the person."""
+"""Forward kinematics of one body, computed with the MuJoCo model of the person, and the roll of its soles."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import mujoco
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import DOFS, RANGES, SIDES
 from simharness.world.humans.body import Body
 from simharness.world.humans.mujoco_model import bone_transforms, person_spec
 from simharness.world.motion.motion import Motion
-from simharness.world.motion.poses.foot_roll import FootRoll, roll_sole
 from simharness.world.motion.poses.kinematic_chain import Chain
 
 _TRUNK = ("lumbar_flexion", "lumbar_bending", "lumbar_rotation", "thorax_flexion", "thorax_bending", "thorax_rotation")
@@ -30,6 +31,7 @@ _FEET = {"left": "LeftFoot", "right": "RightFoot"}
 _ORIGIN = np.array([0.0, 0, 0, 1, 0, 0, 0])
 _SOLE = 0.03  # metres: skin this near the floor in the neutral stance belongs to the sole
 _KNEE = 0.04  # metres: half the height and width of the knee region
+_STEP, _ROUNDING = 0.25, 5.0  # degrees: of the pitch of a foot that rolls
 _PALM = 0.02  # metres: half the height of the region at the centre of the palm
 
 
@@ -192,3 +194,48 @@ class Addresses:
     def read(self, data: mujoco.MjData) -> tuple[Floats, Floats]:
         """Return copies of positions (B, 3) and orientations (B, 3, 3) of the bones after ``mj_kinematics``."""
         return data.xpos[self._bones], data.xmat[self._bones].reshape(-1, 3, 3)
+
+
+@dataclass(frozen=True)
+class FootRoll:
+    """Position of the ankle as a function of the pitch of the foot.
+
+    Attributes:
+        pitch: pitch, toes up positive, (n,) radians, ascending.
+        ahead: forward offset of the ankle from its position over the flat foot, (n,) metres.
+        height: height of the ankle while the lowest point of the sole touches the floor, (n,) metres.
+        passing: as ``height``, but smooth where the lowest point changes from toe to heel, and nowhere lower, (n,)
+            metres; for a foot in the air.
+    """
+
+    pitch: Floats
+    ahead: Floats
+    height: Floats
+    passing: Floats
+
+    def at(self, pitch: Floats) -> tuple[Floats, Floats]:
+        """Return forward offset and height of the ankle at pitches (...), metres."""
+        return np.interp(pitch, self.pitch, self.ahead), np.interp(pitch, self.pitch, self.height)
+
+    def spare(self, pitch: Floats) -> Floats:
+        """Return the floor clearance of a swinging foot at pitches (...), metres."""
+        return np.interp(pitch, self.pitch, self.passing - self.height)
+
+
+def roll_sole(sole: Floats) -> FootRoll:
+    """Roll a rigid sole over its edges: at each pitch the lowest point touches the floor and does not slip.
+
+    Args:
+        sole: points of the flat sole relative to the ankle, x forward, z up, (n, 3) metres.
+    """
+    pitch = np.radians(np.arange(-95.0, 95.0, _STEP))
+    forward, up = sole[:, 0], sole[:, 2]
+    x = forward * np.cos(pitch)[:, None] - up * np.sin(pitch)[:, None]
+    z = forward * np.sin(pitch)[:, None] + up * np.cos(pitch)[:, None]
+    touching = z.argmin(axis=1)
+    rows = np.arange(len(pitch) - 1)
+    ahead = np.concatenate([[0.0], np.cumsum(x[rows, touching[:-1]] - x[rows + 1, touching[:-1]])])
+    ahead -= np.interp(0.0, pitch, ahead)
+    height = -z.min(axis=1)
+    passing = np.maximum(height, gaussian_filter1d(height, _ROUNDING / _STEP))
+    return FootRoll(pitch=pitch, ahead=ahead, height=height, passing=passing)

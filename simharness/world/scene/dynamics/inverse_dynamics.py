@@ -6,8 +6,6 @@ provide; the contact forces are distributed to be small (weighted least squares;
 Algorithms", 2008, section 9) and transmitted through the joints.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from copy import copy
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import Any, Protocol, Self
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from simharness.types.floor import Floor
-
-if TYPE_CHECKING:
-    import mujoco
 
 Point = tuple[float, float, float]
 

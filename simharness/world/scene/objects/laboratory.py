@@ -3,8 +3,6 @@
 Boxes, bookshelves and racks; pillars, partitions and carts; chairs and tables, which are props as well.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

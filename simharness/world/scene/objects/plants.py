@@ -1,7 +1,5 @@
 """Potted plants of three kinds: broad leaves on stems, arching fronds, upright blades."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.arrays import Floats

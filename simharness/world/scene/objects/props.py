@@ -1,7 +1,5 @@
 """Props: shapes of the objects that activities use."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import MappingProxyType
 

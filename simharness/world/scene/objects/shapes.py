@@ -4,8 +4,6 @@ Faces are counter-clockwise as seen from outside. Creases have separate vertices
 have flat sides and sharp edges.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Self

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -14,9 +15,6 @@ from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
 from simharness.world.motion.trajectory import Trajectory, transform_points
 from simharness.world.scene.objects.geoms import Box, Geom, carried
-
-if TYPE_CHECKING:
-    import mujoco
 
 Kind = Literal["room", "furniture", "clutter", "prop", "decoy"]
 

@@ -3,8 +3,6 @@
 MuJoCo reads the mesh of an OBJ file, but neither its materials nor groups of faces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

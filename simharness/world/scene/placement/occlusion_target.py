@@ -1,7 +1,5 @@
 """Objects added until a given share of the joints in the pictures is occluded."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np

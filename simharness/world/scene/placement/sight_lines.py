@@ -1,7 +1,5 @@
 """Lines of sight from cameras to joints: occlusion by solids, and share of the pictures that solids fill."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ wall nowhere. Sizes of courts are those of FIBA (Official Basketball Rules, 2022
 the floor has room.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -23,7 +21,7 @@ from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.materials import draw_sheet
 from simharness.world.scene.objects.shapes import quad_mesh
 from simharness.world.scene.objects.solids import Solid
-from simharness.world.scene.rooms.kinds import ROOM_KINDS
+from simharness.world.scene.rooms.kinds import room_kinds
 from simharness.world.scene.rooms.openings import Opening, Wall, room_walls
 from simharness.world.scene.rooms.room_lighting import room_mood
 
@@ -55,7 +53,7 @@ def make_fittings(
         openings: windows and doors.
         solids: solids in the room: nothing hangs behind one that stands or hangs at the wall.
     """
-    if not room.walls or not ROOM_KINDS[room.kind].doors:
+    if not room.walls or not room_kinds()[room.kind].doors:
         return ()
     sheet, rng = draw_sheet(seed), stream(seed, "room", "fittings")
     frame, leaf = _FRAMES[rng.integers(len(_FRAMES))], _LEAVES[rng.integers(len(_LEAVES))]
@@ -175,7 +173,7 @@ def _sockets(f: Furnishing, wall: Wall, taken: Taken) -> None:
 
 def _prints(f: Furnishing, room: RoomSection, rng: np.random.Generator, wall: Wall, taken: Taken) -> None:
     """Hang prints on a wall where it is free: each by chance, framed if it is a picture."""
-    for name, width, height in ROOM_KINDS[room.kind].prints:
+    for name, width, height in room_kinds()[room.kind].prints:
         chance, tries, shade = rng.uniform(), rng.uniform(size=8), rng.uniform()
         if chance < (0.55 if name in ("whiteboard", "clock") else 0.25):
             continue

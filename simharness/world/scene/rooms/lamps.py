@@ -1,28 +1,22 @@
 """Lamps and windows of a room as area lights, what pictures show of them, and the ceiling."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mvpose.camera import Rig
 from simharness.scenario.sections.room_section import RoomSection
-from simharness.types.light_sources import AreaLight, Vector
+from simharness.types.lighting import AreaLight, Vector
 from simharness.world.scene.objects.furnishing import Furnishing
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.materials import draw_sheet
 from simharness.world.scene.objects.shapes import quad_mesh
 from simharness.world.scene.objects.solids import Solid
-from simharness.world.scene.rooms.kinds import ROOM_KINDS, LampKind
+from simharness.world.scene.rooms.kinds import LampKind, room_kinds
 from simharness.world.scene.rooms.openings import Opening
 from simharness.world.scene.rooms.room_lighting import Mood, room_mood
-
-if TYPE_CHECKING:
-    from mvpose.camera import Rig
-
 
 _CEILING = (0.93, 0.93, 0.92)  # sRGB of white paint
 _CELL = 1.0  # metres: cell size of the ceiling
@@ -84,7 +78,7 @@ def _window_light(opening: Opening, mood: Mood) -> AreaLight:
 
 
 def _lamps(room: RoomSection, mood: Mood) -> tuple[AreaLight, ...]:
-    kind = ROOM_KINDS[room.kind].lamps
+    kind = room_kinds()[room.kind].lamps
     if kind == "none" or not any(mood.lamp):
         return ()
     (dx, dy), pitch, down, strength, focus = _LAMPS[kind]
@@ -108,7 +102,7 @@ def shown_lamps(room: RoomSection, seed: int, areas: Sequence[AreaLight]) -> tup
     shown = [fixture(lamp, f"lamp{k}") for k, lamp in enumerate(lamps)]
     bodies = Furnishing(draw_sheet(seed))
     for lamp in lamps:
-        _lamp_body(bodies, ROOM_KINDS[room.kind].lamps, lamp, room.size[2])
+        _lamp_body(bodies, room_kinds()[room.kind].lamps, lamp, room.size[2])
     if bodies.parts:
         mesh = bodies.mesh()
         shown.append(Solid("room", "lamp bodies", mesh, (), Box.around(mesh.vertices)))

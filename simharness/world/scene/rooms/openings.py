@@ -1,7 +1,5 @@
 """Walls of a room as frames, and the windows and doors in them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -14,7 +12,7 @@ from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.solids import Solid
-from simharness.world.scene.rooms.kinds import ROOM_KINDS
+from simharness.world.scene.rooms.kinds import room_kinds
 from simharness.world.scene.rooms.room_lighting import room_lighting
 
 _WINDOW = (1.1, 1.5)  # metres: least and largest width
@@ -110,7 +108,7 @@ def draw_openings(room: RoomSection, seed: int, solids: Sequence[Solid] = ()) ->
     """
     if not room.walls:
         return ()
-    kind, walls = ROOM_KINDS[room.kind], room_walls(room)
+    kind, walls = room_kinds()[room.kind], room_walls(room)
     rng = stream(seed, "room", "openings")
     towards = room_lighting(room, seed).direction[:2]
     sunny = int(np.argmax([-wall.inward @ towards * min(room.size[:2]) / wall.length for wall in walls]))

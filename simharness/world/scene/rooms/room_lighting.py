@@ -1,7 +1,5 @@
 """Lighting of a room by its name in the scenario; outdoors the sun, the sky and the panorama around the scene."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -9,12 +7,9 @@ from types import MappingProxyType
 import numpy as np
 
 from simharness.scenario.sections.room_section import RoomSection
-from simharness.types.light_sources import AreaLight, LightSources, Sun, Vector
-from simharness.types.lighting import Lighting
-from simharness.types.panorama import Panorama
+from simharness.types.lighting import AreaLight, Lighting, LightSources, Panorama, Sun, Vector
 from simharness.types.random_streams import stream
-from simharness.world.scene.rooms.landscape import panorama
-from simharness.world.scene.rooms.surroundings import MEADOW
+from simharness.world.scene.rooms.landscape import MEADOW, panorama
 from simharness.world.scene.rooms.weather import WEATHERS
 
 _EXPOSED = 0.30  # radiance of the view as a share of that of the light of a window
@@ -28,7 +23,7 @@ class Mood:
         window: radiance of the sky that windows show; zeros for none.
         lamp: radiance of the lamps; zeros for lamps that are off.
         sun: the sun, if it shines in.
-        brightness: see :class:`~simharness.types.light_sources.LightSources`.
+        brightness: see :class:`~simharness.types.lighting.LightSources`.
         every: every how many lamps one is on.
     """
 

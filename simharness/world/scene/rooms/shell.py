@@ -4,8 +4,6 @@ The faces of the floor look up and those of the walls look into the room: counte
 room, which is the outside of a wall as a solid. The ceiling is in :mod:`~simharness.world.scene.rooms.lamps`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
@@ -15,7 +13,7 @@ import numpy as np
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
 from simharness.scenario.sections.room_section import RoomSection
-from simharness.types.light_sources import AreaLight
+from simharness.types.lighting import AreaLight
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
@@ -24,9 +22,9 @@ from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.fittings import make_court, make_fittings
 from simharness.world.scene.rooms.kinds import settled
 from simharness.world.scene.rooms.lamps import make_ceiling, shown_lamps
+from simharness.world.scene.rooms.landscape import AROUND, make_surroundings
 from simharness.world.scene.rooms.openings import Opening, Wall, room_walls
 from simharness.world.scene.rooms.room_lighting import room_lighting
-from simharness.world.scene.rooms.surroundings import AROUND, make_surroundings
 from simharness.world.scene.rooms.textures import FLOORS, WALLS, TiledTexture
 
 Choice = TypeVar("Choice")

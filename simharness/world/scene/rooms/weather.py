@@ -4,8 +4,6 @@ The clear sky is that of Preetham, Shirley and Smits, "A practical analytic mode
 overcast one is the standard sky of the CIE (ISO 15469), three times as bright at the zenith as at the horizon.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
-from simharness.types.light_sources import Sun, Vector
+from simharness.types.lighting import Sun, Vector
 from simharness.types.srgb import LUMINANCE
-from simharness.world.scene.rooms.noise import smooth_noise
+from simharness.world.scene.rooms.textures import smooth_noise
 
 _LUMINANCE = np.array(LUMINANCE)
 _ROWS, _COLUMNS = 60, 120  # directions over which the light of the sky is summed
@@ -57,7 +55,7 @@ class Weather:
         beam: colour of the sunlight.
         diffuse: share of the sky in the irradiance of a horizontal surface.
         cover: share of the sky under clouds, least and most.
-        brightness, balance: see :class:`~simharness.types.light_sources.LightSources`.
+        brightness, balance: see :class:`~simharness.types.lighting.LightSources`.
     """
 
     bearing: float

@@ -15,7 +15,7 @@ from mvpose.formats.joint_names import KNOWN
 from mvpose.formats.people.panoptic_poses import body_scene
 from mvpose.skeleton import PANOPTIC19
 from mvpose.wholebody import skeleton_by_name
-from simharness.outputs.benchmark.joint_confidences import confidences
+from simharness.outputs.benchmark.layout import confidences
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence, hd_names
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.views import Visibility

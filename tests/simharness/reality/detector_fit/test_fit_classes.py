@@ -81,7 +81,7 @@ def test_drawn_labels_and_distances_agree(filmed, seed):
             "bias": {"hips": [0.0, 0.01, 0.03]},
         }
     )
-    views, conditions = filmed.views, Conditions.of(filmed.views)
+    views, conditions = filmed.views, Conditions.of_views(filmed.views)
     target = views.pixels + pixel_offsets(filmed.sequence.joints, config.bias, filmed.rig)
     agree: list[bool] = []
     kinds = set()

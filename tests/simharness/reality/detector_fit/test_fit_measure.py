@@ -9,7 +9,7 @@ from filmed_people import narrowed
 
 from mvpose import Detections
 from simharness.detector.draws import PARENT
-from simharness.detector.view_geometry import head_bearings
+from simharness.detector.viewing_conditions import head_bearings
 from simharness.reality.detector_fit.detector_measurement import (
     MeasuredValue,
     agreement,

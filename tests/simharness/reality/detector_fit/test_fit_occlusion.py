@@ -25,7 +25,7 @@ def test_occlusion_from_skeletons_is_that_of_rendered_bodies(filmed):
     """Nine of ten joints have the true class, and each class is as frequent as it is."""
     joints, normals = occlusion.complete_face(filmed.sequence.joints, filmed.sequence.joints)
     found = occlusion.occlusion_classes(joints, normals, np.zeros((len(filmed), 0, 17, 3)), filmed.rig)
-    true = Conditions.of(filmed.views).occlusion
+    true = Conditions.of_views(filmed.views).occlusion
     inside = (true != OUTSIDE) & (found != OUTSIDE)
     counted = np.array([[(inside & (true == a) & (found == b)).sum() for b in range(3)] for a in range(3)])
     assert counted.sum(axis=1).min() > 500

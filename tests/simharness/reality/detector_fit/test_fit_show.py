@@ -9,8 +9,12 @@ from rich.console import Console
 
 from simharness.reality.annotation_errors import AnnotationFit, AnnotationModel
 from simharness.reality.detector_fit.detector_measurement import MeasuredValue, measure_detector
-from simharness.reality.detector_fit.fit_plot import plot_comparison
-from simharness.reality.detector_fit.fit_table import print_agreement, print_annotation, print_measurement
+from simharness.reality.detector_fit.fit_table import (
+    plot_comparison,
+    print_agreement,
+    print_annotation,
+    print_measurement,
+)
 from simharness.scenario.sections.detector_section import KINDS
 
 

@@ -5,7 +5,7 @@ import pytest
 from turning_people import joints_of, walkers
 
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.reality.validation.score_sums import ScoreSums
+from simharness.reality.validation.passes import ScoreSums
 from simharness.scoring.frame_scores import RULES, score_by_rules, score_frames
 from simharness.scoring.score_summary import VariantScores
 from simharness.statistics.resampling import block_weights
@@ -34,7 +34,7 @@ def scene():
 def test_sums_have_the_figures_of_a_summary(scene):
     truth, estimates = scene
     actors = (0, 2)
-    sums = ScoreSums.of(score_by_rules(truth, estimates), actors).total()
+    sums = ScoreSums.of_scores(score_by_rules(truth, estimates), actors).total()
     for rule in RULES[:2]:
         summary = VariantScores(score_frames(truth, estimates, head=rule.mapping)).summary(actors=actors)
         assert sums.pcp(rule) == pytest.approx(summary["pcp"])
@@ -47,17 +47,19 @@ def test_sums_have_the_figures_of_a_summary(scene):
 
 def test_a_resample_is_the_sum_of_its_frames(scene):
     truth, estimates = scene
-    sums = ScoreSums.of(score_by_rules(truth, estimates), (0, 1, 2))
+    sums = ScoreSums.of_scores(score_by_rules(truth, estimates), (0, 1, 2))
     weights = block_weights(np.arange(12) / 25, block=0.1, resamples=5)
     drawn = sums.resampled(weights)
     for row, of_frames in enumerate(weights.astype(int)):
         repeated = np.repeat(np.arange(12), of_frames)
-        alone = ScoreSums.of(score_by_rules(truth[repeated], [estimates[k] for k in repeated]), (0, 1, 2)).total()
+        alone = ScoreSums.of_scores(
+            score_by_rules(truth[repeated], [estimates[k] for k in repeated]), (0, 1, 2)
+        ).total()
         assert drawn.pcp()[row] == pytest.approx(alone.pcp())
         assert drawn.mpjpe()[row] == pytest.approx(alone.mpjpe())
 
 
 def test_exact_estimates_are_exact():
     recording = walkers(frames=3, people=2)
-    sums = ScoreSums.of(score_by_rules(recording.truth, list(joints_of(3, 2))), recording.scored).total()
+    sums = ScoreSums.of_scores(score_by_rules(recording.truth, list(joints_of(3, 2))), recording.scored).total()
     assert (sums.pcp(), sums.mpjpe(), sums.recall(), sums.ghosts()) == (100.0, 0.0, 1.0, 0.0)

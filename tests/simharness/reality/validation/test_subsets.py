@@ -66,11 +66,11 @@ def test_the_result_does_not_depend_on_the_workers():
 
 def test_a_recording_is_its_own_best_twin(passes):
     recordings, results = passes
-    own = compare_subsets(Evidence.of(recordings[1], results[1], [results[1]]), 4, ("full", "fast"))
+    own = compare_subsets(Evidence.of_tallies(recordings[1], results[1], [results[1]]), 4, ("full", "fast"))
     assert all(figure.difference == 0 for curve in own.curves.values() for figure in curve.values())
     assert all(gain.difference == 0 for gain in own.gains.values())
     assert own.ranks["fast"].mean == pytest.approx(1.0)
-    other = compare_subsets(Evidence.of(recordings[0], results[0], results[1:]), 4, ("full", "fast"))
+    other = compare_subsets(Evidence.of_tallies(recordings[0], results[0], results[1:]), 4, ("full", "fast"))
     assert other.curves[2]["fast"].difference < 0
     assert other.mean_difference("fast") > own.mean_difference("fast") == 0
     assert other.sampled == ()

@@ -13,11 +13,9 @@ from mvpose.formats.calibration.voxelpose import write_calibration
 from simharness.cli import app
 from simharness.outputs.validation.page import render_validation
 from simharness.outputs.validation.tables import group_rows
-from simharness.reality.validation import unseen_prediction
 from simharness.reality.validation import validation as validation_module
 from simharness.reality.validation.treatments import KINDS
-from simharness.reality.validation.unseen_prediction import halves
-from simharness.reality.validation.validation import ValidationPlan, validate
+from simharness.reality.validation.validation import ValidationPlan, halves, validate
 from simharness.reality.validation.validation_summary import summarize_validation
 from simharness.reality.validation.verdicts import VerdictState
 from simharness.scenario.toml_files import dumps_keys
@@ -133,7 +131,7 @@ class TestCommand:
     def test_the_exit_code_is_the_verdict(self, described, tmp_path, monkeypatch, noise, code):
         """Twins are given, because filming them takes longer than all the rest."""
         given = [walkers(frames=6, cameras=3, noise=noise, name="twin")] * 2
-        monkeypatch.setattr(unseen_prediction, "simulate_predictions", lambda *_, **__: given)
+        monkeypatch.setattr(validation_module, "simulate_predictions", lambda *_, **__: given)
         monkeypatch.setattr(validation_module, "QUICK", PLAN)
         arguments = ["validate", str(described), "--quick", "--out", str(tmp_path / "out"), "--workers", "1"]
         result = CliRunner().invoke(app, [*arguments, "--json", str(tmp_path / "all.json")], catch_exceptions=False)

@@ -5,9 +5,7 @@ import pytest
 from trackeval_oracle import random_case, reference
 
 from mvpose import COCO17
-from simharness.scoring.tracking.clear_mot import clear_mot
-from simharness.scoring.tracking.hota import hota
-from simharness.scoring.tracking.identity_scores import identity_scores
+from simharness.scoring.tracking.identity_scores import clear_mot, hota, identity_scores
 from simharness.scoring.tracking.tracked_frames import DISTANCES, PLACES, tracked_frames
 
 pytest.importorskip("trackeval", reason="pip install --no-deps trackeval==1.3.0, as the Makefile does")

@@ -7,10 +7,8 @@ from hypothesis import strategies as st
 from trackeval_oracle import random_case
 
 from mvpose import COCO17, SHELF14
-from simharness.scoring.tracking.clear_mot import ABSENT, MISSED, clear_mot
-from simharness.scoring.tracking.hota import hota
 from simharness.scoring.tracking.identity_figures import COUNTS, SHARES, identity_figures
-from simharness.scoring.tracking.identity_scores import identity_scores
+from simharness.scoring.tracking.identity_scores import ABSENT, MISSED, clear_mot, hota, identity_scores
 from simharness.scoring.tracking.tracked_frames import roots, tracked_frames
 
 RATE = 10.0

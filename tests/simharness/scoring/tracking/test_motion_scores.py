@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scoring.tracking.motion_scores import jerk, jerk_ratio, rms_jerk, velocity, velocity_error
+from simharness.scoring.tracking.identity_figures import jerk, jerk_ratio, rms_jerk, velocity, velocity_error
 
 
 @given(st.integers(0, 999))

@@ -9,9 +9,8 @@ from simharness.scenario.load import load
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.statistics.intervals import Interval
 from simharness.study.causes.blame_text import conclusion, heading, points
-from simharness.study.causes.cause_catalogue import CAUSES, causes_by_name, present_causes
+from simharness.study.causes.cause_catalogue import CAUSES, MendedTrial, causes_by_name, present_causes
 from simharness.study.causes.cause_shares import EXACT, Blame, blame, difference_interval
-from simharness.study.causes.mended_trial import MendedTrial
 from simharness.types.truth import KeypointError
 from simharness.types.views import Visibility
 

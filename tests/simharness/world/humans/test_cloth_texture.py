@@ -5,8 +5,7 @@ import pytest
 
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import FacePart, make_body
-from simharness.world.humans.cloth_texture import BAND, LENGTH, WHITE, WIDTH, texture_image
-from simharness.world.humans.clothing import Garment, dress, garments, paint
+from simharness.world.humans.clothing import BAND, LENGTH, WHITE, WIDTH, Garment, dress, garments, paint, texture_image
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import PATTERNS, draw_look
 

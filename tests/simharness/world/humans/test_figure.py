@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from simharness.capture.rendering.finishes import grain_of
-from simharness.types.finish import Material
+from simharness.types.mesh import Material
 from simharness.world.humans.body import FacePart, make_body
 from simharness.world.humans.clothing import Garment, dress, face_colors, garments
 from simharness.world.humans.face_colors import EXPRESSIONS

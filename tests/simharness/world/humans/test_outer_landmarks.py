@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mvpose.wholebody import skeleton_by_name
+from simharness.capture.outer_views import OuterJoints
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.world.humans.body import make_body
-from simharness.world.humans.outer_landmarks import OuterJoints
 from simharness.world.humans.shape import Shape
 
 SHAPES = {"man": Shape(gender=0.0, weight=0.7), "woman": Shape(gender=1.0, weight=1.1), "child": Shape(age=0.3)}
@@ -19,7 +19,7 @@ FINGERS = [range(1 + 4 * finger, 5 + 4 * finger) for finger in range(5)]  # thum
 def person(request):
     body = make_body(SHAPES[request.param])
     rest = np.tile(np.eye(3, 4), (len(body.bones), 1, 1))
-    joints = OuterJoints.of(body, skeleton_by_name("wholebody133"))
+    joints = OuterJoints.of_body(body, skeleton_by_name("wholebody133"))
     return body, dict(zip(joints.names, joints.at(rest), strict=True)), body.joints(rest)
 
 
@@ -62,7 +62,7 @@ def test_left_and_right_are_mirror_images(person):
 
 def test_joints_move_with_their_bones(person):
     body, _, _ = person
-    joints = OuterJoints.of(body, skeleton_by_name("wholebody133"))
+    joints = OuterJoints.of_body(body, skeleton_by_name("wholebody133"))
     transforms = np.tile(np.eye(3, 4), (len(body.bones), 1, 1))
     rest = joints.at(transforms)
     for bone in ("LeftHand", "LThumb", "LeftFingerBase", "LeftHandFinger1"):
@@ -77,7 +77,7 @@ def test_joints_move_with_their_bones(person):
 @pytest.mark.parametrize("name", typing.get_args(DetectorSection.model_fields["skeleton"].annotation)[1:])
 def test_every_joint_but_those_of_the_face_is_known(name):
     body = make_body(Shape())
-    joints = OuterJoints.of(body, skeleton_by_name(name))
+    joints = OuterJoints.of_body(body, skeleton_by_name(name))
     faces = np.array([joint.startswith("face_") for joint in joints.names])
     np.testing.assert_array_equal(joints.known, ~faces)
     assert (joints.depths[~faces] >= 0.015).all()
@@ -88,7 +88,7 @@ def test_neck_and_hips_are_the_middles_of_both_sides():
     body = make_body(Shape())
     rest = np.tile(np.eye(3, 4), (len(body.bones), 1, 1))
     coco = body.joints(rest)
-    joints = OuterJoints.of(body, skeleton_by_name("halpe26"))
+    joints = OuterJoints.of_body(body, skeleton_by_name("halpe26"))
     place = dict(zip(joints.names, joints.at(rest), strict=True))
     np.testing.assert_allclose(place["neck"], coco[5:7].mean(axis=0), atol=1e-12)
     np.testing.assert_allclose(place["hip"], coco[11:13].mean(axis=0), atol=1e-12)

@@ -5,8 +5,7 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.activities.gait import FOOT_OFF, make_gait, normative_angles
-from simharness.world.motion.poses.foot_roll import roll_sole
-from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.kinematics import Kinematics, roll_sole
 
 
 @pytest.fixture(scope="module", params=[0, 1, 2])

@@ -14,12 +14,12 @@ from mvpose.skeleton import COCO17
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
-from simharness.world.humans.body_size import body_lengths
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.activity_registry import activities
 from simharness.world.motion.choreography import choreograph
 from simharness.world.motion.mocap import recorded_shape, reenact
-from simharness.world.motion.mocap.joint_directions import middle
+from simharness.world.motion.mocap.recorded_people import body_lengths
+from simharness.world.motion.mocap.reenactment import middle
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop, Spot, make_loop
 from simharness.world.motion.poses.kinematics import Kinematics

@@ -9,8 +9,7 @@ from mvpose.formats.calibration import opencv, pose2sim, voxelpose
 from simharness.cli import app
 from simharness.scenario.load import load
 from simharness.trial.identity import trial_identity
-from simharness.world.rigs.layouts import build_rig
-from simharness.world.rigs.published_rigs import preset_rig
+from simharness.world.rigs.layouts import build_rig, preset_rig
 
 RIG = preset_rig("shelf")  # 1032 x 776
 

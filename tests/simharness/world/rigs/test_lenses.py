@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from mvpose.camera import Camera
-from simharness.world.rigs.lenses import check_lens, intrinsics
+from simharness.world.rigs.projection import check_lens, intrinsics
 
 SIZE = (800, 600)
 

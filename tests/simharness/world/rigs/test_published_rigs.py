@@ -6,9 +6,8 @@ import pytest
 from mvpose import Rig
 from mvpose.formats.calibration import panoptic, voxelpose
 from simharness.scenario.sections.cameras_section import CamerasSection, Preset
-from simharness.world.rigs.layouts import build_rig
-from simharness.world.rigs.lenses import check_lens
-from simharness.world.rigs.published_rigs import PRESETS, preset_rig
+from simharness.world.rigs.layouts import PRESETS, build_rig, preset_rig
+from simharness.world.rigs.projection import check_lens
 
 
 def test_a_scenario_can_name_every_preset():

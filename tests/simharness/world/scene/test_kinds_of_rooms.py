@@ -15,15 +15,15 @@ from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import CaptureFrames
 from simharness.world.scene.camera_clearance import WALL_MARGIN
 from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.placement.clutter import place_furniture
 from simharness.world.scene.placement.free_space import LENS
-from simharness.world.scene.placement.furniture import place_furniture
 from simharness.world.scene.playback import simulate
 from simharness.world.scene.rooms.fittings import make_fittings
-from simharness.world.scene.rooms.kinds import ROOM_KINDS, check_size, furniture_of_rooms, settled
+from simharness.world.scene.rooms.kinds import check_size, room_kinds, settled
 from simharness.world.scene.rooms.openings import draw_openings
 from simharness.world.scene.rooms.shell import make_room
 
-KINDS = list(furniture_of_rooms())
+KINDS = [name for name, kind in room_kinds().items() if kind.furniture]
 
 
 def furnished(kind, *, size=(7.0, 7.0, 3.0), people=3, area=1.8, seed=1):
@@ -76,7 +76,7 @@ def first_hit(start, end, triangles):
     return t[hit].min(initial=np.inf)
 
 
-@pytest.mark.parametrize("kind", list(ROOM_KINDS))
+@pytest.mark.parametrize("kind", list(room_kinds()))
 def test_fittings_lie_nearer_to_the_walls_than_any_camera(kind):
     room, _, openings, furniture = furnished(kind)
     for solid in make_fittings(room, 1, openings, furniture):

@@ -14,7 +14,7 @@ from mvpose.camera import Camera
 from simharness.capture.filming import PictureObserver, film
 from simharness.capture.picture import meshes_at
 from simharness.capture.ray_visibility import RayObserver
-from simharness.capture.rendering.renderer_names import make_renderer
+from simharness.capture.rendering.raster import make_renderer
 from simharness.scenario.sections.cameras_section import FaultsSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.mirror import Mirror

@@ -13,7 +13,7 @@ from simharness.trial.identity import trial_identity
 from simharness.world.scene.objects.materials import draw_sheet
 from simharness.world.scene.objects.object_files import ASSETS, load_object, load_shipped, object_dependencies, variants
 from simharness.world.scene.placement.clutter import place_clutter
-from simharness.world.scene.rooms.kinds import ROOM_KINDS, furniture_of_rooms
+from simharness.world.scene.rooms.kinds import room_kinds
 
 STOOL = """
 <mujoco>
@@ -231,8 +231,8 @@ def test_the_contents_of_objects_count_in_the_identity_of_a_trial(write):
 
 
 def test_rooms_name_objects_that_ship():
-    assert set(furniture_of_rooms()) == set(ROOM_KINDS) - {"laboratory"}
-    names = {name for pieces in furniture_of_rooms().values() for name in pieces}
+    assert {name for name, kind in room_kinds().items() if not kind.furniture} == {"laboratory"}
+    names = {name for kind in room_kinds().values() for name in kind.furniture}
     assert all(variants(name)[0].is_file() for name in names)
     files = {file.name.partition(".")[0] for file in ASSETS.glob("*.xml")}
     assert files - names == {"far_tree", "far_shrub"}

@@ -10,10 +10,9 @@ import pytest
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.world.rigs.layouts import build_rig
-from simharness.world.scene.rooms.landscape import WHITE, draw_panorama
+from simharness.world.scene.rooms.landscape import AROUND, MEADOW, WHITE, draw_panorama, make_surroundings
 from simharness.world.scene.rooms.room_lighting import room_lighting
 from simharness.world.scene.rooms.shell import make_room
-from simharness.world.scene.rooms.surroundings import AROUND, MEADOW, make_surroundings
 from simharness.world.scene.rooms.weather import WEATHERS, clear_sky, overcast_sky
 
 ROOM = RoomSection(kind="outdoors", floor="paving", size=(8.0, 6.0, 3.0))

@@ -9,7 +9,7 @@ from simharness.capture.rendering.raster import RasterRenderer
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.world.rigs.layouts import intrinsics, look_at
 from simharness.world.scene.rooms.fittings import make_court
-from simharness.world.scene.rooms.kinds import ROOM_KINDS, settled
+from simharness.world.scene.rooms.kinds import room_kinds, settled
 from simharness.world.scene.rooms.lamps import area_lights
 from simharness.world.scene.rooms.openings import draw_openings
 from simharness.world.scene.rooms.room_lighting import room_lighting
@@ -20,7 +20,7 @@ def camera_at(center, aim, fov):
     return look_at(center, aim, K=intrinsics(fov, (160, 120)), size=(160, 120))
 
 
-@pytest.mark.parametrize("kind", [name for name, kind in ROOM_KINDS.items() if kind.windows[0]])
+@pytest.mark.parametrize("kind", [name for name, kind in room_kinds().items() if kind.windows[0]])
 def test_windows_shine_into_the_room(kind):
     room = settled(RoomSection(kind=kind), 1)
     areas = [area for area in area_lights(room, 1, draw_openings(room, 1)) if area.kind == "window"]
