@@ -7,10 +7,11 @@ Rules, one after another; what they leave out is a gap in all files, and nothing
 3. a person of whom less than half of the joints are left in a frame is left out there;
 4. a person who is there in too few frames.
 
-Rules 2 and 4 need identities. The fastest measured run is 12.4 m/s (R. Graubner and E. Nixdorf on the 2009
-World Championships in Athletics, New Studies in Athletics 26, 2011); trunk and head move no faster. The foot that stands does not move, so the one that swings is twice as fast, 24.8 m/s; a
-ball leaves the hand of experienced players of handball at less (van den Tillaar and Ettema, "A force-velocity
-relationship and coordination patterns in overarm throwing", Journal of Sports Science and Medicine 3, 2004).
+Rules 2 and 4 need identities. The fastest measured run is 12.4 m/s (R. Graubner and E. Nixdorf on the 2009 World
+Championships in Athletics, New Studies in Athletics 26, 2011); trunk and head move no faster. The foot that stands does
+not move, so the one that swings is twice as fast, 24.8 m/s; a ball leaves the hand of experienced players of handball
+at less (van den Tillaar and Ettema, "A force-velocity relationship and coordination patterns in overarm throwing",
+Journal of Sports Science and Medicine 3, 2004).
 """
 
 from __future__ import annotations
