@@ -1,4 +1,4 @@
-"""Prior on bone lengths, of the adult population or scaled to one person (paper, section 3.3).
+"""Prior on bone lengths, of the adult population or scaled to one person of any age (paper, section 3.3).
 
 The paper learns its prior from Human3.6M, and the numbers in its released code come from the test sets. This prior is
 taken from published anthropometry, and uses neither those data sets nor a simulated population:
@@ -7,6 +7,8 @@ taken from published anthropometry, and uses neither those data sets nor a simul
   J. Biomechanics 29(9), 1996, table 4, women and men averaged as fractions of stature;
 - stature 1.70 m, standard deviation 5.5 % over adults of both sexes: NCD-RisC, "A century of trends in adult human
   height", eLife 5:e13410, 2016;
+- children: a quarter of all people are younger than 15 years (United Nations, "World Population Prospects 2022"); they
+  are 0.87 m tall at two years of age (WHO, "Child growth standards", 2006) and as tall as adults at the end;
 - shoulder span: biacromial breadth of ANSUR II (Gordon et al. 2014, 0.39 m) minus the two distances from acromion to
   joint centre;
 - head: ANSUR II (interpupillary and bitragion breadths, tragion to nose) and Drillis & Contini's segment heights.
@@ -30,6 +32,9 @@ STATURE_DEVIATION = 0.055
 PROPORTION_DEVIATION = 0.04
 """Standard deviation of a bone length among adults of equal stature, as a fraction of the length."""
 
+_CHILDREN = 0.25  # share of people who still grow
+_SMALLEST, _TALLEST = 0.5, 1.25  # sizes of people by that of the mean adult: from two years of age to 2.1 m
+_FEWEST = 5  # bones whose median ratio is where the search for a size begins
 _OUTLIER = 9.0  # squared standardised residual at which the Cauchy weight of a bone is 1/2
 _ROUNDS = 3  # of iteratively reweighted least squares
 
@@ -92,10 +97,11 @@ def bone_lengths(skeleton: Skeleton) -> tuple[Floats, Floats]:
 def personal_prior(states, count, weights, sigmas, graph, length, definition, personal):
     """Return mean bone lengths (B,), metres, and the precisions of their priors (B,), 1/m^2, for one person.
 
-    Stature is a scale that all bones of a person share. Its posterior is Gaussian, with the population as prior and
-    the distances between the likeliest proposals as measurements. Long bones seen by many views weigh most, outliers
-    weigh little (Cauchy weights). The deviation of each bone is then that of proportions combined with the posterior
-    deviation of stature.
+    Stature is a scale that all bones of a person share, and that the distances between the likeliest proposals measure.
+    Its prior is a mixture: adults are Gaussian, and the logarithm of the scale of children is uniform, so that small
+    people are not stretched to adults (expectation and maximisation, from the median ratio of the bones on). Long bones
+    seen by many views weigh most, outliers weigh little (Cauchy weights). The deviation of each bone is then that of
+    proportions combined with the posterior deviation of stature.
 
     Args:
         states: proposals (J, S, 3), metres, the likeliest first.
@@ -116,8 +122,10 @@ def personal_prior(states, count, weights, sigmas, graph, length, definition, pe
             if count[j] > 0:
                 for v in range(n):
                     views[j] += weights[j, v, 0] > 0.0
+        scale = _first_scale(states, views, graph, length)
         for _ in range(_ROUNDS):
-            weighted_sum, information = 1.0 / STATURE_DEVIATION**2, 1.0 / STATURE_DEVIATION**2
+            adult = _adult(scale) / STATURE_DEVIATION**2
+            weighted_sum, information = adult, adult
             for bone in range(bones):
                 j, parent = graph.children[bone], graph.parents[bone]
                 if parent < 0 or length[bone] == 0.0 or views[j] < 2 or views[parent] < 2:
@@ -138,3 +146,26 @@ def personal_prior(states, count, weights, sigmas, graph, length, definition, pe
         variance = (deviation**2 + PROPORTION_DEVIATION**2) * length[bone] ** 2 + definition[bone] ** 2
         precision[bone] = graph.share[bone] / variance
     return scaled, precision
+
+
+@njit(cache=True, borrows=True)
+def _adult(scale):
+    """Return the probability that a person of a scale is an adult."""
+    residual = (scale - 1.0) / STATURE_DEVIATION
+    adult = (1.0 - _CHILDREN) * np.exp(-0.5 * residual * residual) / (np.sqrt(2.0 * np.pi) * STATURE_DEVIATION)
+    child = _CHILDREN / (max(scale, _SMALLEST) * np.log(1.0 / _SMALLEST))
+    return adult / (adult + child) if scale < 1.0 else 1.0
+
+
+@njit(cache=True)
+def _first_scale(states, views, graph, length):
+    """Return the median ratio of the lengths of bones, whose ends two views see, to their means; 1 for too few."""
+    ratios, count = np.empty(len(length)), 0
+    for bone in range(len(length)):
+        j, parent = graph.children[bone], graph.parents[bone]
+        if parent >= 0 and length[bone] > 0.0 and views[j] >= 2 and views[parent] >= 2:
+            ratios[count] = np.sqrt(np.sum((states[j, 0] - states[parent, 0]) ** 2)) / length[bone]
+            count += 1
+    if count < _FEWEST:
+        return 1.0
+    return min(max(np.median(ratios[:count]), _SMALLEST), _TALLEST)

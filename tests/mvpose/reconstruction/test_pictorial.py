@@ -5,12 +5,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from people import STANDING, detect, ring
+from scipy.stats import norm
 
 from mvpose import COCO17, PANOPTIC19, SHELF14, Detections, Estimate, Matching, Rig, Skeleton
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
 from mvpose.reconstruction.bone_graph import bone_graph, mirror_images
-from mvpose.reconstruction.bone_length_prior import PROPORTION_DEVIATION, bone_lengths
+from mvpose.reconstruction.bone_length_prior import (
+    PROPORTION_DEVIATION,
+    _adult,
+    bone_lengths,
+    personal_prior,
+    published_bones,
+)
 from mvpose.reconstruction.error_scale import SHARED
 from mvpose.reconstruction.inference import marginalize, max_product
 from mvpose.reconstruction.likelihood import log_likelihood
@@ -372,6 +379,43 @@ def test_the_prior_adapts_to_the_size_of_the_person(stature):
         assert np.mean(errors[True]) < 1.1 * np.mean(errors[False])
     else:
         assert np.mean(errors[True]) < 0.95 * np.mean(errors[False])
+
+
+def size(joints, views, prior=1.0):
+    """Size of a person by the personal prior, relative to the mean adult; joints (17, 3), each seen by some views."""
+    graph, (length, definition) = bone_graph(COCO17), published_bones(COCO17)
+    weights = np.zeros((17, 5, 1))
+    for joint, count in enumerate(views):
+        weights[joint, :count] = 1.0
+    scaled, _ = personal_prior(
+        joints[:, None], np.ones(17, np.int64), weights, np.full(17, 0.03), graph, length, definition, True
+    )
+    return float(np.median(scaled[length > 0] / length[length > 0]))
+
+
+ADULT = STANDING * (1.0 / size(STANDING, [5] * 17))  # of the mean size
+
+
+@pytest.mark.parametrize("views", [2, 3, 5])
+@pytest.mark.parametrize("scale", [0.5, 0.55, 0.65, 0.8, 1.0])
+def test_small_people_are_not_stretched_to_adults(scale, views):
+    assert size(scale * ADULT, [views] * 17) == pytest.approx(scale, rel=0.02)
+
+
+def test_a_size_that_few_bones_show_is_that_of_adults():
+    legs = [0] * 13 + [2] * 4  # two shins
+    assert 0.9 < size(0.65 * ADULT, legs) < 1.0
+    assert size(0.65 * ADULT, [0] * 17) == 1.0
+
+
+def test_a_quarter_of_people_are_children_of_every_size():
+    """The density of children that follows from the probability of an adult: a quarter in all, uniform in log size."""
+    sizes = np.linspace(0.5, 1.0, 2001)[500:-1]  # below, hardly anybody is an adult
+    adult = np.array([_adult(each) for each in sizes])
+    density = 0.75 * norm(1.0, 0.055).pdf(sizes) * (1.0 - adult) / adult
+    assert np.trapezoid(density, sizes) == pytest.approx(0.25 * np.log(1.0 / 0.625) / np.log(2.0), rel=1e-3)
+    np.testing.assert_allclose(density * sizes, density[0] * sizes[0], rtol=1e-6)
+    assert _adult(1.1) == 1.0
 
 
 @pytest.mark.parametrize("method", [Triangulation(), PictorialStructure()])
