@@ -11,8 +11,9 @@ from typing import Any, cast
 import numpy as np
 
 from mvpose.commands.errors import failing
+from mvpose.commands.programs import note
 from mvpose.commands.progress import single_stage
-from mvpose.files.atomic_files import open_manifest, write_atomic
+from mvpose.files.atomic_files import open_manifest, set_aside, write_atomic
 from mvpose.files.input_files import parse_json, read_bytes
 from mvpose.formats.pictures import PictureSource
 from mvpose.networks.detector import (
@@ -78,6 +79,8 @@ def detect_videos(
                     opened.write(json.dumps(frames[-1]) + "\n")
                     opened.flush()
                     advance(1)
+            if files[-1].exists():  # hours of work on another video, or by other networks
+                note(f"{files[-1]}: of another video or other networks, kept as {set_aside(files[-1])}")
             write_atomic(files[-1], json.dumps(frames).encode())
             write_atomic(state, head_line.encode())
             partial.unlink()

@@ -36,9 +36,7 @@ def write_atomic(path: Path, content: bytes) -> None:
     if path.name != MANIFEST and manifest.is_file():
         what, files = _read_manifest(path.parent)
         if path.exists() and files.get(path.name) != _digest(path):
-            place = _unused(path.parent, path.name)
-            place.parent.mkdir(parents=True, exist_ok=True)
-            path.rename(place)
+            set_aside(path)
         digest = hashlib.blake2b(content, digest_size=_BYTES).hexdigest()
         write_atomic(manifest, _manifest(what, {**files, path.name: digest}))
     partial = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.partial")
@@ -123,6 +121,14 @@ def open_manifest(folder: Path, what: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     if not (folder / MANIFEST).exists():
         write_atomic(folder / MANIFEST, _manifest(what, {}))
+
+
+def set_aside(path: Path) -> Path:
+    """Move a file of a folder of results into its folder :data:`KEPT`, and return its place there."""
+    place = _unused(path.parent, path.name)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    path.rename(place)
+    return place
 
 
 def files_of_user(folder: Path) -> list[str]:

@@ -120,11 +120,13 @@ class TestDetect:
         assert json.loads((tmp_path / "found" / "cam1.json").read_text()) == [frames[0], *json.loads(complete)[1:]]
         assert not (tmp_path / "found" / ".cam1.partial.jsonl").exists()
 
-    def test_detections_of_other_settings_are_made_again(self, detect, tmp_path):
+    def test_detections_of_other_settings_are_made_again_and_the_earlier_are_kept(self, detect, tmp_path):
         write_folder(tmp_path / "cam1", spots(2))
         assert detect(tmp_path / "cam1").exit_code == 0
+        earlier = (tmp_path / "found" / "cam1.json").read_text()
         assert detect(tmp_path / "cam1", options=["--min-score", "0.95"]).exit_code == 0
         assert [frame["instances"] for frame in json.loads((tmp_path / "found" / "cam1.json").read_text())] == [[], []]
+        assert (tmp_path / "found" / "kept" / "cam1.json").read_text() == earlier
 
     def test_refusals(self, detect, tmp_path, networks):
         write_folder(tmp_path / "cam1", spots(2))
