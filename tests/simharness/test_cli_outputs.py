@@ -60,7 +60,7 @@ ELSEWHERE = {"simharness report --digest"}
 
 READ = {
     "calibration", "detections", "videos", "folder", "recording", "fit_on", "scenario", "suite", "file", "study",
-    "stores", "room", "poses", "pictures", "times", "detector", "pose", "skeleton",
+    "stores", "room", "poses", "pictures", "times", "detector", "pose", "skeleton", "package",
 }  # fmt: skip
 """Parameters whose files are read alone."""
 

@@ -189,7 +189,7 @@ def _reachable(people: People, kept: Bools, max_speed: float) -> Bools:
         places, times = people.joints[rows, person, joint], people.times[rows]
         far = np.linalg.norm(np.diff(places, axis=0), axis=1) > fastest[joint] * np.diff(times)
         if far.any():
-            result[rows, person, joint] = _longest_chain(places, times, fastest[joint])
+            result[rows, person, joint] = _longest_chain(places, times, float(fastest[joint]))
     return result
 
 

@@ -106,6 +106,8 @@ AROUND = {
     "mvpose/files/input_files.py": "the reader",
     "mvpose/files/archives.py": "bytes that were read",
     "mvpose/formats/people/people_tables.py": "bytes that were read",
+    "mvpose/formats/calibration/qualisys.py": "bytes that were read",
+    "mvpose/networks/catalogue/tfjs_graph.py": "bytes with a published digest",
     "simharness/runtime/parquet_tables.py": "bytes that were read",
     "simharness/planning/search.py": "text that was just written",
     "simharness/outputs/run/pictures.py": "a film that was just written",
