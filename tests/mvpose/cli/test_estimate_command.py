@@ -97,7 +97,14 @@ class TestEstimate:
             "--out",
         ]
         assert run(*call, tmp_path / "out").exit_code == 0
-        assert run(*call, tmp_path / "out").exit_code == 0
+        (tmp_path / "out" / "ik.mot").write_text("of OpenSim")
+        (tmp_path / "out" / "people.json").write_text("changed by hand")
+        again = run(*call, tmp_path / "out")
+        assert again.exit_code == 0
+        assert f"note: {tmp_path / 'out'}: ik.mot, people.json not of the earlier result" in again.stderr
+        assert (tmp_path / "out" / "ik.mot").read_text() == "of OpenSim"
+        assert (tmp_path / "out" / "kept" / "people.json").read_text() == "changed by hand"
+        assert json.loads((tmp_path / "out" / "people.json").read_text())["frames"]
         (tmp_path / "thesis").mkdir()
         (tmp_path / "thesis" / "chapter.txt").write_text("years of work")
         ends(run(*call, tmp_path / "thesis"), 2, "is no result of mvpose estimate")
