@@ -142,9 +142,10 @@ def _check_folder(folder: Path) -> None:
 def _detect(sources: Sequence[PictureSource], out: Path, networks: Networks) -> None:
     """Write the detections of videos of one rate."""
     from mvpose.cli.camera_pictures import common_rate
-    from mvpose.cli.video_detection import detect_videos, networks_text, open_finder
+    from mvpose.cli.video_detection import detect_videos, networks_text
     from mvpose.networks.catalogue.store import path_of
     from mvpose.networks.detector import open_head
+    from mvpose.networks.finders import open_finder
 
     common_rate(sources)
     detector = path_of(networks.detector)

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -17,16 +17,11 @@ from mvpose.files.atomic_files import open_manifest, set_aside, write_atomic
 from mvpose.files.input_files import parse_json, read_bytes
 from mvpose.formats.pictures import PictureSource
 from mvpose.networks.detector import (
-    Kind,
     PeopleFinder,
     PeopleInPicture,
-    PersonDetector,
-    PictureSession,
     detect_people,
 )
-from mvpose.networks.movenet import MoveNet
 from mvpose.networks.pose import PoseHead
-from mvpose.networks.session import Provider
 
 DETECT = "mvpose detect"
 """What the manifest of a folder of detections says."""
@@ -85,27 +80,6 @@ def detect_videos(
             write_atomic(state, head_line.encode())
             partial.unlink()
     return files
-
-
-def open_finder(
-    path: Path, *, kind: str | None = None, least: float | None = None, provider: Provider = "cpu"
-) -> PeopleFinder:
-    """Open a detector of people, of the kind that its card or its outputs show.
-
-    Args:
-        path: ONNX file.
-        kind: kind of the network; None: that of the file.
-        least: least score of a person; None: the default of the kind.
-        provider: as of :class:`mvpose.networks.Session`.
-
-    Raises:
-        ValueError: as of the detectors.
-    """
-    more = {} if least is None else {"least": least}
-    session = PictureSession(path, provider=provider)
-    if kind is None and session.card.name == MoveNet.kind:
-        return MoveNet(session, **more)
-    return PersonDetector(session, kind=cast("Kind | None", kind), **more)
 
 
 def networks_text(detector: Path, pose: Path | None, *, least: float, kind: str) -> str:

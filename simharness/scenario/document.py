@@ -14,7 +14,7 @@ from typing import Any
 from mvpose.files.input_files import parse_toml
 from mvpose.files.message_text import one_line, shown
 from simharness.scenario.layers import PRESET_KINDS, Key, Origins, leaves, merge_with_presets, set_origin
-from simharness.scenario.sections.scenario import FILE_KEYS
+from simharness.scenario.sections.scenario import FILE_KEYS, NETWORK_KEYS
 from simharness.scenario.shipped import shipped_folder, shipped_names
 from simharness.scenario.toml_files import ScenarioError, read_toml, toml_place
 
@@ -246,4 +246,6 @@ def _is_file(key: Key, value: Any) -> bool:
         return False
     if key in _PRESET_KEYS:
         return value.endswith(".toml")
+    if key in NETWORK_KEYS:
+        return "/" in value or value.endswith(".onnx")
     return key in FILE_KEYS or ".py:" in value

@@ -36,8 +36,9 @@ import simharness
 from mvpose.formats.calibration.camera_folder import calibration_files
 from mvpose.formats.people.people_formats import people_files
 from simharness.runtime.version import code_version, digest_of_folders
-from simharness.scenario.sections.scenario import FILE_KEYS, Scenario
+from simharness.scenario.sections.scenario import FILE_KEYS, NETWORK_KEYS, Scenario
 from simharness.trial.stages.estimators import sources_of
+from simharness.trial.stages.networks import network_file
 from simharness.world.scene.objects.object_files import object_dependencies
 
 PACKAGES = ("mujoco", "numpy", "scipy", "numba", "opencv-python-headless", "onnxruntime", "pyrender2", "pillow")
@@ -49,13 +50,16 @@ SIMULATION = ("types", "scenario/sections", "assets", "world", "capture", "detec
 BESIDE_THE_SIMULATION = ("scenario/sections/gate_section.py",)
 """Modules in :data:`SIMULATION` that make neither: what the gate allows."""
 
-BORROWED = ("formats/calibration", "formats/joint_names.py", "formats/people", "recording.py", "wholebody")
-"""Folders and modules of ``mvpose`` that simulations use: readers of rigs and of people to re-enact, skeletons with
-feet and hands and their estimates."""
+BORROWED = (
+    "formats/calibration", "formats/joint_names.py", "formats/people", "networks/detector.py", "networks/finders.py",
+    "networks/movenet.py", "recording.py", "wholebody",
+)  # fmt: skip
+"""Folders and modules of ``mvpose`` that simulations use: readers of rigs and of people to re-enact, detectors of
+people in pictures, skeletons with feet and hands and their estimates."""
 
 BESIDE_THE_METHOD = (
-    "cli", "commands", "files", "formats", "networks/catalogue", "networks/detector.py", "networks/movenet.py",
-    "recording.py", "report", "skeleton_fit", "wholebody",
+    "cli", "commands", "files", "formats", "networks/catalogue", "networks/detector.py", "networks/finders.py",
+    "networks/movenet.py", "recording.py", "report", "skeleton_fit", "wholebody",
 )  # fmt: skip
 """Folders and modules of ``mvpose`` that make no estimates of bodies in trials: readers, writers, detection in videos,
 hands and faces, the command line, pages."""
@@ -199,7 +203,9 @@ def _files(scenario: Scenario) -> dict[str, list[Path]]:
         if key.startswith("clutter.objects"):
             files[key] = list(object_dependencies(file))
             continue
-        if suffix == ".onnx":  # the card beside a network
+        if tuple(key.split(".")) in NETWORK_KEYS:
+            files[key] = [file := network_file(scenario, key), file.with_suffix(".json")]
+        elif suffix == ".onnx":  # the card beside a network
             files[key].append(file.with_suffix(".json"))
         elif suffix == ".amc":  # the skeleton beside a motion
             files[key] += _beside(file, ".asf")

@@ -91,7 +91,7 @@ def _facts(record: Record) -> list[tuple[str, str]]:
         ("people", f"{scenario.people.count}"),
         ("cameras", f"{len(record.rig)} × {record.rig[0].size[0]}×{record.rig[0].size[1]}"),
         ("objects", f"{objects}"),
-        ("detector", "a pose head" if scenario.detector.onnx else scenario.detector.name),
+        ("detector", scenario.detector.label),
         ("frames", f"{len(record.time)} at {scenario.rate:g} Hz"),
         ("detections", f"{sum(map(len, record.detections))}"),
         ("seed", f"{scenario.seed}"),

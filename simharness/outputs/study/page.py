@@ -167,7 +167,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
             ("frames", f"{results.frames.select('trial', 'frame').n_unique():,}"),
             ("people", _span([scenario.people.count for scenario in scenarios])),
             ("cameras", _join(_rig(scenario.cameras) for scenario in scenarios)),
-            ("detector", _join("a pose head" if s.detector.onnx else s.detector.name for s in scenarios)),
+            ("detector", _join(s.detector.label for s in scenarios)),
         ]
     kept = f", {info['kept']} kept" if info["kept"] else ""
     return [*facts, ("time", f"{duration(info['seconds'])}{kept}"), ("version", f"{info['code']}")]

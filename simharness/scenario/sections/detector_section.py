@@ -10,6 +10,7 @@ Distances are in units of OKS sigma x sqrt(area), the area 0.53 of the box (Ronc
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
 from pydantic import Field, model_validator
@@ -332,10 +333,21 @@ class DetectorSection(Section):
         description="bottom-up: parts are joined to people along a tree, and a joint is reported only with its parent; "
         "top-down: joints are reported independently",
     )
+    source: Literal["simulated", "network"] = Field(
+        "simulated",
+        description="simulated: detections are the truth with the errors below; network: a network finds the people in "
+        "the rendered pictures, and the errors below are not used",
+    )
+    network: str = Field(
+        "movenet",
+        min_length=1,
+        description='the network of source = "network", a name of `mvpose networks list` or an ONNX file relative to '
+        "the scenario file: a detector of people that gives their keypoints, or boxes for the pose head of onnx",
+    )
     onnx: str = Field(
         "",
-        description="ONNX file of a top-down pose head, relative to the scenario file, which computes the keypoints in "
-        "the simulated boxes from the rendered pictures; empty: keypoints are simulated, too",
+        description="top-down pose head, a name of `mvpose networks list` or an ONNX file relative to the scenario "
+        "file, which computes the keypoints in the boxes from the rendered pictures; empty: those of source",
     )
     skeleton: Literal["coco17", "body25", "halpe26", "openpose137", "wholebody133"] = Field(
         "coco17",
@@ -351,12 +363,28 @@ class DetectorSection(Section):
     decoys: DecoyHitsSection = DecoyHitsSection()
     heatmaps: HeatmapHeadSection = HeatmapHeadSection()
 
+    @property
+    def networks(self) -> dict[str, str]:
+        """Networks that read pictures, by key."""
+        finder = {"network": self.network} if self.source == "network" else {}
+        return finder | ({"onnx": self.onnx} if self.onnx else {})
+
+    @property
+    def label(self) -> str:
+        """Name of the detector for people: of the networks without their folders, or of the simulated one."""
+        return " and ".join(re.split(r"[/\\]", each)[-1] for each in self.networks.values()) or self.name
+
     @model_validator(mode="after")
     def _network_reads_the_body(self) -> DetectorSection:
-        if self.onnx and self.skeleton != "coco17":
+        if self.networks and self.skeleton != "coco17":
             raise ValueError(
-                f'skeleton = "coco17" with the network of onnx, which reads these 17 joints, got "{self.skeleton}": '
-                "leave skeleton or onnx out"
+                f'skeleton = "coco17" with a network, which reads these 17 joints, got "{self.skeleton}": leave '
+                "skeleton or the network out"
+            )
+        if self.source == "network" and self.heatmaps.size != "none" and not self.onnx:
+            raise ValueError(
+                f'heatmaps.size = "none" with source = "network", got "{self.heatmaps.size}": heat maps are those of '
+                "the pose head in onnx, or of the simulated detector"
             )
         return self
 

@@ -16,12 +16,15 @@ from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
 from simharness.scenario.sections.section import Section, Share, Span, Spread
 
+NETWORK_KEYS = (("detector", "network"), ("detector", "onnx"))
+"""Keys whose values are names of networks on this machine, or their ONNX files."""
+
 FILE_KEYS: tuple[tuple[str, ...], ...] = (
     ("people", "motion", "file"),
     ("people", "motion", "skeleton"),
     ("clutter", "objects"),
     ("cameras", "file"),
-    ("detector", "onnx"),
+    *NETWORK_KEYS,
     ("appearance", "network"),
 )
 """Keys whose values name files, one or a list: recorded motion, objects, calibration, networks. All code that handles
@@ -98,7 +101,8 @@ class Scenario(Section):
     def named_files(self) -> dict[str, Path]:
         """Files that the scenario names, by dotted key: those of :data:`FILE_KEYS` that are not empty.
 
-        Those of a list have its key and their number: "clutter.objects.0".
+        Those of a list have its key and their number: "clutter.objects.0". A network by name is no file yet, but its
+        name; the network of a simulated detector does not count.
         """
         values: dict[str, object] = {}
         for key in FILE_KEYS:
@@ -106,6 +110,8 @@ class Scenario(Section):
             values |= (
                 {f"{name}.{k}": each for k, each in enumerate(value)} if isinstance(value, tuple) else {name: value}
             )
+        if self.detector.source == "simulated":
+            del values["detector.network"]
         return {key: Path(str(value)) for key, value in values.items() if value}
 
     @property

@@ -206,10 +206,10 @@ def blame(
     seeds = tuple(range(scenario.seed, scenario.seed + seeds)) if isinstance(seeds, int) else tuple(seeds)
     if not seeds:
         raise ValueError("blame needs one seed or more, got none")
-    if scenario.detector.onnx:
+    if networks := scenario.detector.networks:
         raise ValueError(
-            "detector.onnx: keypoints are those of a network, whose errors cannot be mended one by one; remove the key "
-            "to use a simulated detector"
+            f"detector.{next(iter(networks))}: detections are those of a network, whose errors cannot be mended one by "
+            "one; use a simulated detector"
         )
     scenario = with_variants(scenario, [variant or scenario.method.variants[0]])
     (variant, estimator), *_ = build_variants(scenario).items()

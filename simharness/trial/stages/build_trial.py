@@ -13,7 +13,7 @@ from simharness.detector.descriptors import DescriptorSettings
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.capture import renderer_of
 from simharness.trial.stages.estimators import estimators_of
-from simharness.trial.stages.networks import descriptor_settings, pose_head, re_id
+from simharness.trial.stages.networks import descriptor_settings, people_finder, pose_head, re_id
 from simharness.world.rigs.exposure_schedule import ExposureSchedule
 from simharness.world.rigs.faults import camera_phases, schedule_exposures
 from simharness.world.rigs.layouts import build_rig
@@ -47,6 +47,8 @@ def build_trial(scenario: Scenario) -> Trial:
             variant or network does not exist.
     """
     descriptors = descriptor_settings(scenario)
+    if scenario.detector.source == "network":
+        people_finder(scenario)
     if scenario.detector.onnx:
         pose_head(scenario)
     pipelines = build_variants(scenario)

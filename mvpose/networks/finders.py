@@ -1,0 +1,31 @@
+"""Detectors of people by the file of their network."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast
+
+from mvpose.networks.detector import Kind, PeopleFinder, PersonDetector, PictureSession
+from mvpose.networks.movenet import MoveNet
+from mvpose.networks.session import Provider
+
+
+def open_finder(
+    path: str | Path, *, kind: str | None = None, least: float | None = None, provider: Provider = "cpu"
+) -> PeopleFinder:
+    """Open a detector of people, of the kind that its card or its outputs show.
+
+    Args:
+        path: ONNX file.
+        kind: kind of the network; None: that of the file.
+        least: least score of a person; None: the default of the kind.
+        provider: as of :class:`mvpose.networks.Session`.
+
+    Raises:
+        ValueError: as of the detectors.
+    """
+    more = {} if least is None else {"least": least}
+    session = PictureSession(path, provider=provider)
+    if kind is None and session.card.name == MoveNet.kind:
+        return MoveNet(session, **more)
+    return PersonDetector(session, kind=cast("Kind | None", kind), **more)
