@@ -128,6 +128,32 @@ def simcc_dots(path, size=(192, 256), *, split=2, gains=(1.0,) * 17, down=1.0, b
     return graph.save(path)
 
 
+def constant_people(path, keypoints, size, *, kind="keypoints"):
+    """A one-stage detector, as RTMO exports it, that finds the same people in every picture of a size.
+
+    With the kind "boxes" it gives boxes and labels, as YOLOX after non-maximum suppression.
+
+    Args:
+        path: ONNX file.
+        keypoints: (N, J, 2), pixels.
+        size: width and height of the pictures.
+    """
+    keypoints = np.asarray(keypoints, float)
+    low, high = keypoints.min(axis=1), keypoints.max(axis=1)
+    rows = {
+        "dets": np.concatenate([low, high, np.full((len(low), 1), 0.9)], axis=1)[None],
+        "keypoints": np.concatenate([keypoints, np.full((*keypoints.shape[:2], 1), 0.8)], axis=2)[None],
+    }
+    if kind == "boxes":
+        rows["labels"] = np.zeros((1, len(rows.pop("keypoints")[0])))
+    graph = Graph((1, 3, size[1], size[0]))
+    nothing = graph.add("Mul", graph.add("ReduceMean", axes=[1, 2, 3], keepdims=0), np.zeros(1))
+    for name, values in rows.items():
+        graph.add("Add", nothing, values)
+        graph.output(name, values.shape)
+    return graph.save(path)
+
+
 def picture(size, *dots, background=0):
     """A picture, (height, width, 3), with Gaussian dots: x, y, deviation in pixels, colour."""
     width, height = size

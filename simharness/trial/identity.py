@@ -20,6 +20,7 @@ workers and the machine change nothing; nor does code of the command line, of re
 difference is not detected: ``rendering.renderer = "auto"`` chooses a renderer that depends on the machine.
 """
 
+import contextlib
 import functools
 import hashlib
 import importlib.metadata
@@ -204,7 +205,9 @@ def _files(scenario: Scenario) -> dict[str, list[Path]]:
             files[key] = list(object_dependencies(file))
             continue
         if tuple(key.split(".")) in NETWORK_KEYS:
-            files[key] = [file := network_file(scenario, key), file.with_suffix(".json")]
+            with contextlib.suppress(ValueError):  # not on this machine: its content is that of a missing file
+                file = network_file(scenario, key)
+            files[key] = [file, file.with_suffix(".json")]
         elif suffix == ".onnx":  # the card beside a network
             files[key].append(file.with_suffix(".json"))
         elif suffix == ".amc":  # the skeleton beside a motion

@@ -11,6 +11,7 @@ from trials import measured
 
 from simharness.detector.detect import Detected
 from simharness.scenario.load import Setting, Study, load_study
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.build_trial import Trial, build_trial, true_rig
 from simharness.types.sequence import Sequence
@@ -157,6 +158,8 @@ class TestSettings:
         built = set()
         for chosen in {id(each): each for each in (study.settings[0], *ends.values(), study.settings[-1])}.values():
             scenario = study.at(chosen, study.seeds[0])
+            if scenario.detector.networks:  # which need not be on this machine
+                scenario = scenario.model_copy(update={"detector": DetectorSection()})
             scene = scenario.model_dump_json(exclude={"faults", "detector"})
             if scene in built:  # the rest concerns pictures of what stands there already
                 schedule_exposures(true_rig(scenario), scenario.faults, np.arange(scenario.frames), seed=scenario.seed)

@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
-from onnx_graphs import dots, mean_color
+from onnx_graphs import constant_people, dots, mean_color
 from trials import simulated as detected_frames
 
 from simharness.outputs.run.result_folder import run
 from simharness.scenario.load import ScenarioError, load
+from simharness.trial.identity import trial_identity
 from simharness.trial.run_folder import read_run
 from simharness.trial.stages.build_trial import build_trial
+from simharness.types.truth import KeypointError
+from simharness.types.views import Visibility
 
 BODY = """
 name = "tiny"
@@ -26,12 +29,14 @@ profile = "perfect"
 variants = ["full", "appearance", "geometry"]
 """
 
+FOUND = 'source = "network"\nnetwork = "people.onnx"\n'
+
 
 @pytest.fixture
 def scenario(tmp_path):
-    def write(text):
+    def write(text, *, detector='profile = "perfect"'):
         path = tmp_path / "tiny.toml"
-        path.write_text(BODY + text)
+        path.write_text(BODY.replace('profile = "perfect"', detector) + text)
         return path
 
     return write
@@ -73,6 +78,37 @@ def test_keypoints_are_read_in_the_simulated_boxes(scenario, tmp_path):
         assert (after.truth.error > 0).mean() > 0.5
 
 
+def test_people_are_those_whom_a_network_finds(scenario, tmp_path):
+    """A network that finds the true places in one picture in every picture is right there, and nowhere else."""
+    full = ['method.variants=["full"]']
+    simulated = detected_frames(load(scenario(""), overrides=full))[1]
+    truth = simulated[0].truth
+    view = int(np.isfinite(truth.pixels).all(axis=(1, 2, 3)).argmax())
+    constant_people(tmp_path / "people.onnx", truth.pixels[view], (200, 150))
+    found = detected_frames(load(scenario("", detector=FOUND), overrides=full))[1]
+    people = len(truth.joints)
+    for frame in found:
+        assert np.bincount(frame.detections.view).tolist() == [people] * 3
+        np.testing.assert_allclose(frame.detections.keypoints[:people], truth.pixels[view], atol=1e-3)
+    first = found[0]
+    here = first.detections.view == view
+    assert first.truth.person[here].tolist() == list(range(people))
+    inside = truth.visibility[view] != Visibility.OUTSIDE
+    assert (first.truth.error[here][inside] == KeypointError.GOOD).all()
+    assert (first.truth.error[~here] != KeypointError.GOOD).mean() > 0.8
+    for before, after in zip(simulated, found, strict=True):  # everything else is the same
+        np.testing.assert_array_equal(before.truth.pixels, after.truth.pixels)
+
+
+def test_a_trial_is_that_of_its_network(scenario, tmp_path):
+    places = np.random.default_rng(0).uniform(20, 120, (2, 17, 2))
+    identities = set()
+    for shift in (0.0, 1.0, 0.0):
+        constant_people(tmp_path / "people.onnx", places + shift, (200, 150))
+        identities.add(trial_identity(load(scenario("", detector=FOUND))))
+    assert len(identities) == 2
+
+
 def test_drawn_descriptors_stay_where_keypoints_are_read(scenario, tmp_path):
     dots(tmp_path / "head.onnx")
     path, head = scenario('[appearance]\nsource = "drawn"\n'), f"detector.onnx={tmp_path / 'head.onnx'}"
@@ -100,6 +136,24 @@ def test_mistakes_are_reported_before_any_work(scenario, text, message):
 def test_a_file_that_is_no_pose_head_is_named(scenario):
     with pytest.raises(ValueError, match=r"detector\.onnx: .*tiny.toml"):
         build_trial(load(scenario('[rendering]\nrenderer = "rays"\n'), overrides=["detector.onnx=tiny.toml"]))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("nobody", r"detector\.network: network 'nobody': no such file or name; `mvpose networks list`"),
+        ("none.onnx", r"detector\.network: .*none\.onnx"),
+        (
+            "yolox_boxes.onnx",
+            r"detector\.network: yolox_boxes\.onnx gives boxes alone; name a pose head in detector\.onnx",
+        ),
+    ],
+)
+def test_a_network_that_finds_no_keypoints_is_named(scenario, tmp_path, given, message):
+    constant_people(tmp_path / "yolox_boxes.onnx", np.full((1, 17, 2), 50.0), (200, 150), kind="boxes")
+    path = scenario("", detector=f'source = "network"\nnetwork = "{given}"')
+    with pytest.raises(ValueError, match=message):
+        build_trial(load(path, overrides=['method.variants=["full"]']))
 
 
 def test_sources_are_known(scenario):
