@@ -131,12 +131,11 @@ def simcc_dots(path, size=(192, 256), *, split=2, gains=(1.0,) * 17, down=1.0, b
 def constant_people(path, keypoints, size, *, kind="keypoints"):
     """A one-stage detector, as RTMO exports it, that finds the same people in every picture of a size.
 
-    With the kind "boxes" it gives boxes and labels, as YOLOX after non-maximum suppression.
-
     Args:
         path: ONNX file.
         keypoints: (N, J, 2), pixels.
         size: width and height of the pictures.
+        kind: "keypoints", or "boxes": boxes and labels alone, as YOLOX after non-maximum suppression.
     """
     keypoints = np.asarray(keypoints, float)
     low, high = keypoints.min(axis=1), keypoints.max(axis=1)

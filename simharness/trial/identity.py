@@ -206,8 +206,8 @@ def _files(scenario: Scenario) -> dict[str, list[Path]]:
             continue
         if tuple(key.split(".")) in NETWORK_KEYS:
             with contextlib.suppress(ValueError):  # not on this machine: its content is that of a missing file
-                file = network_file(scenario, key)
-            files[key] = [file, file.with_suffix(".json")]
+                files[key] = [network_file(scenario, key)]
+            files[key].append(files[key][0].with_suffix(".json"))
         elif suffix == ".onnx":  # the card beside a network
             files[key].append(file.with_suffix(".json"))
         elif suffix == ".amc":  # the skeleton beside a motion

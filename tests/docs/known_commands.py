@@ -73,6 +73,13 @@ IN_PARTS = {
     "simharness merge part1 part2 part3 --into results/studies/store": "",
     "simharness study my-lab.toml": f"{LAB} --seeds 2",
 }
+READ_BY_A_NETWORK = {
+    "simharness run pixels": "--set duration=0.4 --set rate=5 --set cameras.count=3",
+    "simharness study sensor": "--set duration=0.2 --set rate=5 --set cameras.count=2 "
+    "--set sweep.sensor.read_noise=[0.0] --set sweep.sensor.shutter=[0.0] --set sweep.sensor.softness=[0.0] "
+    "--set sweep.sensor.exposure=[0.0] --set sweep.cameras.radius=[3.7] --set sweep.cameras.size=[[320,240]] "
+    "--set sweep.sensor.jpeg=[0,5] --seeds 1 --variant fast --workers 1",
+}
 REHEARSE = (  # run by tests/simharness/planning
     "simharness rehearse",
     "simharness rehearse ring5 --volume 6x6 --people 4",
@@ -130,6 +137,7 @@ KNOWN = {
     *SHELF,
     OWN_RECORDING,
     *FROM_PICTURES,
+    *READ_BY_A_NETWORK,
     *OWN_STUDY,
     *OWN_GATE,
     *IN_PARTS,

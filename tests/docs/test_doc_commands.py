@@ -29,11 +29,13 @@ from known_commands import (
     OWN_STUDY,
     PYTEST,
     RAYS,
+    READ_BY_A_NETWORK,
     SHELF,
     USER_FILES,
 )
 
 from mvpose.formats.calibration.voxelpose import write_calibration
+from mvpose.networks.catalogue.store import path_of
 from simharness.scenario.load import load_study
 
 
@@ -86,6 +88,17 @@ def test_commands_that_stand_alone(workplace, command):
     assert done(command.replace("FILE", "my-lab.toml"), ALONE[command])
     if output := OUTPUT.get(command.split()[1]):
         assert list(workplace.glob(output))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", READ_BY_A_NETWORK)
+def test_commands_whose_pictures_a_network_reads(workplace, command):
+    try:
+        path_of("movenet")
+    except ValueError as error:
+        pytest.skip(str(error))
+    done(command, READ_BY_A_NETWORK[command])
+    assert list(workplace.glob(OUTPUT[command.split()[1]]))
 
 
 @pytest.mark.slow

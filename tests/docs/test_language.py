@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 MAKING = re.compile(
     r"\basked\b|\bissues?\b|\(bars? [\d.<>]|\bbars? (?:is|are|was|were) (?:met|missed)|\bthe bar of\b|\bas required\b"
-    r"|\blimits? set during\b|\bhad not seen the code\b|\bdeliverables?\b|\bmilestones?\b|\bsprints?\b"
+    r"|\blimits? set during\b|\bhad not seen the code\b|\bdeliverables?\b|\bmilestones?\b"
     r"|\b(?:this|last|next) session\b|\bby the brief\b|\bthe task (?:is|was|asks)\b|\bTODO\b|\bFIXME\b|\breviewers?\b"
     r"|\bdone in version\b|\buntil this study was made\b",
     re.IGNORECASE,
