@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
+from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, doubt_about, read_inputs
 from mvpose.cli.program import PROGRAM
 from mvpose.commands.option_groups import grouped
-from mvpose.commands.programs import FOUND
+from mvpose.commands.programs import FOUND, note
 
 if TYPE_CHECKING:
     from mvpose.calibration import Diagnosis
@@ -57,6 +57,8 @@ def doctor(
         if choices.up is not None and choices.up not in AXES:
             raise ValueError(f"--up must be one of {', '.join(AXES)}, got {choices.up!r}")
         inputs = read_inputs(calibration, detections, replace(choices, up=None), examined=True)
+        if choices.up is not None and (doubt := doubt_about(inputs.rig, choices.up)):
+            note(doubt)
         with failing("the diagnosis"):
             diagnosis = diagnose(inputs.rig, inputs.frames, period=inputs.period, up=choices.up)
 

@@ -11,12 +11,18 @@ import typer
 
 from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
 from mvpose.cli.program import PROGRAM
-from mvpose.commands.option_groups import grouped
+from mvpose.commands.option_groups import given, grouped
 from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
+    from mvpose.cli.inputs import Inputs
     from mvpose.formats.people.outliers import OutputLimits
     from mvpose.formats.pictures import PictureSource
+
+
+_UNTRACKED = ("lag", "max_speed", "min_frames")
+_USUAL_UP = {"trc": "y", "c3d": "z", "csv": "z", "bvh": "y"}  # of formats that leave their axes open
+_FLAGS = {"films": "--no-films"}
 
 
 def add_to(app: typer.Typer) -> None:
@@ -169,8 +175,11 @@ def estimate_into(
     if views is not None and own:  # detections of another program, perhaps of other pictures
         views = for_frames(inputs.rig.cameras, views, inputs.numbers.tolist(), whole=choices.frames is None)
     method = estimator(wanted.method, lag=wanted.lag, period=inputs.period)
+    tracks = isinstance(method, SequenceEstimator)
+    for each in _without_effect(wanted, choices, inputs, tracks=tracks, pictures=sources is not None):
+        note(each)
     found = estimate_people(inputs, method, trust=wanted.trust)
-    people, left_out = within_limits(found, wanted.limits, tracked=isinstance(method, SequenceEstimator))
+    people, left_out = within_limits(found, wanted.limits, tracked=tracks)
     if told := left_out.sentences():
         note(f"left out: {'; '.join(told)}")
     diagnosis = examine(inputs) if wanted.doctor else None
@@ -202,3 +211,33 @@ def _of_pictures(choices: Choices, calibration: Path, sources: Sequence[PictureS
     if choices.size is None and len(sizes) == 1 and UNKNOWN_SIZE in {camera.size for camera in rig}:
         choices = replace(choices, size="x".join(map(str, sizes.pop())))
     return choices
+
+
+def _without_effect(wanted: Wanted, choices: Choices, inputs: Inputs, *, tracks: bool, pictures: bool) -> list[str]:
+    """Return a remark about each option that was given and has no effect.
+
+    Args:
+        wanted: options about the results.
+        choices: options about the recording.
+        inputs: the recording.
+        tracks: whether the method follows people.
+        pictures: whether there are pictures of the cameras.
+    """
+    from mvpose.cli.results import formats_of
+    from mvpose.skeleton import COCO17
+
+    usual = {_USUAL_UP[name] for name in formats_of(wanted.formats) if name in _USUAL_UP}
+    open_axes = ", ".join(sorted(_USUAL_UP))
+    rules = [
+        *((name, tracks, f"--method {wanted.method} follows nobody") for name in _UNTRACKED),
+        ("pictures", wanted.page, "pictures are those of the page, which --no-page leaves out"),
+        ("films", wanted.page and pictures, "films are those of the page" + ("" if pictures else ", of --pictures")),
+        ("together", "c3d" in formats_of(wanted.formats), "it is about C3D files: --format c3d"),
+        ("files_up", bool(usual - {wanted.files_up}), f"it is for {open_axes}, where another axis is usual"),
+        ("joints", choices.joints == "body" or inputs.skeleton != COCO17, "the detections have the joints of the body"),
+    ]
+    return [f"{_option(name)} has no effect: {why}" for name, effect, why in rules if given(name) and not effect]
+
+
+def _option(name: str) -> str:
+    return _FLAGS.get(name, f"--{name.replace('_', '-')}")

@@ -37,6 +37,7 @@ MISS = 1.18
 _SEEN = 0.3  # score above which a keypoint counts: those below are guesses of the detector
 _AREA = 0.53  # of a box that a person covers, as in COCO's evaluation without masks
 _FEWEST = 30  # keypoints of a camera from which a median is known
+_FEW = 10  # people whose postures count
 _MOST = 0.75  # share of people who stand or face wrongly from which it is no posture of theirs
 _APART = 0.05  # share of a camera's detections in people below which it sees other people than the others
 _BODIES = (0.4, 2.2)  # metres from shoulder to ankle, along the bones: from a baby to beyond the tallest
@@ -102,6 +103,8 @@ def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -
         if not trust:
             raise
         remarks = [str(error)]
+    else:
+        remarks += ["--trust has no effect: nothing contradicts the people"] if trust else []
     for remark in remarks:
         note(remark)
     return People.of_estimates(estimates, inputs.skeleton, inputs.period, untracked=not tracks)
@@ -194,7 +197,7 @@ def check_postures(joints: Floats, doubt: str) -> list[str]:
     trunk = shoulders - hips
     handed = np.einsum("nk,nk->n", joints[:, 5] - joints[:, 6], np.cross(trunk, nose - ears))
     handed = handed[np.isfinite(handed)]
-    if len(handed) >= _FEWEST and (handed < 0).mean() > _MOST:
+    if len(handed) >= _FEW and (handed < 0).mean() > _MOST:
         raise ValueError(
             f"left and right of {100 * (handed < 0).mean():.0f} % of the people are exchanged, by their noses: the "
             "names of the joints are in another order (--skeleton), or the pictures are mirrored; `mvpose doctor` "
@@ -202,7 +205,7 @@ def check_postures(joints: Floats, doubt: str) -> list[str]:
         )
     trunk = trunk[np.isfinite(trunk).all(axis=1)]
     lie = trunk[:, 2] < 0.5 * np.linalg.norm(trunk, axis=1)  # more than 60 degrees from upright
-    if len(lie) < _FEWEST or lie.mean() < _MOST:
+    if len(lie) < _FEW or lie.mean() < _MOST:
         return []
     if doubt:
         raise ValueError(f"{doubt}, and the people lie on their sides: correct --up; --trust writes them nevertheless")

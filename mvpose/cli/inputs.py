@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mvpose.commands.option_groups import given
 from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
@@ -165,6 +166,8 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     if size is not None:
         with _noted() if examined else contextlib.nullcontext():
             plausibility.check_size(rig, size)
+            if given("size") and all(camera.size == size for camera in rig):
+                note("--size has no effect: the calibration states the same")
     rig, about_size = plausibility.with_sizes(rig, extents, size=size)
     if about_size:
         note(about_size)
@@ -174,16 +177,23 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
         plausibility.check_extents(rig, extents)
     doubt = ""
     if choices.up is not None:
-        stands = plausibility.up_axis(rig)
-        rig = plausibility.turned_up(rig, choices.up)
-        if stands not in (None, choices.up):
-            doubt = f"--up={choices.up}: the cameras stand upright where the {stands} axis of the world points up"
+        if doubt := doubt_about(rig, choices.up):
             note(doubt)
+        rig = plausibility.turned_up(rig, choices.up)
     elif not examined:
         plausibility.check_up(rig)
     times, period = _times(choices, recorded.numbers, names, project)
     paths = tuple(source.path for source in recorded.assignment.sources)
     return Inputs(rig, recorded.detections(times), recorded.numbers, period, paths, doubt)
+
+
+def doubt_about(rig: Rig, up: str) -> str:
+    """Return why the given upward axis of a calibration's world may be wrong; "" where nothing speaks against it."""
+    from mvpose.formats.detections.plausibility import up_axis
+
+    stands = up_axis(rig)
+    right = stands in (None, up)
+    return "" if right else f"--up={up}: the cameras stand upright where the {stands} axis of the world points up"
 
 
 def _read_rig(path: Path, only: Sequence[str], *, examined: bool) -> Rig:

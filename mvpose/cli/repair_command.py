@@ -12,7 +12,7 @@ import typer
 
 from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
 from mvpose.cli.program import PROGRAM
-from mvpose.commands.option_groups import grouped
+from mvpose.commands.option_groups import given, grouped
 from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
@@ -105,6 +105,10 @@ def repair(
                 note(f"not changed: {reason}")
             inputs = replace(inputs, rig=result.rig)
             lines += _lines(result)
+        elif new_times is None:
+            for name in ("fps", "times", "frames", "skeleton"):
+                if given(name):
+                    note(f"--{name} has no effect: --mend changes the calibration without the people")
         if out is not None:
             write_new(calibration, out, inputs.rig)
             lines.append(f"{out}: repaired calibration; `mvpose doctor` examines it")

@@ -6,9 +6,15 @@ import dataclasses
 import inspect
 import typing
 from collections.abc import Callable, Collection
+from contextvars import ContextVar
 from typing import Any
 
+import typer
+
 Command = Callable[..., None]
+
+_GIVEN: ContextVar[frozenset[str]] = ContextVar("given", default=frozenset())
+_CONTEXT = "context_of_typer"
 
 
 def grouped(*, without: Collection[str] = ()) -> Callable[[Command], Command]:
@@ -34,7 +40,11 @@ def grouped(*, without: Collection[str] = ()) -> Callable[[Command], Command]:
                     parameter.replace(annotation=kind, kind=inspect.Parameter.KEYWORD_ONLY)  # typer passes names
                 )
 
+        parameters.append(inspect.Parameter(_CONTEXT, inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context))
+
         def called(**values: Any) -> None:
+            source = values.pop(_CONTEXT).get_parameter_source
+            _GIVEN.set(frozenset(name for name in values if getattr(source(name), "name", "") == "COMMANDLINE"))
             for name, kind in groups.items():
                 fields = [field.name for field in dataclasses.fields(kind) if field.name not in without]
                 values[name] = kind(**{field: values.pop(field) for field in fields})
@@ -46,6 +56,11 @@ def grouped(*, without: Collection[str] = ()) -> Callable[[Command], Command]:
         return called
 
     return decorate
+
+
+def given(name: str) -> bool:
+    """Return whether the user gave a parameter of the running grouped command; False outside of one."""
+    return name in _GIVEN.get()
 
 
 def _options(kind: type[Any]) -> list[inspect.Parameter]:

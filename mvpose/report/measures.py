@@ -117,7 +117,7 @@ def _lengths(people: People, person: int, start: str, end: str) -> Floats:
         return np.zeros(0)
     ends = people.joints[:, person, [people.skeleton.index(start), people.skeleton.index(end)]]
     lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1)
-    return lengths[np.isfinite(lengths)]
+    return lengths[lengths > 0]
 
 
 def _spread(lengths: Floats) -> float:

@@ -65,7 +65,7 @@ def options(command):
         ("run", {"fps", "out", "films", "detector", "joints"}, {"times", "skeleton", "pictures"}),
         ("detect", {"out", "detector", "pose"}, {"fps", "method"}),
         ("doctor", {"fps", "times", "up", "out"}, {"joints", "method"}),
-        ("repair", {"fps", "times", "out", "free"}, {"joints", "up"}),
+        ("repair", {"fps", "times", "out", "free"}, {"joints"}),
     ],
 )
 def test_commands_have_what_they_can_use(command, has, lacks):
