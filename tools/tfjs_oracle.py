@@ -116,7 +116,7 @@ def main() -> None:
     for network in PUBLISHED:
         size = network.card.size
         assert size is not None
-        given = [cv2.resize(cv2.imread(file)[..., ::-1], size)[None] for file in files]
+        given = [cv2.resize(np.asarray(cv2.imread(file))[..., ::-1], size)[None] for file in files]
         noise = np.random.default_rng(0).integers(0, 256, (1, size[1], size[0], 3)).astype(np.uint8)
         compare(network, read_members(Path(package), list(network.members)), [probe_picture(size), noise, *given])
 

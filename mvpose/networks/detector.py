@@ -27,6 +27,7 @@ from mvpose.arrays import Floats
 from mvpose.networks.card import Card
 from mvpose.networks.crops import Pixels, Placement, crop_images
 from mvpose.networks.pose import PoseHead
+from mvpose.networks.posenet import PoseNet
 from mvpose.networks.session import Provider, Session
 from mvpose.skeleton import COCO17, Skeleton
 from mvpose.wholebody import SKELETONS, skeleton_by_name
@@ -80,14 +81,18 @@ class PeopleFinder(Protocol):
     """What finds the people of pictures.
 
     Attributes:
-        kind: kind of the network.
-        one_stage: whether it gives keypoints as well.
         least: least score of a person.
     """
 
-    kind: str
-    one_stage: bool
     least: float
+
+    @property
+    def kind(self) -> str:
+        """Kind of the network."""
+
+    @property
+    def one_stage(self) -> bool:
+        """Whether it gives keypoints as well."""
 
     def find(self, picture: Pixels) -> PeopleInPicture:
         """Return the people in a picture, (h, w, 3) uint8, red green blue, the most confident first."""
@@ -321,6 +326,8 @@ def open_head(path: str | Path, *, provider: Provider = "cpu", threads: int = 1)
     known: list[Skeleton] = [COCO17, *map(skeleton_by_name, SKELETONS)]
     counts = {extent for shape in session.shapes for extent in (shape[0], shape[-1])}
     skeleton = next((each for each in known if len(each) in counts), COCO17)
+    if session.card.name == PoseNet.name:
+        return PoseNet(session, likelihoods=False)
     return PoseHead(session, skeleton=skeleton, likelihoods=False)
 
 

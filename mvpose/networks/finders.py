@@ -24,8 +24,11 @@ def open_finder(
     Raises:
         ValueError: as of the detectors.
     """
-    more = {} if least is None else {"least": least}
     session = PictureSession(path, provider=provider)
+    finder: PeopleFinder
     if kind is None and session.card.name == MoveNet.kind:
-        return MoveNet(session, **more)
-    return PersonDetector(session, kind=cast("Kind | None", kind), **more)
+        finder = MoveNet(session)
+    else:
+        finder = PersonDetector(session, kind=cast("Kind | None", kind))
+    finder.least = finder.least if least is None else least
+    return finder

@@ -53,14 +53,14 @@ BESIDE_THE_SIMULATION = ("scenario/sections/gate_section.py",)
 
 BORROWED = (
     "formats/calibration", "formats/joint_names.py", "formats/people", "networks/detector.py", "networks/finders.py",
-    "networks/movenet.py", "recording.py", "wholebody",
+    "networks/movenet.py", "networks/posenet.py", "recording.py", "wholebody",
 )  # fmt: skip
 """Folders and modules of ``mvpose`` that simulations use: readers of rigs and of people to re-enact, detectors of
 people in pictures, skeletons with feet and hands and their estimates."""
 
 BESIDE_THE_METHOD = (
     "cli", "commands", "files", "formats", "networks/catalogue", "networks/detector.py", "networks/finders.py",
-    "networks/movenet.py", "recording.py", "report", "skeleton_fit", "wholebody",
+    "networks/movenet.py", "networks/posenet.py", "recording.py", "report", "skeleton_fit", "wholebody",
 )  # fmt: skip
 """Folders and modules of ``mvpose`` that make no estimates of bodies in trials: readers, writers, detection in videos,
 hands and faces, the command line, pages."""

@@ -132,7 +132,7 @@ def _activation(graph: _Conversion, kind: str, tensor: str, output: str) -> None
     if kind != "Relu6":
         graph.add(kind, [tensor], output)
         return
-    bounds = [graph.constant(f"{output}/{value}", np.float32(value)) for value in (0, 6)]
+    bounds = [graph.constant(f"{output}/{value}", np.array(value, np.float32)) for value in (0, 6)]
     graph.add("Clip", [tensor, *bounds], output)
 
 
