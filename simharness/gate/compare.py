@@ -73,10 +73,12 @@ class Comparison:
         changes: change of each score and of time, by variant, over the whole suite and, if there are several cases,
             over each case.
         cases: names of the cases; empty if there is only one.
+        uncompared: scores that no trial of the baseline has, because they were not yet gated when it was written.
     """
 
     changes: tuple[Change, ...]
     cases: tuple[str, ...]
+    uncompared: tuple[str, ...] = ()
 
     def with_verdict(self, verdict: Verdict) -> tuple[Change, ...]:
         """Return the changes with a verdict: those of the whole suite first, the largest first."""
@@ -125,7 +127,12 @@ def compare(before: Measurement, after: Measurement, gate: GateSection) -> Compa
             p[at] = min(1.0, families * value)
             least[at] = families * len(family) * tested[at].least_p
     changes = [_change(*each, gate.level) for each in zip(pairs, tested, allowed, p, least, strict=True)]
-    return Comparison(tuple(changes), before.cases if families > 1 else ())
+    uncompared = tuple(score for score in GATED if _has(after, score) and not _has(before, score))
+    return Comparison(tuple(changes), before.cases if families > 1 else (), uncompared)
+
+
+def _has(measurement: Measurement, score: str) -> bool:
+    return any(scores[score] is not None for scores in measurement.scores.values())
 
 
 def _allowed(score: str, gate: GateSection, slowdown: float) -> Allowed:
@@ -264,6 +271,9 @@ class GateResult:
             seeds = max(change.n for change in undecided)
             losses = f"{len(undecided)} loss{'es' * (len(undecided) > 1)} beyond tolerance"
             verdict += f", but {losses} that {seeds} seeds are too few to judge"
+        if uncompared := self.comparison.uncompared:
+            titles = ", ".join(SCORES[key].title for key in uncompared)
+            verdict += f"; not compared, because the baseline lacks it: {titles}"
         return verdict
 
     @property

@@ -51,7 +51,7 @@ def brier(probability: ArrayLike, happened: NDArray[np.bool_]) -> float | None:
 _COVERAGE = "true joints of the people found inside of the estimate's 90 % ellipsoid; the best value is 90"
 
 
-@score(ScoreInfo("coverage_90", "Coverage", "%", _COVERAGE, "higher", 1, target=100.0 * SHARE))
+@score(ScoreInfo("coverage_90", "Coverage", "%", _COVERAGE, "higher", 1, target=100.0 * SHARE, tolerance=1.0))
 def coverage_score(given: ScoreInput) -> float | None:
     """Return the share of placed joints inside of their ellipsoids, percent; None without ellipsoids."""
     shares = []
@@ -67,7 +67,7 @@ def coverage_score(given: ScoreInput) -> float | None:
 _BRIER = "mean squared error of joint scores as probabilities of an error within 100 mm; joints of ghosts are wrong"
 
 
-@score(ScoreInfo("score_brier", "Brier score", "", _BRIER, "lower", 3))
+@score(ScoreInfo("score_brier", "Brier score", "", _BRIER, "lower", 3, tolerance=0.005))
 def brier_score(given: ScoreInput) -> float | None:
     """Return the Brier score of the placed joints of all estimates; None without any."""
     scores, right = [], []

@@ -53,6 +53,8 @@ class ScoreInfo:
         digits: digits after the decimal point.
         target: best value where neither the greatest nor the least is best: ``better`` is the direction towards it
             from the usual side, and values beyond it are worse again.
+        tolerance: largest loss of its mean that a gate does not call a regression by default, in its unit; None: no
+            gate compares it.
     """
 
     key: str
@@ -62,6 +64,7 @@ class ScoreInfo:
     better: Better
     digits: int
     target: float | None = None
+    tolerance: float | None = None
 
 
 @dataclass(frozen=True)

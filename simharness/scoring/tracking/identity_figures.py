@@ -46,7 +46,14 @@ _ERRORS = (
     ScoreInfo("switches_per_minute", "Switch rate", "/min", "changes of identity per minute and person", "lower", 2),
     ScoreInfo("fragmentations", "Fragmentations", "", "people found again after frames without them", "lower", 0),
 )
-_IDENTITIES = (*(ScoreInfo(key, title, "%", about, "higher", 1) for key, (title, about) in _SHARES.items()), *_ERRORS)
+_GATED = {"hota": 1.0, "idf1": 1.0}  # tolerances
+_IDENTITIES = (
+    *(
+        ScoreInfo(key, title, "%", about, "higher", 1, tolerance=_GATED.get(key))
+        for key, (title, about) in _SHARES.items()
+    ),
+    *_ERRORS,
+)
 
 IDENTITY_SCORES = tuple(info.key for info in _IDENTITIES)
 """Keys of the scores that only variants with identities have."""

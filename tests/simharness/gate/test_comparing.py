@@ -375,3 +375,11 @@ def test_a_tolerance_of_zero_is_valid():
     strict = GateSection.model_validate({"tolerance": {"pcp": 0.0}})
     assert not regressions(lambda trial: {}, strict)
     assert named(regressions(lambda trial: {"pcp": -0.01}, strict)) >= {("pcp", "full", None)}
+
+
+def test_scores_that_the_baseline_lacks_are_named():
+    after = measured()
+    old = as_measurement({trial: scores | {"hota": None, "map": None} for trial, scores in after.scores.items()})
+    assert compare(old, after, GATE).uncompared == ("map", "hota")
+    assert compare(after, after, GATE).uncompared == ()
+    assert compare(after, old, GATE).uncompared == ()  # a variant without identities has none
