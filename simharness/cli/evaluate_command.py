@@ -28,6 +28,7 @@ class HeadMapping(enum.StrEnum):
 
 
 _COMMAND = "recording"
+_LAG = 0.2  # s
 
 
 class RecordingGroup(TyperGroup):
@@ -77,13 +78,14 @@ def evaluate_recording(
         ),
     ] = None,
     lag: Annotated[
-        float,
+        float | None,
         typer.Option(
             metavar="S",
             min=0.0,
-            help="Seconds of later frames that an estimate of track and track-fast waits for: 0 for none, inf for all.",
+            help="Seconds of later frames that an estimate of track and track-fast waits for: 0 for none, inf for all. "
+            "[dim]\\[default: 0.2][/]",
         ),
-    ] = 0.2,
+    ] = None,
 ) -> None:
     """Score methods on a recording; the word [cyan]recording[/] may be left out."""
     with PROGRAM.exit_on_error():
@@ -101,10 +103,15 @@ def evaluate_recording(
                 f"--method {', '.join(blind)}: uses descriptors alone, and the detections of recordings carry none; "
                 "choose another variant"
             )
+        seconds = _LAG if lag is None else lag
+        if lag is not None and not any(name.startswith("track") and ":" not in name for name in names):
+            raise ValueError(
+                f"--lag: is about track and track-fast, not {', '.join(names)}; give --method track as well"
+            )
         for name in names:  # report a wrong one before the recording is read
-            _estimator(name, lag=lag, period=1.0)
+            _estimator(name, lag=seconds, period=1.0)
         data = read_recording(recording, folder, head=head.value)
-        pipelines = {name: _estimator(name, lag=lag, period=1.0 / data.rate) for name in names}
+        pipelines = {name: _estimator(name, lag=seconds, period=1.0 / data.rate) for name in names}
         with (
             failing(),
             reporter() as bars,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from mvpose.commands.option_groups import grouped
+from mvpose.commands.option_groups import given, grouped
 from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
 from simharness.cli.program import PROGRAM, AllWorkers, Workers
 
@@ -117,6 +117,11 @@ def rehearse(
         room = _room(surroundings)
         corners = None if room is None else (*(2 * room.space.bounds[1]).tolist(), room.space.height)
         rig = read_rig(calibration, size=picture_size(size), room=corners)
+        if size is not None and (other := next((each for each in rig if each.size != picture_size(size)), None)):
+            sides = "x".join(map(str, other.size))
+            raise ValueError(
+                f"--size {size}: the calibration states {sides} for the camera {other.name!r}; leave it out"
+            )
         setup = _setup(rig, room, surroundings)
         name = calibration.stem or calibration.resolve().name
         place = out or Path("results/rehearsal") / name
@@ -269,6 +274,9 @@ def plan(
         check_writable(folder, _PLAN)
         open_manifest(folder, _PLAN)
         if preview:
+            for name in ("cameras", "lens", "scenes", "seed", "workers"):
+                if given(name):
+                    raise ValueError(f"--{name}: is about the plan, which --preview does not make; give one of them")
             from simharness.outputs.planning.plan_page import write_preview
 
             page = write_preview(loaded, folder)

@@ -73,6 +73,10 @@ def report(
             raise ValueError("--rerun and --digest: each is written instead of the report; give one of them")
         if blame and (rerun is not None or digest is not None):
             raise ValueError("--blame: is part of the report, which --rerun and --digest replace; give one of them")
+        if out is not None and (rerun is not None or digest is not None):
+            raise ValueError("--out: names the report, which --rerun and --digest replace; give one of them")
+        if threshold and rerun is not None:
+            raise ValueError("--threshold: is about the report, which --rerun replaces; give one of them")
         from mvpose.commands.output_files import HTML, check_place
 
         check_place(out, option="--out", mark=HTML)

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.text import Text
 
 from mvpose.commands.errors import failing
-from mvpose.commands.option_groups import grouped
+from mvpose.commands.option_groups import given, grouped
 from mvpose.commands.programs import FAILED
 from simharness.cli.program import PROGRAM, BlameSeeds, Overrides, ScenarioFile, Workers
 
@@ -96,6 +96,14 @@ def study(
         limits = None if yes else LIMIT
         loaded = load_study(file, overrides=overrides or (), seeds=seeds, variants=variant or None, limit=limits)
         part = _part(running.shard)
+        if part is not None and blame:
+            raise ValueError("--blame: is made of all parts: give it without --shard, when their stores are merged")
+        if part is not None and running.store is not None and given("out"):
+            raise ValueError(
+                "--out: a part of a study has no results, only trials, which go to --store; give one of them"
+            )
+        if running.scheduler is not None and given("workers") and not blame:
+            raise ValueError("--workers: the cluster of --scheduler has its own; give one of them")
         from mvpose.commands.progress import reporter
         from simharness.study.study_run import run_shard, run_study
 
