@@ -82,12 +82,19 @@ def check_size(rig: Rig, size: tuple[int, int]) -> None:
 
 
 def check_principal_points(rig: Rig) -> None:
-    """Check that the principal point of every camera lies in its picture.
+    """Check that the principal point of every camera lies in its picture, and not in the middle of a turned one.
 
     Raises:
         ValueError: one that does not; the message names the camera.
     """
     for camera in rig:
+        own, turned = (np.abs(camera.K[:2, 2] / size - 0.5).max() for size in (camera.size, camera.size[::-1]))
+        if turned < _MIDDLE / 2 < _MIDDLE < own:
+            raise ValueError(
+                f"camera {camera.name!r}: its pictures are {camera.size[0]} x {camera.size[1]} pixels, but the "
+                f"principal point is in the middle of {camera.size[1]} x {camera.size[0]}: width and height of the "
+                "calibration are exchanged"
+            )
         x, y = camera.K[:2, 2]
         if not (0.0 <= x < camera.size[0] and 0.0 <= y < camera.size[1]):
             raise ValueError(

@@ -43,6 +43,13 @@ class TestSizes:
 
 
 class TestRefusals:
+    def test_width_and_height_that_are_exchanged(self):
+        rig = ring(3, size=(1280, 960))
+        turned = Rig([replace(camera, size=(960, 1280)) for camera in rig])
+        check_principal_points(rig)
+        with pytest.raises(ValueError, match=r"camera 'cam0': .*width and height of the calibration are exchanged"):
+            check_principal_points(turned)
+
     def test_a_principal_point_outside_its_picture(self):
         K = RIG[1].K.copy()
         K[0, 2] = 5000.0
