@@ -11,9 +11,9 @@ from option_walk import Row, Walk, parameters
 from test_detect_command import SIZE, networks, write_folder  # noqa: F401
 
 from mvpose import Rig
+from mvpose.cli import video_detection
 from mvpose.cli.app import app
 from mvpose.formats.calibration import pose2sim, voxelpose
-from mvpose.networks.session import Session
 
 BASES = {
     "estimate": "{lab}/Calib.toml {lab}/openpose --out {out} --fps 25 --method fast --no-page --no-doctor",
@@ -88,7 +88,7 @@ ROWS = {
 }
 ROWS["run"] = ROWS["detect"] | {key: READ[key] for key in ("cameras", "frames", "up")} | {"fps": Row("--fps 50")}
 ROWS["run"] |= {"page": RESULTS["page"], "films": RESULTS["films"], "formats": RESULTS["formats"]}
-"""Options by command and name of the parameter; ``threads`` has a test of its own."""
+"""Options by command and name of the parameter; ``threads`` and ``package`` have tests of their own."""
 
 PLAIN = f"estimate {BASES['estimate']}"
 NO_EFFECT = [
@@ -138,6 +138,7 @@ def test_every_option_of_every_command_has_a_row():
     known = {command: set(rows) for command, rows in ROWS.items()}
     for command in ("detect", "run"):
         known[command].add("threads")
+    known |= {"networks get": {"package"}, "networks list": set(), "networks show": set()}
     found = {command: set(options) for command, options in parameters(app).items()}
     known["run"] |= found["run"] & set(ROWS["estimate"])  # one function takes them from both
     assert found == known
@@ -160,12 +161,21 @@ def test_an_option_without_effect_says_so(walk, base, option):
     assert walk.run(base).files == walk.run(f"{base} {option}").files
 
 
-def test_threads_reach_the_networks(walk, monkeypatch):
-    opened = []
-    real = Session._open
-    monkeypatch.setattr(
-        Session, "_open", lambda self, provider, threads: opened.append(threads) or real(self, provider, threads)
-    )
+def test_threads_are_those_of_the_detection(walk, monkeypatch):
+    counts = []
+    real = video_detection.detect_videos
+
+    def recorded(*words, workers, **options):
+        counts.append(workers)
+        return real(*words, workers=workers, **options)
+
+    monkeypatch.setattr(video_detection, "detect_videos", recorded)
     assert walk.run(f"detect {BASES['detect']} --threads 3").code == 0
-    assert opened
-    assert set(opened) == {3}
+    assert counts == [3]
+
+
+def test_a_package_that_is_none_is_refused(walk, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    refused = walk.run("networks get movenet --package {lab}/Calib.toml")
+    assert refused.code in (2, 3)
+    assert "Calib.toml" in refused.told
