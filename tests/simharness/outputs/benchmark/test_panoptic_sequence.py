@@ -193,7 +193,7 @@ class TestManifest:
 
     def test_all_files_are_listed(self, content, folder):
         single = ("calibration", "calibration_believed", "scenario", "recording", "truth")
-        named = {content["files"][key] for key in single} | {"manifest.json"}
+        named = {content["files"][key] for key in single} | {"manifest.json", ".written"}
         numbers = range(content["frames"]["first"], 3, content["frames"]["every"])
         assert len(numbers) == content["frames"]["count"] == 3
         for frame in numbers:
@@ -361,7 +361,7 @@ class TestAtomicFolder:
     ("options", "message"),
     [
         ({"every": 0}, "--every must be 1 or more, got 0"),
-        ({"folder": "file/tiny"}, "cannot be created, because .*file"),
+        ({"folder": "file/tiny"}, "cannot be written: Not a directory .*file"),
     ],
 )
 def test_bad_requests_are_refused(tmp_path, options, message):

@@ -47,7 +47,7 @@ def test_each_layer_changes_the_picture(plain, tmp_path, layer):
 
 def test_a_film_holds_every_frame(plain, tmp_path):
     folder = render(tiny(), RenderPlan(video=True), out=tmp_path)
-    assert sorted(path.name for path in folder.iterdir()) == ["cam0.mp4", "cam1.mp4", "mosaic.mp4"]
+    assert sorted(path.name for path in folder.glob("*.*")) == [".written", "cam0.mp4", "cam1.mp4", "mosaic.mp4"]
     film = cv2.VideoCapture(str(folder / "cam0.mp4"))
     assert film.get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
     frames = []
