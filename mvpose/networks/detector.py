@@ -316,8 +316,22 @@ def _until_fault(pictures: Iterable[Pixels]) -> Iterator[Pixels | Exception]:
         yield error
 
 
-def open_head(path: str | Path, *, provider: Provider = "cpu", threads: int = 1) -> PoseHead:
-    """Open a pose head, on COCO-17 or on the skeleton of :mod:`mvpose.wholebody` with its number of joints.
+def open_head(
+    path: str | Path,
+    *,
+    skeleton: Skeleton | None = None,
+    likelihoods: bool = False,
+    provider: Provider = "cpu",
+    threads: int = 1,
+) -> PoseHead:
+    """Open a pose head: PoseNet, or one of heat maps or SimCC.
+
+    Args:
+        path: ONNX file.
+        skeleton: its joints; None: COCO-17 or the skeleton of :mod:`mvpose.wholebody` with their number.
+        likelihoods: whether detections carry heat maps.
+        provider: as of :class:`mvpose.networks.Session`.
+        threads: as of :class:`mvpose.networks.Session`.
 
     Raises:
         ValueError: as :class:`mvpose.networks.PoseHead`, or another number of joints.
@@ -325,10 +339,10 @@ def open_head(path: str | Path, *, provider: Provider = "cpu", threads: int = 1)
     session = Session(path, provider=provider, threads=threads)
     known: list[Skeleton] = [COCO17, *map(skeleton_by_name, SKELETONS)]
     counts = {extent for shape in session.shapes for extent in (shape[0], shape[-1])}
-    skeleton = next((each for each in known if len(each) in counts), COCO17)
+    skeleton = skeleton or next((each for each in known if len(each) in counts), COCO17)
     if session.card.name == PoseNet.name:
-        return PoseNet(session, likelihoods=False)
-    return PoseHead(session, skeleton=skeleton, likelihoods=False)
+        return PoseNet(session, likelihoods=likelihoods)
+    return PoseHead(session, skeleton=skeleton, likelihoods=likelihoods)
 
 
 def _nobody(head: PoseHead | None) -> PeopleInPicture:

@@ -10,7 +10,7 @@ from mvpose import COCO17, Detections
 from mvpose.networks import PoseHead, ReId
 from mvpose.networks.catalogue.store import path_of
 from mvpose.networks.crops import Images
-from mvpose.networks.detector import PeopleFinder
+from mvpose.networks.detector import PeopleFinder, open_head
 from mvpose.networks.finders import open_finder
 from mvpose.networks.reid import DEFAULT
 from simharness.detector.descriptors import DescriptorModel, DescriptorSettings
@@ -112,7 +112,7 @@ def pose_head(scenario: Scenario) -> PoseHead:
     """
     file = network_file(scenario, "detector.onnx")
     try:
-        return PoseHead(file, likelihoods=scenario.detector.heatmaps.size != "none")
+        return open_head(file, skeleton=COCO17, likelihoods=scenario.detector.heatmaps.size != "none")
     except ValueError as error:
         raise ValueError(f"detector.onnx: {error}") from None
 

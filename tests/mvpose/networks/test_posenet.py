@@ -57,7 +57,9 @@ def test_joints_are_placed_in_the_picture(head):
     assert found.likelihoods.values.shape == (1, 17, 33, 33)
     np.testing.assert_allclose(found.likelihoods.stride, 4.0)
     assert PoseNet(head, likelihoods=False).detect([shown], [0], [[30, 30, 129, 129]]).likelihoods is None
-    assert isinstance(open_head(head), PoseNet)
+    for likelihoods in (False, True):
+        opened = open_head(head, likelihoods=likelihoods)
+        assert (isinstance(opened, PoseNet), opened.likelihoods) == (True, likelihoods)
 
 
 def test_another_network_is_refused(tmp_path):
