@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -85,6 +86,19 @@ def _of_all_lenses(findings: list[Finding], rig: Rig) -> list[Finding]:
     return [*(each for each in findings if each not in lenses), whole]
 
 
+class _Described(NamedTuple):
+    """What a fault is: text, sizes with intervals, sizes that are judged with their lowest values, loss (m), mend."""
+
+    kind: str
+    text: str
+    size: dict[str, float]
+    interval: dict[str, tuple[float, float]]
+    judged: dict[str, tuple[float, float]]
+    cost: float
+    mend: str
+    repair: tuple[str, ...]
+
+
 def _finding(
     found: CameraFault,
     fit: CameraFit,
@@ -94,74 +108,89 @@ def _finding(
     depth: Floats,
     undetermined: bool,
 ) -> Finding | None:
-    view, kind, change = found.fault.view, found.fault.model.kind, found.change
-    name = names[view]
-    draws = _draws(change, found.covariance)
-    repair: tuple[str, ...] = _REPAIR
-    judged_by: dict[str, tuple[float, float]] = {}  # size and its lowest value, where it is not one of the finding
-    if kind == "moved-camera":
-        size, interval = _pose_size(change, draws)
-        cost = np.radians(size["degrees"]) * depth[view] + size["metres"]
-        text = f"{name} is not in its calibrated pose: it is off by {size['degrees']:.1f} degrees and "
-        text += f"{100 * size['metres']:.0f} cm"
-        if found.fault.course == "growing":
-            kind, text = "drifting-camera", text + " at the end, growing from the start"
-        if found.since is not None:
-            best, low, high = found.since
-            later = min(high + 1, len(starts) - 1)
-            size["since_s"] = float(starts[best])
-            interval["since_s"] = float(starts[max(low - 1, 0)]), float(starts[later])
-            text += f", since {starts[best]:.1f} s"
-        if undetermined and len(found.fault.model.index) == 3:  # a repair would be refused
-            repair = ("--mend", _turn(change, name))
-    elif kind == "focal-length":
-        percent = 100 * np.expm1(draws[:, 6])
-        size = {"percent": float(100 * np.expm1(change[6]))}
-        interval = {"percent": _range(percent)}
-        judged_by = {"percent": (size["percent"], min(np.abs(interval["percent"])))}
-        cost = abs(size["percent"]) / 100 * 0.3 * depth[view]
-        text = f"the focal length of {name} should be {size['percent']:+.1f} %"
-        repair = ("--mend", str(Mend("focal", f"{np.exp(change[6]):.4f}", (name,))))
-    elif kind == "principal-point":
-        size = {"x_px": float(change[7]), "y_px": float(change[8])}
-        interval = {"x_px": _range(draws[:, 7]), "y_px": _range(draws[:, 8])}
-        shift = float(np.hypot(*change[7:9]))
-        judged_by = {"px": (shift, _range(np.hypot(draws[:, 7], draws[:, 8]))[0])}
-        cost = shift / rig[view].K[0, 0] * depth[view]
-        text = f"the principal point of {name} is off by {shift:.0f} px (are the pictures cropped?)"
-        repair = ("--mend", str(Mend("center", f"{change[7]:.1f},{change[8]:.1f}", (name,))))
-    elif kind == "distortion-ignored":
-        camera = rig[view]
-        lever = _outer_radius(fit, camera) ** 3 * camera.K[0, 0]
-        corner = abs(change[9]) * lever
-        size, interval = {"k1": float(change[9])}, {"k1": _range(draws[:, 9])}
-        judged_by = {"edge_px": (corner, min(np.abs(interval["k1"])) * lever)}
-        cost = 0.3 * corner / camera.K[0, 0] * depth[view]
-        text = f"the lens of {name} has another distortion than calibrated: {corner:.0f} px off near the edge"
-        kind = "distortion-model" if camera.distortion.any() else kind
-        repair = ("--mend", str(Mend("k1", f"{change[9]:.4f}", (name,))))
-    else:  # offsets of clocks are findings of mvpose.calibration.clocks
+    view, kind = found.fault.view, found.fault.model.kind
+    draws = _draws(found.change, found.covariance)
+    if kind == "clock-offset":  # offsets of clocks are findings of mvpose.calibration.clocks
         return None
+    if kind == "moved-camera":
+        described = _of_pose(found, draws, starts, names[view], float(depth[view]), undetermined)
+    else:
+        described = _of_lens(found, draws, fit, rig[view], names[view], float(depth[view]))
     probability = min(found.probability * found.kind_probability, 1.0)
-    judged_by = judged_by or {key: (value, interval[key][0]) for key, value in size.items()}
     severity = judged(
-        {key: value for key, (value, _) in judged_by.items()},
-        {key: low for key, (_, low) in judged_by.items()},
+        {key: value for key, (value, _) in described.judged.items()},
+        {key: low for key, (_, low) in described.judged.items()},
         probability=probability,
         determined=not undetermined,
     )
     return Finding(
-        kind,
-        text,
+        described.kind,
+        described.text,
         severity,
         probability,
-        name,
+        names[view],
         view,
-        size,
-        interval,
-        cost=float(probability * cost / len(rig)),
-        repair=repair,
+        described.size,
+        described.interval,
+        cost=float(probability * described.cost / len(rig)),
+        mend=described.mend,
+        repair=described.repair,
     )
+
+
+def _of_pose(
+    found: CameraFault, draws: Floats, starts: Floats, name: str, depth: float, undetermined: bool
+) -> _Described:
+    """Describe a pose that is wrong, from the start, since some time, or more and more."""
+    kind, mend, repair = "moved-camera", "", _REPAIR
+    size, interval = _pose_size(found.change, draws)
+    limits = {key: (value, interval[key][0]) for key, value in size.items()}
+    cost = np.radians(size["degrees"]) * depth + size["metres"]
+    text = f"{name} is not in its calibrated pose: it is off by {size['degrees']:.1f} degrees and "
+    text += f"{100 * size['metres']:.0f} cm"
+    if found.fault.course == "growing":
+        kind, text = "drifting-camera", text + " at the end, growing from the start"
+        mend = "fix the camera; a calibration holds for a short part of this recording alone: --frames chooses it"
+    if found.since is not None:
+        best, low, high = found.since
+        later = min(high + 1, len(starts) - 1)
+        size["since_s"] = float(starts[best])
+        interval["since_s"] = float(starts[max(low - 1, 0)]), float(starts[later])
+        text += f", since {starts[best]:.1f} s"
+        mend = "each part of the recording has a calibration of its own: add --frames with those after the change"
+    if undetermined and len(found.fault.model.index) == 3:  # a repair would be refused
+        repair = ("--mend", _turn(found.change, name))
+    return _Described(kind, text, size, interval, limits, cost, mend, repair)
+
+
+def _of_lens(found: CameraFault, draws: Floats, fit: CameraFit, camera: Camera, name: str, depth: float) -> _Described:
+    """Describe intrinsics that are wrong."""
+    kind, change = found.fault.model.kind, found.change
+    if kind == "focal-length":
+        size = {"percent": float(100 * np.expm1(change[6]))}
+        interval = {"percent": _range(100 * np.expm1(draws[:, 6]))}
+        limits = {"percent": (size["percent"], min(np.abs(interval["percent"])))}
+        cost = abs(size["percent"]) / 100 * 0.3 * depth
+        text = f"the focal length of {name} should be {size['percent']:+.1f} %"
+        mend = Mend("focal", f"{np.exp(change[6]):.4f}", (name,))
+    elif kind == "principal-point":
+        size = {"x_px": float(change[7]), "y_px": float(change[8])}
+        interval = {"x_px": _range(draws[:, 7]), "y_px": _range(draws[:, 8])}
+        shift = float(np.hypot(*change[7:9]))
+        limits = {"px": (shift, _range(np.hypot(draws[:, 7], draws[:, 8]))[0])}
+        cost = shift / camera.K[0, 0] * depth
+        text = f"the principal point of {name} is off by {shift:.0f} px (are the pictures cropped?)"
+        mend = Mend("center", f"{change[7]:.1f},{change[8]:.1f}", (name,))
+    else:
+        lever = _outer_radius(fit, camera) ** 3 * camera.K[0, 0]
+        corner = abs(change[9]) * lever
+        size, interval = {"k1": float(change[9])}, {"k1": _range(draws[:, 9])}
+        limits = {"edge_px": (corner, min(np.abs(interval["k1"])) * lever)}
+        cost = 0.3 * corner / camera.K[0, 0] * depth
+        text = f"the lens of {name} has another distortion than calibrated: {corner:.0f} px off near the edge"
+        kind = "distortion-model" if camera.distortion.any() else kind
+        mend = Mend("k1", f"{change[9]:.4f}", (name,))
+    return _Described(kind, text, size, interval, limits, cost, "", ("--mend", str(mend)))
 
 
 def turn_finding(rig: Rig, cameras: Floats, covariance: Floats, view: int, names: Sequence[str]) -> Finding:

@@ -217,7 +217,8 @@ def mistake_finding(verdict: FoundMistake, names: Sequence[str]) -> Finding:
     everyone = verdict.whole and len(mistake.views) == len(names)
     who = "all cameras" if everyone else " and ".join(named)
     possible = bool(mistake.mend) and (everyone or mistake.mend != "mirrored")
-    mend = Mend(*mistake.mend.split(":", 1), cameras=() if everyone else tuple(named)) if possible else None
+    name, _, values = mistake.mend.partition(":")
+    mend = Mend(name, values, () if everyone else tuple(named)) if possible else None
     return Finding(
         mistake.kind,
         mistake.text.replace("{who}", who),

@@ -108,8 +108,8 @@ def _changes() -> Iterator[tuple[Mistake, Change]]:
         extrinsics(lambda R, t, C: (_GL @ R.T, t)),
     )
     turned = replace(gl, prior=0.5, text="{who}: two axes of the camera point the other way")
-    for axes, signs in (("xy", [-1.0, -1.0, 1.0]), ("xz", [-1.0, 1.0, -1.0])):
-        yield replace(turned, mend=f"flipped-{axes}"), extrinsics(turned_camera(np.diag(signs)))
+    for which, signs in (("xy", [-1.0, -1.0, 1.0]), ("xz", [-1.0, 1.0, -1.0])):
+        yield replace(turned, mend=f"flipped-{which}"), extrinsics(turned_camera(np.diag(signs)))
     world = replace(
         gl, prior=0.5, of_all=False, text="the world of {who} has another vertical axis than that of the others"
     )

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
@@ -199,12 +200,13 @@ def _of_size(values: str) -> Callable[[Camera], Camera]:
     return lambda camera: replace(camera, size=(width, height))
 
 
-def upright(up: Sequence[float]) -> Floats:
+def upright(up: ArrayLike) -> Floats:
     """Return the turn (3, 3) from a world in which a direction (3,) points up to one in which z does.
 
     An axis of the world is turned onto z exactly: the axes are exchanged in a cycle, or turned by half about x.
     """
-    direction = np.asarray(up, float) / np.linalg.norm(up)
+    direction = np.asarray(up, float)
+    direction = direction / np.linalg.norm(direction)
     axis = int(np.argmax(np.abs(direction)))
     if abs(direction[axis]) < 1.0 - 1e-9:
         return Rotation.align_vectors([[0.0, 0.0, 1.0]], [direction])[0].as_matrix()

@@ -38,9 +38,8 @@ _TILTED = float(np.radians(35.0))  # between people and the vertical: people who
 _NEAR_AXIS = float(np.radians(15.0))  # an axis of the world this near to the people is the vertical
 _ALIGNED = 0.7  # length of the mean direction of trunks; less is of people who lie, bend or are matched wrongly
 _FEWEST_TRUNKS = 20
-_ANKLES, _SHOULDERS, _HIPS = (
-    tuple(f"{side}_{joint}" for side in ("left", "right")) for joint in ("ankle", "shoulder", "hip")
-)
+_ANKLES = ("left_ankle", "right_ankle")
+_SHOULDERS, _HIPS = ("left_shoulder", "right_shoulder"), ("left_hip", "right_hip")
 _BELOW = 0.3  # metres below the lowest feet, where no camera stands
 
 _OFF_CENTER = 0.3  # of the picture: principal points farther from its middle are of another picture
@@ -173,13 +172,17 @@ def world_findings(
         views: the sightings of each joint.
         up: axis of the world that points up by the user, "z", "-y" ...; None for z.
     """
+    wanted = (*_SHOULDERS, *_HIPS, *_ANKLES)
+    if not set(wanted) <= set(sightings.skeleton.joints):
+        return [], []
     first = rows[views.start[:-1]]
     people = int(sightings.person.max(initial=0)) + 1
     body, number = np.unique(sightings.frame[first] * people + sightings.person[first], return_inverse=True)
     place = np.full((len(body), len(sightings.skeleton), 3), np.nan)
     place[number, sightings.joint[first]] = joints
-    known = {joint: place[:, sightings.skeleton.index(joint)] for joint in (*_SHOULDERS, *_HIPS, *_ANKLES)}
-    trunks = sum(known[joint] for joint in _SHOULDERS) - sum(known[joint] for joint in _HIPS)
+    known = {joint: place[:, sightings.skeleton.index(joint)] for joint in wanted}
+    shoulders, hips = (known[left] + known[right] for left, right in (_SHOULDERS, _HIPS))
+    trunks = shoulders - hips
     trunks = trunks[np.isfinite(trunks[:, 0])]
     trunks = trunks / np.linalg.norm(trunks, axis=1, keepdims=True)
     if len(trunks) < _FEWEST_TRUNKS or np.linalg.norm(trunks.mean(axis=0)) < _ALIGNED:

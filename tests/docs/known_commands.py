@@ -99,6 +99,8 @@ MVPOSE = (  # run by tests/mvpose/cli
     "mvpose estimate CALIBRATION DETECTIONS --out results",
     "mvpose doctor CALIBRATION DETECTIONS",
     "mvpose repair CALIBRATION DETECTIONS --out NEW",
+    "mvpose repair CALIBRATION DETECTIONS --mend inverted --mend unit:0.001@cam2 --free extrinsics "
+    "--out mended/Calib.toml",
     "mvpose networks get movenet",
     "mvpose run CALIBRATION VIDEO... --out results",
     "mvpose run CALIBRATION VIDEO... --detector det.onnx --pose pose.onnx --out results",
@@ -109,6 +111,7 @@ MODULES = tuple(
     f"python -m {name}"
     for name in (
         "benchmarks.doctor",
+        "benchmarks.doctor.breaks",
         "benchmarks.expected_error",
         "benchmarks.method",
         "benchmarks.pictures",

@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 
 from mvpose import Camera, Rig
-from mvpose.calibration.findings import KINDS, Diagnosis, Finding, camera_names
+from mvpose.calibration.findings import (
+    ALARM,
+    EXCLUDED,
+    KINDS,
+    Diagnosis,
+    Finding,
+    camera_names,
+    is_excluded,
+    joined_options,
+    judged,
+)
 
 
 def diagnosis(*findings):
@@ -77,3 +87,38 @@ def test_names_of_cameras_differ():
     assert len(set(names)) == 4
     assert names[1] == "camera 1"
     assert names[3] == "b"
+
+
+@pytest.mark.parametrize("name", ALARM)
+def test_no_error_as_large_as_an_alarm_is_a_note(name):
+    """Size decides between note and more, evidence between unknown and alarm."""
+    limit = ALARM[name]
+    assert judged({name: 0.99 * limit}, {name: 0.9 * limit}) == "note"
+    for sign in (1.0, -1.0):
+        assert judged({name: sign * limit}, {name: 0.0}) == "alarm"
+        assert judged({name: sign * limit}, {name: 0.0}, determined=False) == "unknown"
+        assert judged({name: sign * 9 * limit}, {name: 1.9 * limit}, determined=False) == "unknown"
+        assert judged({name: sign * 9 * limit}, {name: 3 * limit}, determined=False, probability=0.5) == "unknown"
+        assert judged({name: sign * 9 * limit}, {name: 3 * limit}, determined=False) == "alarm"
+    assert judged({name: 0.0, "since_s": 1e9}, {}) == "note"
+
+
+def test_fine_excludes_each_size():
+    assert is_excluded({name: 0.99 * limit for name, limit in EXCLUDED.items()})
+    for name in EXCLUDED:
+        assert not is_excluded({**{each: 0.0 for each in EXCLUDED}, name: EXCLUDED[name]})
+
+
+def test_options_of_all_alarms_make_one_command():
+    found = [
+        Finding("moved-camera", "m", cost=9.0, repair=("--free", "extrinsics")),
+        Finding("wrong-unit", "u", repair=("--mend", "unit:0.001")),
+        Finding("moved-camera", "n", severity="note", repair=("--mend", "turn:1,2,3@a")),
+        Finding("clock-offset", "c", repair=("--new-times", "TIMES")),
+        Finding("extrinsics-inverted", "i", repair=("--mend", "inverted@a")),
+        Finding("other-people", "o"),
+    ]
+    wanted = ("--mend", "unit:0.001", "--mend", "inverted@a", "--free", "extrinsics", "--new-times", "TIMES")
+    assert diagnosis(*found).repair == wanted  # mends in the order in which they were found
+    assert joined_options([("--free", "focal"), ("--free", "extrinsics,focal")]) == ("--free", "focal,extrinsics")
+    assert joined_options([]) == ()

@@ -1,6 +1,8 @@
 """``mvpose doctor``: what the diagnosis says, as lines and as JSON, and its exit code."""
 
 import json
+import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,8 @@ from typer.testing import CliRunner
 
 from mvpose.calibration import Diagnosis, Finding
 from mvpose.cli.app import app
+from mvpose.cli.doctor_command import repair_line
+from mvpose.cli.inputs import Choices
 from mvpose.formats.calibration import pose2sim
 
 NAMES = ["cam0", "cam1", "cam2", "cam3"]
@@ -63,3 +67,34 @@ def test_what_estimate_refuses_the_doctor_examines(call):
     assert result.exit_code == 1
     assert "Traceback" not in result.output
     assert len(got["rig"]) == 4
+
+
+def test_the_printed_command_repeats_the_options_of_the_user(tmp_path, monkeypatch):
+    """Without them it would fail or take another rate; a folder that is there is not written into."""
+    monkeypatch.chdir(tmp_path)
+    choices = Choices(fps=59.94, size="1280x960", cameras="a b,c", frames="10:300", skeleton="coco17", up="-y")
+    line = repair_line(Path("in/Calib.toml"), [Path("my poses"), Path("p2")], choices, ("--mend", "unit:0.001@a b"))
+    assert shlex.split(line) == [
+        "mvpose", "repair", "in/Calib.toml", "my poses", "p2", "--fps", "59.94", "--size", "1280x960", "--cameras",
+        "a b,c", "--frames", "10:300", "--skeleton", "coco17", "--up", "-y", "--mend", "unit:0.001@a b", "--out",
+        "mended/Calib.toml",
+    ]  # fmt: skip
+    Path("mended").mkdir()
+    line = repair_line(Path("Calib.toml"), [Path("p")], Choices(), ("--new-times", "TIMES"))
+    assert line == "mvpose repair Calib.toml p --new-times mended-2/times.csv"
+    assert repair_line(Path("Calib.toml"), [Path("p")], Choices(), ()) == ""
+
+
+def test_inverted_extrinsics_are_found_whatever_up_says(call):
+    """The axis is that of the file's world: the extrinsics are examined as the file has them."""
+    _, plain = call([MOVED])
+    given = [camera.R for camera in plain["rig"]]
+    _, got = call([MOVED], "--up", "-y")
+    assert got["up"] == "-y"
+    assert all(np.array_equal(camera.R, R) for camera, R in zip(got["rig"], given, strict=True))
+
+
+def test_a_wrong_axis_is_refused(call):
+    result, _ = call([MOVED], "--up", "up")
+    assert result.exit_code == 2
+    assert "--up must be one of" in result.stderr

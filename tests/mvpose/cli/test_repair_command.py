@@ -1,6 +1,7 @@
 """``mvpose repair``: the new calibration in the format of the old one, or one line that says why there is none."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -88,3 +89,54 @@ def test_a_refused_repair_writes_nothing(call):
     wrong = run(folder / "Calib.toml", folder / "openpose", "--out", folder / "new.toml", "--rig-size", "me")
     assert wrong.exit_code == 2
     assert "--rig-size me: expected calibration, people or both" in wrong.stderr
+
+
+def test_named_mends_are_applied_and_nothing_else(call):
+    """The rig of the file in millimetres and inverted is the true one again; no camera is estimated."""
+    run, folder, rig, _ = call
+    wrong = Rig.unchecked([replace(each, R=each.R.T, t=1000 * each.center) for each in rig])
+    pose2sim.write_calibration(folder / "Calib.toml", wrong)
+    mends = "--mend", "unit:0.001", "--mend", "inverted"
+    result = run(folder / "Calib.toml", folder / "openpose", "--out", folder / "new.toml", "--fps", 25, *mends)
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines()[:2] == ["unit:0.001: applied", "inverted: applied"]
+    for one, two in zip(read_calibration(folder / "new.toml", size=(1, 1)), rig, strict=True):
+        np.testing.assert_allclose(one.R, two.R, atol=1e-12)
+        np.testing.assert_allclose(one.t, two.t, atol=1e-12)
+
+
+def test_corrected_times_alone_leave_the_calibration(call):
+    run, folder, rig, _ = call
+    pose2sim.write_calibration(folder / "Calib.toml", rig)
+    result = run(folder / "Calib.toml", folder / "openpose", "--fps", 25, "--new-times", folder / "new" / "times.csv")
+    assert result.exit_code == 0, result.output
+    assert [each.name for each in (folder / "new").iterdir()] == ["times.csv"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ((), "--out: expected the file of the new calibration"),
+        (("--mend", "inverted", "--new-times", "t.csv"), "--mend and --free change the calibration: give --out"),
+        (("--out", "new.toml", "--mend", "bent"), "--mend bent: expected NAME"),
+        (("--out", "new.toml", "--mend", "inverted@cam9"), "there is no camera 'cam9'"),
+        (("--out", "new.toml", "--mend", "unit:1e6"), "which cannot be metres"),
+        (("--out", "new.toml", "--mend", "inverted", "--rig-size", "both"), "--rig-size: has an effect only where"),
+    ],
+)
+def test_options_that_do_nothing_or_harm_are_refused(call, options, message):
+    run, folder, rig, _ = call
+    pose2sim.write_calibration(folder / "Calib.toml", rig)
+    result = run(folder / "Calib.toml", folder / "openpose", "--fps", 25, *options)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert not Path("new.toml").exists()
+
+
+def test_an_axis_that_points_up_has_no_effect_and_says_so(call):
+    run, folder, rig, moved = call
+    pose2sim.write_calibration(folder / "Calib.toml", rig)
+    result = run(folder / "Calib.toml", folder / "openpose", "--out", folder / "new.toml", "--fps", 25, "--up", "-y")
+    assert "--up has no effect" in result.stderr
+    for one, two in zip(read_calibration(folder / "new.toml", size=(1, 1)), moved, strict=True):
+        np.testing.assert_allclose(one.R, two.R, atol=1e-12)
