@@ -21,7 +21,6 @@ off by 30 to 50 mm); it does not shrink with the length of a recording."""
 _LENSES = ("distortion-ignored", "distortion-model")
 _REPAIR = ("--free", "extrinsics")
 _DRAWS = 4000
-_NINE_TENTHS = 1.282  # standard deviations of a Gaussian below which nine tenths are
 
 
 def findings_of_cameras(
@@ -221,13 +220,13 @@ def _turn(change: Floats, name: str) -> str:
 
 
 def possible_errors(fit: CameraFit, view: int) -> dict[str, float]:
-    """Return turn (degrees) and shift (metres) of a camera that nine tenths of the probability allow at most."""
+    """Return turn (degrees) and shift (metres) by which a camera may be off: estimates plus a standard deviation."""
     pose, covariance = fit.freed(view)
     high = {}
     for name, part, unit in (("degrees", slice(0, 3), 180.0 / np.pi), ("metres", slice(3, 6), 1.0)):
         length = max(float(np.linalg.norm(pose[part])), 1e-9)
         along = pose[part] / length
-        high[name] = unit * (length + _NINE_TENTHS * float(np.sqrt(along @ covariance[part, part] @ along)))
+        high[name] = unit * (length + float(np.sqrt(along @ covariance[part, part] @ along)))
     return high
 
 
@@ -242,9 +241,12 @@ def _remark(fit: CameraFit, view: int, names: Sequence[str], depth: Floats, dete
     cost = (np.radians(size["degrees"]) * depth[view] + size["metres"]) / len(names)
     high = possible_errors(fit, view)
     if determined and not is_excluded(high):
-        text = f"{names[view]} may be off by {high['degrees']:.1f} degrees and {100 * high['metres']:.0f} cm: its "
-        text += f"estimated correction is {size['degrees']:.2f} degrees and {100 * size['metres']:.1f} cm, more than "
-        text += "those of good calibrations, and too uncertain for an alarm"
+        text = (
+            f"{names[view]} may be off by up to {high['degrees']:.2f} degrees and {100 * high['metres']:.0f} cm: its "
+        )
+        text += (
+            f"estimated correction of {size['degrees']:.2f} degrees and {100 * size['metres']:.1f} cm is too uncertain"
+        )
         return [Finding("moved-camera", text, "unknown", 0.5, names[view], view, size, interval, cost, repair=_REPAIR)]
     change, sigma = fit.change[view, :6], np.sqrt(np.diagonal(fit.covariance[view])[:6])
     if (np.abs(change) / sigma).max() < 3.0 or (size["degrees"] < 0.1 and size["metres"] < 0.01) or not determined:

@@ -287,7 +287,7 @@ def _evidence(
     lines.append(
         "median distance of keypoints from the people as seen by the other cameras: "
         + ", ".join(
-            f"{value:.1f} px ({name}; usual {normal:.0f})" for name, value, normal in zip(names, *medians, strict=True)
+            f"{name} {value:.1f} px (usual {normal:.0f})" for name, value, normal in zip(names, *medians, strict=True)
         )
     )
     lines.append(

@@ -66,8 +66,8 @@ outermost tenth of the people, clock, and residual over the usual one. Errors of
 that are estimated for careful, published calibrations are 0.05 to 0.28 degrees and 1 to 2.5 cm (Shelf)."""
 
 EXCLUDED: Mapping[str, float] = MappingProxyType({"degrees": 0.5, "metres": 0.12})
-"""Sizes of which "fine" says that no camera has them: the estimate without trust in the calibration, with what nine
-tenths of its probability allow, is below. Shifts are less certain than turns: detectors place joints differently from
+"""Sizes of which "fine" says that no camera has them: the estimate without trust in the calibration, plus a standard
+deviation, is below. Shifts are less certain than turns: detectors place joints differently from
 different sides, which imitates shifts of 5 cm (Shelf's published cameras), and of distant cameras 9 cm."""
 
 _CLEAR = 2.0  # times the size of an alarm, in a recording that does not determine smaller ones
@@ -104,7 +104,7 @@ def judged(
 
 
 def is_excluded(high: Mapping[str, float]) -> bool:
-    """Whether what nine tenths of the probability allow for a camera, by name, is within what "fine" promises."""
+    """Whether the errors that a camera may have, by name, are within what "fine" promises."""
     return all(value < EXCLUDED[name] for name, value in high.items())
 
 
@@ -186,8 +186,8 @@ class Diagnosis(Sealed):
         residuals: median distance of each camera's keypoints from the people that the other cameras see, (V,), pixels;
             NaN where a camera shares nobody with the others.
         usual: what these distances are where the calibration is right and detectors err as usual, (V,), pixels.
-        within: turn (``"degrees"``) and shift (``"metres"``) that nine tenths of the probability allow for any
-            camera at most; empty where the recording does not determine it.
+        within: turn (``"degrees"``) and shift (``"metres"``) by which any camera may be off, estimates plus a standard
+            deviation; empty where the recording does not determine it.
         repair: options of ``mvpose repair`` that mend all alarms for which there are any, in the order in which they
             must be applied.
 

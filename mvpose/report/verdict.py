@@ -40,7 +40,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     """Return the verdict as one sentence, with the worst finding where it is not fine."""
     alarms = diagnosis.alarms
     if not alarms and diagnosis.verdict == "cannot tell":
-        reason = diagnosis.open_questions[0].text.removeprefix("cannot tell: ").rstrip(".")
+        reason = _named(diagnosis.open_questions[0]).removeprefix("cannot tell: ")
         return f"{_SENTENCES[diagnosis.verdict]}: {reason}."
     if not alarms:
         within = diagnosis.within
@@ -53,10 +53,15 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 def sentence_of(finding: Finding) -> str:
     """Return a finding as a sentence; one that starts with the name of a camera calls it a camera."""
+    text = _named(finding)
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _named(finding: Finding) -> str:
     text, name = (finding.text or KINDS[finding.kind]).rstrip("."), finding.camera
     if name and text.startswith(f"{name} ") and not name.lower().startswith("camera"):
         text = f"camera {text}"
-    return f"{text[:1].upper()}{text[1:]}."
+    return text
 
 
 def quantities(finding: Finding) -> list[Quantity]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import shlex
 import shutil
 import subprocess
 from dataclasses import replace
@@ -80,7 +81,9 @@ def _write_pages(folder: Path, result: TrialResult) -> None:
         diagnosis=diagnose(wrong, frames),
         repair=repair(wrong, frames),
         pictures=picture,
-        files=("hall.json", "detections"),
+        command=lambda options: shlex.join(
+            ["mvpose", "repair", "hall.json", "detections", *options, "--out", "new.json"]
+        ),
     )
 
 
