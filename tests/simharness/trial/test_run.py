@@ -29,7 +29,7 @@ from simharness.trial.stages import simulation
 from simharness.trial.stages.build_trial import build_trial
 
 SAME_BYTES = ("detections.npz", "truth.npz", "estimates.npz", "scores.parquet", "rig.npz", "scenario.toml")
-FILES = {*SAME_BYTES, "timings.parquet", "summary.json", "mosaic.png", "film.mp4", "report.html"}
+FILES = {*SAME_BYTES, ".written", "timings.parquet", "summary.json", "mosaic.png", "film.mp4", "report.html"}
 
 
 def tiny(**sections) -> Scenario:
