@@ -123,11 +123,11 @@ def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: N
             raise ValueError(f"--size {choices.size}: the videos have pictures of another size; leave --size out")
         if choices.frames is None:
             check_lengths(sources)
-        _detect(sources, detections, networks)
+        skeleton = _detect(sources, detections, networks)
         note(f"detections are kept in {detections}: another run does not detect again")
         sizes = {source.size for source in sources}
         size = choices.size or ("x".join(map(str, sizes.pop())) if len(sizes) == 1 else None)
-        choices = replace(choices, fps=choices.fps or common_rate(sources), size=size)
+        choices = replace(choices, fps=choices.fps or common_rate(sources), size=size, skeleton=skeleton)
         files = [detections / f"{source.name}.json" for source in sources]
         estimate_into(calibration, files, choices, wanted, sources=sources)
 
@@ -139,13 +139,14 @@ def _check_folder(folder: Path) -> None:
     check_writable(folder, DETECT)
 
 
-def _detect(sources: Sequence[PictureSource], out: Path, networks: Networks) -> None:
-    """Write the detections of videos of one rate."""
+def _detect(sources: Sequence[PictureSource], out: Path, networks: Networks) -> str:
+    """Write the detections of videos of one rate, and return the name of their skeleton."""
     from mvpose.cli.camera_pictures import common_rate
     from mvpose.cli.video_detection import detect_videos, networks_text
     from mvpose.networks.catalogue.store import path_of
     from mvpose.networks.detector import open_head
     from mvpose.networks.finders import open_finder
+    from mvpose.skeleton import COCO17
 
     common_rate(sources)
     detector = path_of(networks.detector)
@@ -163,3 +164,4 @@ def _detect(sources: Sequence[PictureSource], out: Path, networks: Networks) -> 
     text = networks_text(detector, pose, least=finder.least, kind=finder.kind)
     workers = networks.threads or len(os.sched_getaffinity(0))
     detect_videos(sources, out, finder, head, networks=text, workers=workers)
+    return (COCO17 if head is None else head.skeleton).name

@@ -171,6 +171,7 @@ class TestRun:
             "--method", "fast", "--trust", "--fps", 25,
         )  # fmt: skip
         assert result.exit_code == 0, result.output
+        assert "joints are those of" not in result.stderr  # the network says which they are
         assert "data:image/jpeg" in (tmp_path / "out" / "recording.html").read_text(encoding="utf-8")
         table = pl.read_parquet(tmp_path / "out" / "poses.parquet")
         where = table.group_by("frame").agg(pl.col("x", "y", "z").median()).sort("frame")
