@@ -3,9 +3,14 @@
 import base64
 import io
 import json
+import os
 import tarfile
+from pathlib import Path
 
 import numpy as np
+import pytest
+
+from mvpose.networks.catalogue.published import PACKAGE
 
 STORED = {"float32": "<f4", "float16": "<f2", "int32": "<i4", "uint8": "u1"}
 
@@ -69,3 +74,12 @@ def package(path, members):
             info.size = len(content)
             archive.addfile(info, io.BytesIO(content))
     return path
+
+
+def package_of_networks():
+    """Package of the published networks; without it the test skips, or fails if SIMHARNESS_REQUIRE_NETWORKS is set."""
+    given = os.environ.get("SIMHARNESS_NETWORKS", "")
+    if not Path(given).is_file():
+        missing = f"SIMHARNESS_NETWORKS names no package; `npm pack {PACKAGE}` makes it"
+        (pytest.fail if os.environ.get("SIMHARNESS_REQUIRE_NETWORKS") else pytest.skip)(missing)
+    return Path(given)

