@@ -9,6 +9,7 @@ import numpy as np
 
 from mvpose.arrays import Floats, Integers
 from mvpose.calibration.camera_findings import findings_of_cameras, possible_errors, turn_finding
+from mvpose.calibration.camera_models import ALWAYS
 from mvpose.calibration.cameras import CameraFit, fit
 from mvpose.calibration.clocks import estimate_clocks
 from mvpose.calibration.consistency import Consistency, Reading
@@ -16,6 +17,7 @@ from mvpose.calibration.conventions import FoundMistake, mistake_finding, search
 from mvpose.calibration.findings import ALARM, Diagnosis, Finding, camera_names
 from mvpose.calibration.mends import Mend
 from mvpose.calibration.normal_equations import (
+    CLOCK,
     JointViews,
     joint_views,
     residuals_of_others,
@@ -68,7 +70,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
     detections = np.bincount(tracklets.view, minlength=len(rig))
     consistency = Consistency(cut_into_windows(tracklets))
     files = _examine_files(rig, tracklets, consistency, names)
-    reading, turned = files.reading, files.turned
+    reading = files.reading
     findings = [*files.findings, *silent_views(detections, names)]
     mended = reread_rig(rig, reading)
     if mended is None:
@@ -77,13 +79,14 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
     tracklets = reread_tracklets(tracklets, reading)
     matched = match_over_time(mended, tracklets)
     sightings, joints, rows, result = _fitted(mended, tracklets, matched)
+    if result.faults:  # with a camera that is far off, people are matched wrongly
+        matched_better = match_over_time(_with_found_faults(mended, reading, result), tracklets)
+        sightings, joints, rows, result = _fitted(mended, tracklets, matched_better)
     moved = replace(reading, cameras=matched.rig.packed)
     agreement = PairAgreement.measured(consistency, reading, _corrected(reading, result), moved)
     found_strangers = strangers(agreement, detections, names)
     if found_strangers:
-        sightings = sightings.select(
-            ~np.isin(sightings.view, [each.view for each in found_strangers if each.view is not None])
-        )
+        sightings = sightings.select(~np.isin(sightings.view, [each.view for each in found_strangers]))
         joints, rows = joint_views(sightings)
         result = fit(mended.packed, joints)
     findings += found_strangers
@@ -104,14 +107,15 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
     of_cameras = findings_of_cameras(result, mended, starts, names, undetermined=undetermined)
     if undetermined and not any(SHORT in each.text for each in missing):
         of_cameras = [replace(each, severity="unknown") if each.severity == "alarm" else each for each in of_cameras]
-    findings += [each for each in of_cameras if each.view not in turned or each.kind != "moved-camera"]
+    findings += [each for each in of_cameras if each.view not in files.turned or each.kind != "moved-camera"]
     of_world, line = world_findings(mended, sightings, rows, result.equations.joints, joints, up)
-    findings += of_world
     after = _corrected(reading, result).cameras
-    findings += [turn_finding(rig, after, result.covariance[view], view, names) for view in sorted(turned - useless)]
+    findings += of_world + [
+        turn_finding(rig, after, result.covariance[view], view, names) for view in sorted(files.turned - useless)
+    ]
     different = any(DIFFERENT in each.text for each in missing)  # then neither files nor clocks can be compared
     if not different:
-        clocks = estimate_clocks(_with_found_lenses(mended, reading, result), sightings, period=period)
+        clocks = estimate_clocks(_with_found_faults(mended, reading, result), sightings, period=period)
         findings += [each for each in clocks.findings() if each.view not in useless]
     if undetermined:
         findings = [replace(each, severity="unknown") if _doubtful(each, different) else each for each in findings]
@@ -231,15 +235,16 @@ def _corrected(reading: Reading, result: CameraFit) -> Reading:
     return replace(reading, cameras=with_errors(reading.cameras, result.change.reshape(1, -1))[0, :, :22].copy())
 
 
-def _with_found_lenses(rig: Rig, reading: Reading, result: CameraFit) -> Rig:
-    """Return the rig with the intrinsics of cameras whose intrinsics were found to be wrong.
+def _with_found_faults(rig: Rig, reading: Reading, result: CameraFit) -> Rig:
+    """Return the rig with what was found to be wrong all the time corrected.
 
-    Poses are corrected along with the clocks (:mod:`.clock_adjustment`), lenses are not.
+    Poses are corrected along with the clocks (:mod:`.clock_adjustment`) where they are off by little, lenses are not.
     """
     change = np.zeros_like(result.change)
     for each in result.faults:
-        if each.fault.model.index[0] in range(6, 10):
-            change[each.fault.view, 6:10] = each.change[6:10]
+        own = np.array(each.fault.model.index)
+        if each.fault.course == ALWAYS and own[0] < CLOCK.start:
+            change[each.fault.view, own] = each.change[own]
     cameras = with_errors(reading.cameras, change.reshape(1, -1))[0, :, :22].copy()
     return reread_rig(rig, replace(reading, cameras=cameras)) or rig
 
