@@ -134,7 +134,7 @@ def _run_unstored(study: Study, workers: int) -> Mapping[TrialKey, Mapping[str, 
 
 def _run_stored(study: Study, folder: Path, workers: int) -> dict[TrialKey, Mapping[str, float | None]]:
     """Run the unfinished trials of a study in a folder, and return the scores of all trials."""
-    from simharness.study.study_plan import plan
+    from simharness.study.study_folder import plan
     from simharness.study.study_run import run_study
 
     planned = plan(study)

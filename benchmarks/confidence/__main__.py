@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mvpose import COCO17, Estimate
 from simharness import simulate
 from simharness.scenario.load import load_study
-from simharness.scoring.confidence import inside
+from simharness.scoring.joint_errors import inside
 from simharness.scoring.pairing import pair
 from simharness.trial.stages.build_trial import build_variants
 from simharness.types.recording import Recording

@@ -21,9 +21,9 @@ from benchmarks.planning.rooms import draw_room
 from mvpose.arrays import Floats
 from simharness.planning.candidates import Candidate, candidates_in, far_enough
 from simharness.planning.planned_room import Room
+from simharness.planning.rig_comparison import fit_value
 from simharness.planning.rig_value import RigValue
 from simharness.planning.search import CandidateSet, Limits, exchange_search, refine
-from simharness.planning.value_fit import fit_value
 
 FIRST_SEED = 2000  # no room of the benchmark of plans
 _PARAMETERS = 5  # of a camera: place along all mounts, height, bearing, tilt, lens

@@ -17,11 +17,10 @@ from benchmarks.planning.shelf_subsets import SubsetFigures, annotated_people, r
 from mvpose import Rig
 from mvpose.commands.progress import reporter
 from simharness.planning import Volume
-from simharness.planning.rehearsal_scene import ACTIVITIES, SceneSettings
-from simharness.planning.rehearsal_setup import RehearsalSetup
+from simharness.planning.rehearsal_scene import ACTIVITIES, RehearsalSetup, SceneSettings
 from simharness.planning.simulated_scenes import Condition, SceneBatch, interval_of, simulate_scenes
 from simharness.reality.recording_file import read_recording
-from simharness.reality.validation.subsets import FILLED, camera_subsets
+from simharness.reality.validation.variant_comparison import FILLED, camera_subsets
 from simharness.scenario.presets import read_profile
 
 _PEOPLE = 4  # on Shelf

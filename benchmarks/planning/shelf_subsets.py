@@ -23,7 +23,7 @@ from scipy.stats import spearmanr
 from mvpose import COCO17, SHELF14, Camera
 from mvpose.arrays import Bools, Floats
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.detector.bias import world_offsets
+from simharness.detector.viewing_conditions import world_offsets
 from simharness.planning import FastLayer, Volume
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationModel
@@ -31,7 +31,7 @@ from simharness.reality.detector_fit.fit import fit
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, track_people
 from simharness.reality.recording_file import read_recording
 from simharness.reality.validation.passes import CameraSubset, annotated, run_passes
-from simharness.reality.validation.subsets import FILLED, camera_subsets
+from simharness.reality.validation.variant_comparison import FILLED, camera_subsets
 from simharness.scenario.presets import read_profile
 from simharness.scoring.frame_scores import fill_face
 from simharness.scoring.pcp import Part, part_states

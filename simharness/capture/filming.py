@@ -20,7 +20,7 @@ from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.joint_visibility import label_joints
 from simharness.capture.picture import ScenePictures, meshes_at, stack_bands
 from simharness.capture.rendering.renderer import Image, Renderer
-from simharness.capture.shutter import band_cameras, band_times, joints_at_exposure
+from simharness.capture.sensor import band_cameras, band_times, joints_at_exposure
 from simharness.types.views import LookalikeViews, Views, Visibility
 from simharness.world.rigs.exposure_schedule import ExposureSchedule
 from simharness.world.rigs.projection import project_to_image
@@ -52,7 +52,7 @@ class Observer(Protocol):
         """Return the observations of cameras that expose at the same time.
 
         Args:
-            states: scene at the times of the bands of a picture (:func:`simharness.capture.shutter.band_times`); one
+            states: scene at the times of the bands of a picture (:func:`simharness.capture.sensor.band_times`); one
                 state if all rows are exposed at once.
             cameras: any number of cameras.
         """

@@ -26,7 +26,7 @@ from simharness.capture.filming import simultaneous_exposures
 from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import RayCaster
 from simharness.capture.ray_visibility import CameraArrays, cast_bands
-from simharness.capture.shutter import joints_at_exposure
+from simharness.capture.sensor import joints_at_exposure
 from simharness.types.outer_joints import OuterViews
 from simharness.types.views import Visibility
 from simharness.world.humans.body import DATA as BODY_DATA

@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 from mvpose.camera import Camera
 from simharness.capture.rendering.renderer import Image, Renderer
-from simharness.capture.sensor import blur, develop
-from simharness.capture.shutter import band_cameras, band_times
+from simharness.capture.sensor import band_cameras, band_times, blur, develop
 from simharness.scenario.sections.cameras_section import SensorSection
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
-from simharness.world.motion.trajectory import transform_points
+from simharness.world.motion.motion import transform_points
 from simharness.world.rigs.exposure_schedule import ExposureSchedule
 from simharness.world.rigs.projection import viewing_rays
 from simharness.world.scene.build import Scene

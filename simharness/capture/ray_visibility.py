@@ -19,7 +19,7 @@ from simharness.capture.body_outlines import Outline, boxes, packed
 from simharness.capture.filming import Observation
 from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import RayCaster
-from simharness.capture.shutter import joints_at_exposure
+from simharness.capture.sensor import joints_at_exposure
 from simharness.types.views import Visibility
 from simharness.world.rigs.projection import bend, is_imaged, projection_matrix
 from simharness.world.scene.lookalikes import Lookalikes

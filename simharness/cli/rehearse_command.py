@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mvpose import Rig
     from simharness.planning.plan_result import RigPlan
     from simharness.planning.planned_room import Room
-    from simharness.planning.rehearsal_setup import RehearsalSetup
+    from simharness.planning.rehearsal_scene import RehearsalSetup
     from simharness.types.floor import Volume
 
 _MOST_PEOPLE = 40
@@ -157,7 +157,7 @@ def _room(given: Surroundings) -> Room | None:
 def _setup(rig: Rig, room: Room | None, given: Surroundings) -> RehearsalSetup:
     """Return what the rig is rehearsed for: the room file's, or the defaults, as the options change it."""
     from simharness.planning.floor_coverage import covered_volume
-    from simharness.planning.rehearsal_setup import RehearsalSetup
+    from simharness.planning.rehearsal_scene import RehearsalSetup
     from simharness.scenario.presets import read_profile
 
     if room is not None:

@@ -131,8 +131,8 @@ def _thresholds(given: list[str]) -> dict[str, float]:
 
 def _write_rerun(results: Results, trial: str | None, path: Path) -> None:
     """Write the recording of a trial of a study, which is run again."""
-    from simharness.outputs.study.replay import replay
     from simharness.outputs.study.rerun_recording import require_sdk, write_rerun
+    from simharness.outputs.study.skeleton_view_3d import replay
 
     require_sdk()
     frame = _choose_frame(results, trial)
@@ -151,8 +151,8 @@ def _write_rerun_of_run(folder: Path, trial: str | None, path: Path | None) -> N
         )
     if trial is not None:
         raise ValueError(f"--trial {trial}: {folder} is the folder of a run, which has one trial; remove --trial")
-    from simharness.outputs.study.replay import replay_run
     from simharness.outputs.study.rerun_recording import require_sdk, write_rerun
+    from simharness.outputs.study.skeleton_view_3d import replay_run
     from simharness.trial.run_folder import read_run
 
     require_sdk()

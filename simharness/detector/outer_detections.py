@@ -24,11 +24,17 @@ from mvpose import COCO17
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.skeleton import Skeleton
 from mvpose.wholebody.estimator import rows_of
-from simharness.detector.bias import pixel_offsets
 from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.scatter import Scatter
 from simharness.detector.steps import Context
-from simharness.detector.viewing_conditions import BOX_SHARE, OUTSIDE, VISIBLE, image_axes, occlusion_classes
+from simharness.detector.viewing_conditions import (
+    BOX_SHARE,
+    OUTSIDE,
+    VISIBLE,
+    image_axes,
+    occlusion_classes,
+    pixel_offsets,
+)
 from simharness.scenario.sections.detector_section import BiasSection
 from simharness.types.outer_joints import OuterTruth
 from simharness.types.truth import KeypointError

@@ -17,9 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Rig
 from mvpose.kernels import njit
-from simharness.detector.bias import SIDE
 from simharness.detector.draws import ErrorDraws, with_parents
-from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE, VISIBLE, Conditions, head_bearings
+from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE, SIDE, VISIBLE, Conditions, head_bearings
 from simharness.scenario.sections.detector_section import (
     BEARINGS,
     KIND_OF_JOINT,

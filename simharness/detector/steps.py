@@ -39,7 +39,6 @@ from simharness.types.views import Views
 
 MODULES = (
     "keypoints",
-    "keypoint_scores",
     "boxes",
     "phantoms",
     "false_positives",

@@ -27,12 +27,11 @@ from simharness.planning.candidates import Candidate, alike, around, candidates_
 from simharness.planning.fast_layer import FastLayer, Prediction
 from simharness.planning.plan_result import Alternative, CurvePoint, Figures, PlannedCamera, RigPlan
 from simharness.planning.planned_room import Room
-from simharness.planning.rig_comparison import corner_rig, rig_of, ring_rig, simulate_rigs
+from simharness.planning.rig_comparison import VARIANT, corner_rig, fit_value, layer_of, rig_of, ring_rig, simulate_rigs
 from simharness.planning.rig_value import RigValue
 from simharness.planning.room_file import read_room
 from simharness.planning.search import CandidateSet, Ledger, Limits, exchange_search, refine
 from simharness.planning.simulated_scenes import interval_of
-from simharness.planning.value_fit import VARIANT, fit_value, layer_of
 from simharness.runtime.version import code_version
 
 _CURVE_STARTS = 2  # of the searches for other numbers of cameras

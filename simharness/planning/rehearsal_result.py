@@ -10,7 +10,7 @@ from mvpose import Camera, Rig
 from mvpose.arrays import Bools, Integers
 from simharness.planning.fast_layer import Prediction
 from simharness.planning.floor_coverage import good_rectangle
-from simharness.planning.rehearsal_setup import RehearsalSetup
+from simharness.planning.rehearsal_scene import RehearsalSetup
 from simharness.planning.simulated_scenes import SceneResult
 from simharness.planning.tolerance import CLIFF, FaultTolerance
 from simharness.statistics.intervals import Interval

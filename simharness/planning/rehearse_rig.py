@@ -20,8 +20,7 @@ from simharness.planning.rehearsal_result import (
     Rehearsal,
     sentences,
 )
-from simharness.planning.rehearsal_scene import SceneSettings
-from simharness.planning.rehearsal_setup import RehearsalSetup
+from simharness.planning.rehearsal_scene import RehearsalSetup, SceneSettings
 from simharness.planning.simulated_scenes import (
     Condition,
     SceneBatch,
@@ -31,7 +30,7 @@ from simharness.planning.simulated_scenes import (
     simulate_scenes,
 )
 from simharness.planning.tolerance import fault_conditions, tolerances
-from simharness.reality.validation.subsets import camera_subsets
+from simharness.reality.validation.variant_comparison import camera_subsets
 from simharness.world.rigs.extra_camera import cameras_on_walls
 
 T = TypeVar("T")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.checks import as_array
-from simharness.detector.bias import body_axes
+from simharness.detector.viewing_conditions import body_axes
 from simharness.scenario.sections.people_section import ActivityName
 from simharness.types.floor import Floor, Volume
 from simharness.types.random_streams import stream

@@ -17,7 +17,7 @@ from mvpose import SHELF14, Rig
 from mvpose.arrays import Floats
 from mvpose.recording import People
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.detector.bias import SIDE, body_axes
+from simharness.detector.viewing_conditions import SIDE, body_axes
 from simharness.reality.detector_fit.consensus import Consensus
 from simharness.reality.detector_fit.frame_sums import lags
 from simharness.reality.detector_fit.tetrachoric import fit_noisy_life

@@ -17,7 +17,7 @@ from scipy.optimize import linear_sum_assignment
 from mvpose import COCO17, SHELF14, preset
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.recording import People
-from simharness.detector.bias import body_axes
+from simharness.detector.viewing_conditions import body_axes
 from simharness.reality.annotated_recording import AnnotatedRecording
 
 LIMB_JOINTS = np.arange(5, 17)

@@ -17,7 +17,7 @@ from mvpose import COCO17, preset
 from mvpose.commands.progress import Reporter, Silence
 from mvpose.recording import People
 from mvpose.skeleton import HeadMapping
-from simharness.detector.bias import world_offsets
+from simharness.detector.viewing_conditions import world_offsets
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationModel
 from simharness.reality.detector_fit.fit import DetectorFit

@@ -26,7 +26,7 @@ Beside the keys of a scenario, a scenario file may have::
     [method.estimators]               # user-defined estimators: simharness.trial.stages.estimators
     custom = "custom.py:Custom"
 
-    [gate]                            # simharness.scenario.sections.gate_section
+    [gate]                            # simharness.scenario.sections.method_section
 
 A setting at a seed is a trial; all variants of a trial get the same detections. A file without these keys is a study of
 one trial.
@@ -46,8 +46,7 @@ from simharness.scenario.document import Document, read_document
 from simharness.scenario.file_model import MOST_TRIALS
 from simharness.scenario.layers import Origins, merge, set_origin
 from simharness.scenario.presets import Presets
-from simharness.scenario.sections.gate_section import GateSection
-from simharness.scenario.sections.method_section import wrong_variants
+from simharness.scenario.sections.method_section import GateSection, wrong_variants
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.sweep import Sweep, SweepReader, Value, value_at, vary
 from simharness.scenario.toml_files import ScenarioError

@@ -6,10 +6,12 @@ deviation s along each axis makes each component s sqrt(6), and the mean norm s 
 
 PCK in 3D is a function of the error limit (Mehta et al., 3DV 2017). Every joint of every true person counts. A joint
 without an estimate, or of a missed person, is wrong at any limit.
+
+How well the reported confidence says the errors is scored by the coverage of ellipsoids and the Brier score.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mvpose import COCO17, Skeleton
 from mvpose.arrays import Floats
@@ -104,3 +106,70 @@ def _bone_lengths(joints: Floats, skeleton: Skeleton) -> Floats:
 def _counted(errors: ArrayLike) -> Floats:
     errors = np.asarray(errors, float)
     return errors[~np.isnan(errors)]
+
+
+SHARE = 0.9
+"""Share of joints that the ellipsoids of ``coverage_90`` should hold."""
+
+RIGHT = 0.1
+"""Greatest error of a joint that is right, metres."""
+
+
+def inside(truth: ArrayLike, estimate: ArrayLike, ellipsoid: ArrayLike) -> Floats:
+    """Return 1 where the true joint is inside of the ellipsoid around the estimated one, 0 where not, (...).
+
+    Args:
+        truth: true joints, (..., 3), metres.
+        estimate: estimated joints, (..., 3), metres.
+        ellipsoid: matrices E of the ellipsoids ``d' inv(E) d <= 1`` around them, (..., 3, 3), square metres. One that
+            is singular holds no joint.
+
+    Returns:
+        0 or 1; NaN where the truth, the joint or its ellipsoid is missing.
+    """
+    off = np.asarray(truth, float) - np.asarray(estimate, float)
+    ellipsoid = np.asarray(ellipsoid, float)
+    known = np.isfinite(off).all(axis=-1) & np.isfinite(ellipsoid).all(axis=(-1, -2))
+    matrices = np.where(known[..., None, None], ellipsoid, np.eye(3))
+    singular = np.linalg.matrix_rank(matrices, hermitian=True) < 3
+    matrices[singular] = np.eye(3)
+    distance = np.einsum("...i,...i->...", off, np.linalg.solve(matrices, off[..., None])[..., 0])
+    return np.where(known, (distance <= 1.0) & ~singular, np.nan)
+
+
+def brier(probability: ArrayLike, happened: NDArray[np.bool_]) -> float | None:
+    """Return the mean squared difference between probabilities and what happened, both (k,); None without any."""
+    return finite_mean((np.asarray(probability, float) - happened) ** 2)
+
+
+_COVERAGE = "true joints of the people found inside of the estimate's 90 % ellipsoid; the best value is 90"
+
+
+@score(ScoreInfo("coverage_90", "Coverage", "%", _COVERAGE, "higher", 1, target=100.0 * SHARE, tolerance=1.0))
+def coverage_score(given: ScoreInput) -> float | None:
+    """Return the share of placed joints inside of their ellipsoids, percent; None without ellipsoids."""
+    shares = []
+    for estimate, partner, truth in zip(given.estimates, given.partner, given.truth, strict=True):
+        ellipsoids = estimate.ellipsoids(SHARE)
+        if ellipsoids is not None:
+            found = partner >= 0
+            shares.append(inside(truth[found], estimate.joints[partner[found]], ellipsoids[partner[found]]).ravel())
+    share = finite_mean(np.concatenate(shares)) if shares else None
+    return None if share is None else 100.0 * share
+
+
+_BRIER = "mean squared error of joint scores as probabilities of an error within 100 mm; joints of ghosts are wrong"
+
+
+@score(ScoreInfo("score_brier", "Brier score", "", _BRIER, "lower", 3, tolerance=0.005))
+def brier_score(given: ScoreInput) -> float | None:
+    """Return the Brier score of the placed joints of all estimates; None without any."""
+    scores, right = [], []
+    for estimate, partner, truth in zip(given.estimates, given.partner, given.truth, strict=True):
+        error = np.full(estimate.scores.shape, np.inf)
+        found = partner >= 0
+        error[partner[found]] = joint_errors(truth[found], estimate.joints[partner[found]])
+        counted = np.isfinite(estimate.joints).all(axis=-1) & ~np.isnan(error)
+        scores.append(estimate.scores[counted])
+        right.append(error[counted] <= RIGHT)
+    return brier(np.concatenate(scores), np.concatenate(right))

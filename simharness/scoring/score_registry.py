@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from mvpose import Estimate
     from simharness.types.recording import Recording
 
-MODULES = ("joint_errors", "confidence", "tracking.identity_figures")
+MODULES = ("joint_errors", "tracking.identity_figures")
 """Modules of ``simharness.scoring`` that register scores, in the order of the columns of tables."""
 
 Better = Literal["higher", "lower"]

@@ -15,8 +15,7 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.study.scheduler import Measure, TrialFailure, TrialSuccess, Unit, error_text, run_units
 from simharness.study.stored_trial import StoredTrial
 from simharness.study.stored_trial import run_stored_trial as measure_trial
-from simharness.study.study_folder import Results, document, read_study, tables, write_study
-from simharness.study.study_plan import PlannedTrial, plan
+from simharness.study.study_folder import PlannedTrial, Results, document, plan, read_study, tables, write_study
 from simharness.study.trial_store import Entry, EntryState, Store, StoreError
 from simharness.trial.archive import TrialArchive
 from simharness.trial.identity import code, provenance

@@ -14,7 +14,7 @@ from doc_pages import FENCE, PAGES, ROOT, blocks
 import simharness
 from mvpose.wholebody import read_skeleton
 from simharness.planning.candidates import candidates_in
-from simharness.planning.rehearsal_setup import RehearsalSetup
+from simharness.planning.rehearsal_scene import RehearsalSetup
 from simharness.planning.room_file import read_room
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.people_section import PeopleSection

@@ -13,7 +13,7 @@ import pytest
 from mvpose import Detections
 from mvpose.report.palette import css, person_color
 from simharness.outputs.run.result_folder import run
-from simharness.outputs.study.replay import Replay
+from simharness.outputs.study.skeleton_view_3d import Replay
 from simharness.scenario.load import load
 from simharness.scenario.shipped import shipped_folder
 from simharness.trial.run_folder import read_run

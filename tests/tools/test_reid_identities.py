@@ -9,9 +9,9 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape
 from simharness.world.motion.activity_registry import activities
+from simharness.world.motion.motion import motion_clock
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.trajectory import motion_clock
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build
 from tools.reid.identities import CHILDREN, SPLITS, Group, dressed_people, groups, split_of

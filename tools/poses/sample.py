@@ -11,14 +11,14 @@ import numpy as np
 
 from mvpose import COCO17
 from mvpose.arrays import Floats
-from simharness.detector.bias import body_axes
+from simharness.detector.viewing_conditions import body_axes
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.activity_registry import Activity, activities_in_place
+from simharness.world.motion.motion import motion_clock
 from simharness.world.motion.paths import Loop, Spot, Track, draw_loop
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.trajectory import motion_clock
 
 _DURATION = 6.0  # seconds of every motion
 _HALF = 2.0  # half the side of the square in which people walk, metres

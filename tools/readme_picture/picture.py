@@ -25,7 +25,7 @@ from mvpose.report.documents import fill_template
 from mvpose.report.limbs import COCO17_BODY
 from mvpose.report.palette import TRUTH, css, person_color
 from simharness.outputs.run.pictures import PagePicture
-from simharness.outputs.study.replay import Replay
+from simharness.outputs.study.skeleton_view_3d import Replay
 from simharness.trial.run_folder import Record, read_run
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import picture_source_of

@@ -13,7 +13,7 @@ from mvpose.arrays import Floats
 from mvpose.report.view_3d import camera_pyramid
 from simharness.capture.picture import antialiased, meshes_at, scaled
 from simharness.outputs.run.pictures import PagePicture
-from simharness.outputs.study.replay import Replay
+from simharness.outputs.study.skeleton_view_3d import Replay
 from simharness.trial.stages.capture import renderer_of
 from simharness.world.rigs.layouts import look_at
 from simharness.world.rigs.projection import intrinsics

@@ -12,7 +12,7 @@ from mvpose.arrays import Floats
 from mvpose.report.limbs import COCO17_LIMBS
 from mvpose.report.palette import TRUTH, Color, person_color
 from simharness.capture.picture import ScenePictures
-from simharness.outputs.study.replay import Replay
+from simharness.outputs.study.skeleton_view_3d import Replay
 from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback
 

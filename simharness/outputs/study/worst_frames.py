@@ -11,8 +11,7 @@ import polars as pl
 from mvpose.report.view_3d import View3D
 from simharness.gate.trial_command import overrides
 from simharness.outputs.run.pictures import MAX_VIEWS, PagePicture, draw_frame
-from simharness.outputs.study.replay import Replay, replay
-from simharness.outputs.study.skeleton_view_3d import skeleton_view_3d
+from simharness.outputs.study.skeleton_view_3d import Replay, replay, skeleton_view_3d
 from simharness.scenario.document import relative_files
 from simharness.scenario.load import Study, load_study
 from simharness.scenario.sections.scenario import Scenario

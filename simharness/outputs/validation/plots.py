@@ -10,9 +10,8 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from mvpose.arrays import Floats
 from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
 from simharness.reality.validation.evidence import Compared
-from simharness.reality.validation.subsets import SubsetComparison
 from simharness.reality.validation.treatments import KINDS
-from simharness.reality.validation.variant_comparison import DoseResponse, JointDifficulty
+from simharness.reality.validation.variant_comparison import DoseResponse, JointDifficulty, SubsetComparison
 from simharness.reality.validation.verdicts import BOUNDS
 
 REAL_COLOR: Color = "#8b93a1"

@@ -20,7 +20,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.files.atomic_files import write_atomic
 from mvpose.recording import People
-from simharness.detector.bias import SIDE, body_axes
+from simharness.detector.viewing_conditions import SIDE, body_axes
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationFit, fit_annotation
 from simharness.reality.detector_fit.detector_measurement import (

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from mvpose import COCO17, Rig
 from mvpose.arrays import Bools, Floats
-from simharness.detector.bias import body_axes
-from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE, SELF_OCCLUDED, VISIBLE
+from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE, SELF_OCCLUDED, VISIBLE, body_axes
 from simharness.reality.detector_fit.sample import LIMB_JOINTS
 
 FLESH = 0.085

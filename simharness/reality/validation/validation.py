@@ -25,14 +25,16 @@ from simharness.reality.validation.passes import (
     run_passes,
     score_recordings,
 )
-from simharness.reality.validation.subsets import SubsetComparison, camera_subsets, compare_subsets
 from simharness.reality.validation.treatments import treatments
 from simharness.reality.validation.variant_comparison import (
     DoseResponse,
     JointDifficulty,
+    SubsetComparison,
+    camera_subsets,
     compare_contrasts,
     compare_joints,
     compare_responses,
+    compare_subsets,
     compare_variants,
     median_error,
     pcp_of_parts,

@@ -6,9 +6,8 @@ from typing import Any
 from mvpose import SHELF14
 from simharness.reality.validation.detection_figures import AFFINITY_EDGES
 from simharness.reality.validation.evidence import Compared, number
-from simharness.reality.validation.subsets import SubsetComparison
 from simharness.reality.validation.validation import HalfPrediction, Validation
-from simharness.reality.validation.variant_comparison import SCORES, DoseResponse
+from simharness.reality.validation.variant_comparison import SCORES, DoseResponse, SubsetComparison
 from simharness.reality.validation.verdicts import BoundVerdict, VerdictState
 from simharness.scoring.frame_scores import RULES, HeadRule
 from simharness.statistics.intervals import Interval

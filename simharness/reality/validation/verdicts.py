@@ -14,9 +14,8 @@ import numpy as np
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.validation.detection_figures import BONES, TREE
 from simharness.reality.validation.evidence import Compared
-from simharness.reality.validation.subsets import SubsetComparison
 from simharness.reality.validation.treatments import KINDS
-from simharness.reality.validation.variant_comparison import DoseResponse
+from simharness.reality.validation.variant_comparison import DoseResponse, SubsetComparison
 from simharness.scoring.frame_scores import HeadRule
 from simharness.statistics.intervals import Interval
 

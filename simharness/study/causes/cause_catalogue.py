@@ -40,8 +40,8 @@ from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.trial.stages.estimation import EstimateFrames
 from simharness.types.views import Visibility
 from simharness.world.rigs.extra_camera import with_camera_in_gap
-from simharness.world.scene.camera_clearance import WALL_MARGIN
 from simharness.world.scene.objects.solids import Solid
+from simharness.world.scene.placement.free_space import WALL_MARGIN
 
 
 def _unchanged(scenario: Scenario) -> Scenario:

@@ -14,7 +14,7 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.motion.activity_registry import Activity, configured_activities, solo
 from simharness.world.motion.contact import ContactModel, SampledBody
-from simharness.world.motion.motion import ALWAYS, Motion, Performance, Presence, Prop
+from simharness.world.motion.motion import ALWAYS, Motion, Performance, Presence, Prop, Trajectory
 from simharness.world.motion.paths import Loop, RecordedPath, Spot, Track, rotation_2d
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.routes import Route
@@ -26,7 +26,6 @@ from simharness.world.motion.track_planning import (
     VisitRequest,
     plan_tracks,
 )
-from simharness.world.motion.trajectory import Trajectory
 from simharness.world.motion.visits import Door, Visitor, draw_doors
 
 _PACE = (1.05, 1.25)  # steps in a room are short and quick

@@ -1,4 +1,7 @@
-"""Motion of one person (pelvis pose and joint angles over time), and motions and props of one activity."""
+"""Motion of one person (pelvis pose and joint angles over time), and motions and props of one activity.
+
+Trajectories of rigid objects, such as props, are sampled poses and their smooth interpolation.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,113 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Bools, Floats
 from mvpose.checks import as_array
 from simharness.world.humans.anatomy import DOFS
-from simharness.world.motion.trajectory import Trajectory, check_poses, check_times, interpolate, interpolate_poses
+
+RATE = 60.0  # Hz: planning rate of motions, which are read at any time: frames and cameras have separate clocks
+_UNIT_TOLERANCE = 1e-6
+
+
+def motion_clock(duration: float, *, margin: float = 0.0) -> Floats:
+    """Return the times (N,) in seconds at which motions are planned.
+
+    They cover ``-margin`` to ``duration + margin`` and contain 0. ``margin`` is the largest offset of a camera clock in
+    seconds.
+    """
+    before = int(np.ceil(margin * RATE)) + 1
+    after = int(np.ceil((duration + margin) * RATE)) + 1
+    return np.arange(-before, after + 1) / RATE
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Poses of one rigid object at N times.
+
+    Attributes:
+        time: times in seconds, (N,), ascending; a single time means an object that stands still.
+        pose: position in metres and orientation as a unit quaternion w x y z, (N, 7).
+
+    Raises:
+        ValueError: wrong shape, non-finite value, times that do not ascend, or a quaternion that does not have unit
+            length.
+    """
+
+    time: Floats
+    pose: Floats
+
+    def __post_init__(self) -> None:
+        time = as_array(self.time, ("N",), "trajectory time")
+        pose = as_array(self.pose, (len(time), 7), "trajectory pose")
+        check_times(time, "trajectory")
+        check_poses(pose, "trajectory pose")
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "pose", pose)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def at(self, time: ArrayLike) -> Floats:
+        """Return poses (..., 7) at times (...); constant before the first and after the last time."""
+        return interpolate_poses(self.time, self.pose, time)
+
+
+def interpolate(time: Floats, values: Floats, when: ArrayLike) -> Floats:
+    """Interpolate ``values`` (N, D) at ``time`` (N,) smoothly to the times ``when`` (...); returns (..., D).
+
+    Cubic Hermite interpolation with central differences (Catmull and Rom, 1974): velocity is continuous, and the
+    support is local, so that a curve does not depend on its total length. Values are constant beyond both ends.
+    """
+    when = np.asarray(np.clip(when, time[0], time[-1]), float)
+    if len(time) == 1:
+        return np.broadcast_to(values[0], (*when.shape, values.shape[1])).copy()
+    k = np.clip(np.searchsorted(time, when, side="right") - 1, 0, len(time) - 2)
+    before, after = np.maximum(k - 1, 0), np.minimum(k + 2, len(time) - 1)
+    step = (time[k + 1] - time[k])[..., None]
+    start, end = values[k], values[k + 1]
+    leaving = step * (end - values[before]) / (time[k + 1] - time[before])[..., None]
+    arriving = step * (values[after] - start) / (time[after] - time[k])[..., None]
+    s = (when - time[k])[..., None] / step
+    turn = s - 1
+    return (1 + 2 * s) * turn**2 * start + s * turn**2 * leaving + s**2 * (3 - 2 * s) * end + s**2 * turn * arriving
+
+
+def interpolate_poses(time: Floats, pose: Floats, when: ArrayLike) -> Floats:
+    """Interpolate poses (N, 7) as :func:`interpolate` does; quaternions w x y z take the shorter arc and stay unit."""
+    flips = np.where((pose[1:, 3:] * pose[:-1, 3:]).sum(axis=1) < 0, -1.0, 1.0)
+    signs = np.concatenate([np.ones(min(len(pose), 1)), np.cumprod(flips)])
+    steady = np.concatenate([pose[:, :3], pose[:, 3:] * signs[:, None]], axis=1)
+    result = interpolate(time, steady, when)
+    result[..., 3:] /= np.linalg.norm(result[..., 3:], axis=-1, keepdims=True)
+    return result
+
+
+def transform_points(points: NDArray[np.floating], pose: Floats) -> Floats:
+    """Transform points (n, 3) from an object's frame, given by its pose (7,), to the world."""
+    turn = Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()
+    return np.asarray(points @ turn.T + pose[:3])
+
+
+def check_times(time: Floats, what: str) -> None:
+    """Raise ValueError for times that are empty, not finite, or do not ascend."""
+    if not len(time) or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
+        raise ValueError(f"{what} time must be one or more finite seconds, ascending, got {time[:5].tolist()}...")
+
+
+def check_poses(pose: Floats, what: str) -> None:
+    """Raise ValueError for poses (N, 7) that are not finite or have quaternions that do not have unit length."""
+    if not np.isfinite(pose).all():
+        bad = int(np.flatnonzero(~np.isfinite(pose).all(axis=1))[0])
+        raise ValueError(f"{what} must be finite; the one at index {bad} is not")
+    off = np.abs(np.linalg.norm(pose[:, 3:], axis=1) - 1.0)
+    if (off > _UNIT_TOLERANCE).any():
+        raise ValueError(
+            f"{what} quaternions (w x y z) must have unit length, the one at index {int(off.argmax())} is off by "
+            f"{off.max():.2g}"
+        )
 
 
 @dataclass(frozen=True)

@@ -28,15 +28,13 @@ from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import Look, draw_looks
 from simharness.world.motion.choreography import choreograph
 from simharness.world.motion.mocap import load_people, recorded_shape
-from simharness.world.motion.motion import Motion, Presence, held
+from simharness.world.motion.motion import Motion, Presence, held, motion_clock
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.trajectory import motion_clock
-from simharness.world.scene.camera_clearance import check_rig
 from simharness.world.scene.dynamics.motion_servos import planned_push, track
 from simharness.world.scene.objects.props import make_prop
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.placement.clutter import place_clutter, place_decoys, place_furniture
-from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, FreeSpace
+from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, FreeSpace, check_rig
 from simharness.world.scene.rooms.kinds import check_size, settled
 from simharness.world.scene.rooms.lamps import area_lights, has_ceiling
 from simharness.world.scene.rooms.openings import draw_openings

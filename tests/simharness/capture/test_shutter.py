@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mvpose.camera import Camera
-from simharness.capture.shutter import BANDS, band_cameras, band_times, joints_at_exposure
+from simharness.capture.sensor import BANDS, band_cameras, band_times, joints_at_exposure
 from simharness.world.rigs.layouts import intrinsics, look_at
 
 

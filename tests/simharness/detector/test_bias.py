@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mvpose import COCO17, Camera, Rig
-from simharness.detector.bias import body_axes, pixel_offsets, world_offsets
+from simharness.detector.viewing_conditions import body_axes, pixel_offsets, world_offsets
 from simharness.scenario.sections.detector_section import BiasSection
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape

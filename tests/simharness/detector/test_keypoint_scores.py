@@ -4,8 +4,7 @@ from worlds import within, world
 
 from mvpose import COCO17
 from simharness.detector.draws import KeyedDraws
-from simharness.detector.keypoint_scores import MIN_SCORE, score_keypoints
-from simharness.detector.keypoints import find_keypoints
+from simharness.detector.keypoints import MIN_SCORE, find_keypoints, score_keypoints
 from simharness.detector.viewing_conditions import Conditions
 from simharness.scenario.sections.detector_section import KINDS, CorrelationSection, KeypointsSection, ScoresSection
 from simharness.types.truth import KeypointError

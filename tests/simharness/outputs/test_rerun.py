@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from simharness.cli import app
 from simharness.outputs.run.result_folder import run as run_scenario
-from simharness.outputs.study.replay import replay_run
 from simharness.outputs.study.rerun_recording import write_rerun
+from simharness.outputs.study.skeleton_view_3d import replay_run
 from simharness.scenario.load import load
 from simharness.trial.run_folder import read_run
 

@@ -17,7 +17,7 @@ from simharness.outputs.planning.rehearsal_page import render_rehearsal
 from simharness.outputs.planning.rehearsal_plots import outline_of
 from simharness.planning.floor_coverage import good_rectangle
 from simharness.planning.rehearsal_result import HEIGHTS, sentences
-from simharness.planning.rehearsal_setup import RehearsalSetup
+from simharness.planning.rehearsal_scene import RehearsalSetup
 from simharness.planning.rehearse_rig import RehearsalEffort, rehearse_rig
 from simharness.planning.rig_file import read_rig
 from simharness.scenario.presets import read_profile

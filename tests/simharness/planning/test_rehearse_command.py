@@ -10,7 +10,7 @@ from mvpose import Rig
 from mvpose.formats.calibration.voxelpose import write_calibration
 from simharness.cli import app
 from simharness.cli.rehearse_command import rectangle_of
-from simharness.planning.rehearsal_setup import RehearsalSetup
+from simharness.planning.rehearsal_scene import RehearsalSetup
 from simharness.planning.rehearse_rig import rehearse_rig
 from simharness.planning.room_file import read_room
 from simharness.planning.standing_people import taken_floor

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from mvpose import Rig
-from simharness.planning.rehearsal_scene import SceneSettings
-from simharness.planning.rehearsal_setup import RehearsalSetup
+from simharness.planning.rehearsal_scene import RehearsalSetup, SceneSettings
 from simharness.planning.rig_file import read_rig
 from simharness.planning.simulated_scenes import Condition, SceneBatch, loss_of, simulate_scenes
 from simharness.scenario.presets import read_profile

@@ -7,7 +7,7 @@ import pytest
 
 from mvpose import Rig
 from simharness.planning.floor_coverage import covered_volume, whole_people
-from simharness.planning.rehearsal_setup import RehearsalSetup
+from simharness.planning.rehearsal_scene import RehearsalSetup
 from simharness.planning.rig_file import read_rig
 from simharness.scenario.presets import read_profile
 from simharness.types.floor import Volume

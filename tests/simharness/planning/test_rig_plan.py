@@ -16,13 +16,12 @@ from simharness.cli import app
 from simharness.planning.candidates import candidates_in
 from simharness.planning.plan_rig import PlanEffort, plan_rig
 from simharness.planning.planned_room import Room
-from simharness.planning.rig_comparison import corner_rig, rig_of, ring_rig
+from simharness.planning.rig_comparison import corner_rig, layer_of, rig_of, ring_rig
 from simharness.planning.rig_file import CALIBRATION, write_rig
 from simharness.planning.rig_value import RigValue, SightingOdds
 from simharness.planning.room_file import make_room, read_room
 from simharness.planning.room_keys import RoomKeys
 from simharness.planning.search import Ledger
-from simharness.planning.value_fit import layer_of
 from simharness.scenario.load import load
 from simharness.world.rigs.layouts import build_rig
 

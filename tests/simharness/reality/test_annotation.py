@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.detector.bias import SIDE, body_axes
+from simharness.detector.viewing_conditions import SIDE, body_axes
 from simharness.reality.annotation_errors import AnnotationModel, fit_annotation
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.detector_fit.joint_labels import label_joints

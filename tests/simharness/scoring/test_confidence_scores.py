@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from simharness.scoring.assessment import assess
 from simharness.scoring.catalogue import SCORES
-from simharness.scoring.confidence import brier, inside
+from simharness.scoring.joint_errors import brier, inside
 
 
 def gaussian_estimates(recording, *, claimed=1.0, seed=0):

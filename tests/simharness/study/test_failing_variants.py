@@ -14,7 +14,7 @@ from mvpose.commands.errors import RunError
 from simharness.gate import suite
 from simharness.study.scheduler import ATTEMPTS, TrialFailure, TrialSuccess, Unit, run_units
 from simharness.study.stored_trial import TrialOutput
-from simharness.study.study_plan import plan
+from simharness.study.study_folder import plan
 from simharness.study.study_run import run_study
 from simharness.study.trial_store import Store
 from simharness.trial.identity import entry_identity

@@ -14,7 +14,7 @@ from mvpose import Estimate
 from simharness.scenario.load import load, load_study
 from simharness.scoring import assessment
 from simharness.study.stored_trial import StoredTrial, run_stored_trial
-from simharness.study.study_plan import plan
+from simharness.study.study_folder import plan
 from simharness.study.study_run import run_study
 from simharness.study.trial_store import EntryState, Store
 from simharness.trial import identity, run_trial

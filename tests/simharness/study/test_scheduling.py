@@ -7,7 +7,7 @@ from fakes import ALWAYS, Fake, called, made_up, study_of, times
 
 from simharness.study import scheduler as scheduling
 from simharness.study.scheduler import TrialFailure, TrialSuccess, Unit, run_units
-from simharness.study.study_plan import plan
+from simharness.study.study_folder import plan
 
 
 def units_of(folder, seeds):

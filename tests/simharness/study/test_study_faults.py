@@ -10,7 +10,7 @@ import psutil
 import pytest
 from fakes import Fake, called, made_up, program, run_program, study_of
 
-from simharness.study.study_plan import plan
+from simharness.study.study_folder import plan
 from simharness.study.study_run import run_study
 from simharness.study.trial_store import Store
 

@@ -11,7 +11,7 @@ from fakes import made_up, study_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.study.study_plan import plan
+from simharness.study.study_folder import plan
 from simharness.study.trial_store import Entry, Store, StoreError
 
 ID, OTHER = "ab" * 16, "ac" * 16

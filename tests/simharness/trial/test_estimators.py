@@ -22,7 +22,7 @@ from simharness import assert_robust
 from simharness.outputs.run.result_folder import run
 from simharness.outputs.study.digest import write_digest
 from simharness.outputs.study.page import write_report
-from simharness.outputs.study.replay import replay
+from simharness.outputs.study.skeleton_view_3d import replay
 from simharness.outputs.study.worst_frames import _command
 from simharness.runtime.frame_pool import map_frames
 from simharness.scenario.load import load, load_study

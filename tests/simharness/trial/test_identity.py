@@ -13,7 +13,7 @@ import simharness
 from simharness.runtime.version import files_of
 from simharness.scenario.load import load, load_study
 from simharness.scenario.sections.section import Section
-from simharness.study.study_plan import plan
+from simharness.study.study_folder import plan
 from simharness.trial import identity
 from simharness.trial.identity import entry_identity, estimator_code, trial_identity
 

@@ -4,7 +4,7 @@ import pytest
 from trials import measured
 
 from simharness.scenario.load import load, load_study
-from simharness.study.study_plan import plan
+from simharness.study.study_folder import plan
 from simharness.trial.stages.estimators import estimators_of
 
 WALK = (

@@ -7,7 +7,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activity_registry import activity
-from simharness.world.motion.motion import Motion, Performance, Prop
+from simharness.world.motion.motion import Motion, Performance, Prop, Trajectory
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.poses.foot_placement import (
     Footprint,
@@ -27,7 +27,6 @@ from simharness.world.motion.poses.inverse_kinematics import (
 )
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import Curves, blend, cycle_time, limbs, minimum_jerk, relaxed_posture
-from simharness.world.motion.trajectory import Trajectory
 
 _GRIP, _NEARER = (
     0.75,

@@ -8,7 +8,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activity_registry import activity
-from simharness.world.motion.motion import Performance, Prop
+from simharness.world.motion.motion import Performance, Prop, Trajectory
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.poses.foot_placement import (
     foot_path,
@@ -20,7 +20,6 @@ from simharness.world.motion.poses.foot_placement import (
 from simharness.world.motion.poses.inverse_kinematics import pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import blend, cycle_time, ease, limbs, minimum_jerk, relaxed_posture
-from simharness.world.motion.trajectory import Trajectory
 
 _SHANK = np.radians(5.0)  # forward tilt of a seated shank
 _LEANS = np.radians([-9.0, 0.0, 15.0, 35.0])  # leans of the pelvis at which its height above the seat is computed

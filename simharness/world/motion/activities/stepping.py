@@ -7,7 +7,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activity_registry import activity, solo_activity
-from simharness.world.motion.motion import Motion, Performance, Prop
+from simharness.world.motion.motion import Motion, Performance, Prop, Trajectory
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.poses.foot_placement import (
     Footprint,
@@ -20,7 +20,6 @@ from simharness.world.motion.poses.foot_placement import (
 from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_legs, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import blend, bump, cycle_time, limb, minimum_jerk, relaxed_posture
-from simharness.world.motion.trajectory import Trajectory
 
 Steps = Mapping[str, list[tuple[float, float, Footprint]]]  # by side: take-off time, landing time, footprint
 

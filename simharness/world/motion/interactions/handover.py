@@ -13,13 +13,12 @@ from mvpose.arrays import Floats
 from simharness.world.motion.activities.gestures import gesture
 from simharness.world.motion.activity_registry import activity
 from simharness.world.motion.interactions.partners import Meeting, arm_length, lean_forward, look_ahead, plan_meeting
-from simharness.world.motion.motion import Motion, Performance, Prop, PropKind
+from simharness.world.motion.motion import Motion, Performance, Prop, PropKind, Trajectory
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import spot_to_world
 from simharness.world.motion.poses.inverse_kinematics import reach_with
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import cycle_time, ease
-from simharness.world.motion.trajectory import Trajectory
 
 _BOX_CHANCE = 0.5
 _INWARD = np.radians(22.0)  # inward rotation of the fingers of the hand around a bottle

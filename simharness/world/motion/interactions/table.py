@@ -18,13 +18,12 @@ from simharness.world.motion.interactions.partners import (
     look_ahead,
     offset_angles,
 )
-from simharness.world.motion.motion import Motion, Performance, Prop
+from simharness.world.motion.motion import Motion, Performance, Prop, Trajectory
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import foot_path, pelvis_from_hips, spot_to_world, stance
 from simharness.world.motion.poses.inverse_kinematics import pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import blend, gesture_envelope, relaxed_posture, smooth_noise
-from simharness.world.motion.trajectory import Trajectory
 
 _SEATED = 0.65  # probability that they sit
 _DEPTH, _WIDTH = (0.60, 0.72), (0.9, 1.3)  # metres: depth of the table between them, and its width

@@ -19,9 +19,8 @@ from simharness.world.motion.mocap.asf import read_amc, read_asf
 from simharness.world.motion.mocap.bvh import read_bvh
 from simharness.world.motion.mocap.retarget import SourceMotion, pelvis_path, retarget, source_motion
 from simharness.world.motion.mocap.skeleton import RecordedMotion
-from simharness.world.motion.motion import Motion
+from simharness.world.motion.motion import RATE, Motion, interpolate_poses
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.trajectory import RATE, interpolate_poses
 
 TURN = 0.3  # seconds of the reversal at an end of the clip
 

@@ -19,10 +19,9 @@ from mvpose.recording import People
 from mvpose.skeleton import COCO17
 from simharness.world.humans.anatomy import DOFS, SIDES
 from simharness.world.motion.mocap.retarget import SourceMotion, retarget, tilt_pelvis
-from simharness.world.motion.motion import Motion
+from simharness.world.motion.motion import RATE, Motion, interpolate
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import smoothstep
-from simharness.world.motion.trajectory import RATE, interpolate
 
 _CONTEXT = 0.5  # seconds before and after the performed part that determine steps and the height of the floor
 _CORRECTIONS = 2  # rounds; the next ones change little

@@ -1,11 +1,17 @@
-"""MocapSkeleton and joint rotations of a motion file."""
+"""MocapSkeleton and joint rotations of a motion file.
 
+The joints of a recorded skeleton are mapped to a person by their names and hierarchy.
+"""
+
+import re
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats, Integers
+from simharness.world.humans.anatomy import SIDES
 
 END = " end"  # suffix of a joint name: tip of its bone, a joint without rotation
 
@@ -90,3 +96,139 @@ def lowest_common_ancestor(skeleton: MocapSkeleton, first: int, second: int) -> 
     """Return the nearest joint that is an ancestor of both."""
     above = set(skeleton.ancestors(first))
     return next(joint for joint in skeleton.ancestors(second) if joint in above)
+
+
+# Joint names by role, without the side, best first: of CMU, MotionBuilder, Biovision, Poser, 3ds Max and Blender. Two
+# roles of a limb may share a name ("shoulder" is the clavicle in one skeleton and the upper arm in another), so the
+# first match counts.
+_NAMES = {
+    "thigh": ("upleg", "upperleg", "femur", "thigh", "hip"),
+    "shank": ("leg", "tibia", "shin", "calf", "lowerleg", "lowleg", "knee"),
+    "foot": ("foot", "ankle"),
+    "arm": ("humerus", "upperarm", "uparm", "shldr", "arm", "shoulder"),
+    "forearm": ("radius", "forearm", "lowerarm", "lowarm", "elbow"),
+    "hand": ("hand", "wrist"),
+    "toes": ("toebase", "toes", "toe", "ball"),
+    "collar": ("clavicle", "collar", "collarbone", "shoulder"),
+}
+_OPTIONAL = frozenset({"hand", "toes", "collar"})
+_LIMBS = (("thigh", "shank", "foot", "toes"), ("collar", "arm", "forearm", "hand"))
+_SIDE_WORDS = {"left": "left", "l": "left", "right": "right", "r": "right"}
+_PADDING = re.compile(r"^(bip|bip01|mixamorig|bvh|def|jnt|joint|bone|j|b|\d+)$")
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+_UPRIGHT = 0.75  # least cosine between the vertical and each segment of a standing person, with legs apart
+
+
+@dataclass(frozen=True)
+class JointMap:
+    """Indices of the joints of a person in a skeleton; -1 for joints that the skeleton does not have.
+
+    Attributes:
+        pelvis: joint that carries both legs.
+        chest: joint that carries both arms.
+        head: joint of the skull.
+        limbs: joints by side and role ("thigh", "shank", "foot", "toes", "collar", "arm", "forearm", "hand").
+        axes: axes of the person in the coordinates of the file, (3, 3); columns are forward, left and up.
+    """
+
+    pelvis: int
+    chest: int
+    head: int
+    limbs: dict[str, dict[str, int]]
+    axes: Floats
+
+
+def map_joints(recording: RecordedMotion) -> JointMap:
+    """Map the skeleton of a recording to the joints of a person.
+
+    Raises:
+        ValueError: joints are missing (the message lists the existing ones), or the zero pose does not stand upright.
+    """
+    skeleton = recording.skeleton
+    named = [_side_and_word(name) for name in skeleton.names]
+    limbs: dict[str, dict[str, int]] = {}
+    missing = []
+    for side in SIDES:
+        limbs[side] = {}
+        for role, words in _NAMES.items():
+            taken = set(limbs[side].values())
+            fitting = [
+                joint
+                for word in words
+                for joint, (where, what) in enumerate(named)
+                if where == side and what == word and joint not in taken
+            ]
+            limbs[side][role] = fitting[0] if fitting else -1
+            if not fitting and role not in _OPTIONAL:
+                missing.append(f"{side} {role} ({', '.join(words)})")
+    if missing:
+        raise ValueError(
+            f"{recording.file}: this skeleton has no {'; no '.join(missing)}; its joints are "
+            f"{', '.join(skeleton.names[:80])}: rename them, or choose another file"
+        )
+    for side in SIDES:
+        for limb in _LIMBS:
+            _check_limb(recording, side, limb, limbs[side])
+
+    pelvis = lowest_common_ancestor(skeleton, *(limbs[side]["thigh"] for side in SIDES))
+    tops = [limbs[side]["collar"] if limbs[side]["collar"] >= 0 else limbs[side]["arm"] for side in SIDES]
+    chest = lowest_common_ancestor(skeleton, *(_above(skeleton, top) for top in tops))
+    heads = [joint for joint, (side, word) in enumerate(named) if side is None and word == "head"]
+    return JointMap(pelvis, chest, heads[0] if heads else -1, limbs, _axes(recording, limbs))
+
+
+def _above(skeleton: MocapSkeleton, joint: int) -> int:
+    return int(skeleton.parents[joint])
+
+
+def _side_and_word(name: str) -> tuple[str | None, str]:
+    """Split a joint name into side and rest: "mixamorig:LeftUpLeg", "lUpLeg" and "UpLeg.L" are ("left", "upleg")."""
+    words = [word.lower() for word in _WORD.findall(re.split(r"[:|]", name)[-1])]
+    words = [word for word in words if not _PADDING.match(word)] or [""]
+    sides = [word for word in words if word in _SIDE_WORDS]
+    if sides:
+        words.remove(sides[0])
+        return _SIDE_WORDS[sides[0]], "".join(words)
+    joined = "".join(words)
+    for prefix, side in _SIDE_WORDS.items():
+        rest = joined.removeprefix(prefix)
+        if rest != joined and any(rest in known for known in _NAMES.values()):
+            return side, rest
+    return None, joined
+
+
+def _check_limb(recording: RecordedMotion, side: str, limb: tuple[str, ...], joints: dict[str, int]) -> None:
+    """Raise ValueError unless the joints of a limb form a chain in their order."""
+    chain = [role for role in limb if joints[role] >= 0]
+    names = recording.skeleton.names
+    for upper, lower in pairwise(chain):
+        if joints[upper] not in recording.skeleton.ancestors(joints[lower]):
+            raise ValueError(
+                f"{recording.file}: {names[joints[lower]]!r} was mapped to the {side} {lower} and "
+                f"{names[joints[upper]]!r} to the {side} {upper}, but the first is not a descendant of the second: "
+                "rename them"
+            )
+
+
+def _axes(recording: RecordedMotion, limbs: dict[str, dict[str, int]]) -> Floats:
+    """Return the axes of the person in the coordinates of the file, from the zero pose of the skeleton."""
+    zero = recording.skeleton.zero
+    thigh, shank, foot, arm = (
+        np.array([zero[limbs[side][role]] for side in SIDES]) for role in ("thigh", "shank", "foot", "arm")
+    )
+    rise = arm.mean(axis=0) - thigh.mean(axis=0)
+    axis = int(np.abs(rise).argmax())
+    up = np.zeros(3)
+    up[axis] = np.sign(rise[axis])
+    left = thigh[0] - thigh[1]
+    left = left - (left @ up) * up
+    segments = np.vstack([rise[None], thigh - shank, shank - foot])
+    lengths = np.linalg.norm(segments, axis=1)
+    standing = lengths.min() > 0 and (segments @ up / np.where(lengths > 0, lengths, 1.0)).min() > _UPRIGHT
+    if not standing or np.linalg.norm(left) < 1e-3 * lengths.max():
+        raise ValueError(
+            f"{recording.file}: the zero pose of this skeleton (all angles 0) does not stand upright with its hips "
+            "side by side, so its joint angles cannot be retargeted: export it with a standing zero pose (T or A pose)"
+        )
+    left /= np.linalg.norm(left)
+    return np.stack([np.cross(left, up), left, up], axis=1)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
-from simharness.world.motion.trajectory import Trajectory, transform_points
+from simharness.world.motion.motion import Trajectory, transform_points
 from simharness.world.scene.objects.geoms import Box, Geom, carried
 
 Kind = Literal["room", "furniture", "clutter", "prop", "decoy"]

@@ -12,7 +12,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
 from simharness.types.random_streams import stream
-from simharness.world.motion.trajectory import Trajectory
+from simharness.world.motion.motion import Trajectory
 from simharness.world.scene.objects.decoy_models import DECOY_MODELS
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.laboratory import (

@@ -4,10 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mvpose import COCO17
-from simharness.detector.bias import pixel_offsets
 from simharness.detector.detect import detect
 from simharness.detector.error_classes import MIRROR, classify, opposite_hits
-from simharness.detector.viewing_conditions import Conditions
+from simharness.detector.viewing_conditions import Conditions, pixel_offsets
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.truth import KeypointError
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from simharness.detector.bias import world_offsets
+from simharness.detector.viewing_conditions import world_offsets
 from simharness.reality.detector_fit.fit import face_bias
 from simharness.scenario.sections.detector_section import BiasSection
 

@@ -10,7 +10,7 @@ from turning_people import walkers
 
 from simharness.reality.validation.evidence import Evidence
 from simharness.reality.validation.passes import CameraSubset, Unchanged, annotated, run_passes
-from simharness.reality.validation.subsets import camera_subsets, compare_subsets, subset_curve
+from simharness.reality.validation.variant_comparison import camera_subsets, compare_subsets, subset_curve
 from simharness.scoring.frame_scores import RULES
 
 

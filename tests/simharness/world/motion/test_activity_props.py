@@ -8,10 +8,10 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.activity_registry import activities
+from simharness.world.motion.motion import motion_clock
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.inverse_kinematics import palm_pose
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.trajectory import motion_clock
 
 TIME = motion_clock(12.0)
 SPOT = Spot(np.array([-0.5, 0.8]), -2.2)

@@ -8,9 +8,8 @@ from simharness.types.random_streams import stream
 from simharness.world.motion.activity_registry import Activity, activities, solo
 from simharness.world.motion.choreography import assign_activities, choreograph, move_to, obstructs
 from simharness.world.motion.contact import penetration
-from simharness.world.motion.motion import Performance, Prop
+from simharness.world.motion.motion import Performance, Prop, Trajectory, motion_clock
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.trajectory import Trajectory, motion_clock
 
 CLOCK = motion_clock(4.0, margin=1.0)
 

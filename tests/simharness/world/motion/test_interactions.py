@@ -9,11 +9,10 @@ from casting import foot_vertices, performer
 from simharness.types.random_streams import stream
 from simharness.world.motion.activity_registry import activities
 from simharness.world.motion.contact import penetration
-from simharness.world.motion.motion import Performance
+from simharness.world.motion.motion import RATE, Performance
 from simharness.world.motion.paths import SWAY, Spot
 from simharness.world.motion.poses.inverse_kinematics import palm_pose
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.trajectory import RATE
 
 PAIRED = {name: each for name, each in activities().items() if each.performers == 2}
 PASSING = ("cross", "swap")  # people walk past each other: test_passing.py

@@ -10,7 +10,7 @@ from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape
 from simharness.world.motion.mocap import Clip, load_clip
-from simharness.world.motion.mocap.joint_mapping import map_joints
+from simharness.world.motion.mocap.skeleton import map_joints
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
 

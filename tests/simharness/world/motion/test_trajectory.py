@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
-from simharness.world.motion.motion import Motion
-from simharness.world.motion.trajectory import RATE, Trajectory, interpolate, motion_clock
+from simharness.world.motion.motion import RATE, Motion, Trajectory, interpolate, motion_clock
 
 
 def turning(time, rate=1.0):

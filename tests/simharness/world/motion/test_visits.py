@@ -12,8 +12,8 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.choreography import choreograph, roles
+from simharness.world.motion.motion import motion_clock
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.trajectory import motion_clock
 from simharness.world.motion.visits import Visitor, draw_doors
 
 ROOM = RoomSection(size=(8.0, 7.0, 3.0))

@@ -11,7 +11,7 @@ from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.rigs.layouts import build_rig, look_at
 from simharness.world.scene.build import Scene
 from simharness.world.scene.build import build as build_scene
-from simharness.world.scene.camera_clearance import check_rig
+from simharness.world.scene.placement.free_space import check_rig
 from simharness.world.scene.playback import Playback, simulate
 
 QUICKSTART = {

@@ -13,10 +13,9 @@ from simharness.scenario.sections.scenario import RenderingSection, Scenario
 from simharness.trial.audit import audit
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import CaptureFrames
-from simharness.world.scene.camera_clearance import WALL_MARGIN
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.placement.clutter import place_furniture
-from simharness.world.scene.placement.free_space import LENS
+from simharness.world.scene.placement.free_space import LENS, WALL_MARGIN
 from simharness.world.scene.playback import simulate
 from simharness.world.scene.rooms.fittings import make_fittings
 from simharness.world.scene.rooms.kinds import check_size, room_kinds, settled

@@ -15,10 +15,9 @@ from simharness.world.humans.body import make_body
 from simharness.world.humans.mujoco_model import person_spec
 from simharness.world.humans.shape import Shape
 from simharness.world.motion.activities.walking import walk
-from simharness.world.motion.motion import Motion
+from simharness.world.motion.motion import RATE, Motion, Trajectory, motion_clock
 from simharness.world.motion.paths import make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.trajectory import RATE, Trajectory, motion_clock
 from simharness.world.scene.dynamics.inverse_dynamics import InverseDynamics
 from simharness.world.scene.dynamics.motion_servos import LEVER, MotionServos, Push, planned_push, track
 from simharness.world.scene.objects.shapes import Assembly

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from walkers import Rays
 
-from simharness.world.motion.motion import Prop
-from simharness.world.motion.trajectory import Trajectory
+from simharness.world.motion.motion import Prop, Trajectory
 from simharness.world.scene.objects.props import make_prop
 
 SIZES = {

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from walkers import ring
 
-from simharness.world.motion.trajectory import Trajectory
+from simharness.world.motion.motion import Trajectory
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import Assembly, box_mesh
 from simharness.world.scene.placement.sight_lines import PictureFill, SightLines, intersects, lines_of_sight

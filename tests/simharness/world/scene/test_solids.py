@@ -7,7 +7,7 @@ from walkers import Rays
 
 from simharness.types.mirror import Mirror
 from simharness.types.random_streams import stream
-from simharness.world.motion.trajectory import Trajectory
+from simharness.world.motion.motion import Trajectory
 from simharness.world.scene.objects.geoms import Box, Cylinder, Surface, carried
 from simharness.world.scene.objects.shapes import TOP, Assembly, bar_mesh, box_mesh, hexahedron, joined, lathe, shifted
 from simharness.world.scene.placement.sight_lines import intersects

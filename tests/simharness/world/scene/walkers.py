@@ -5,7 +5,7 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from simharness.scenario.sections.room_section import RoomSection
-from simharness.world.motion.trajectory import motion_clock
+from simharness.world.motion.motion import motion_clock
 from simharness.world.scene.placement.free_space import FreeSpace
 
 # fmt: off
