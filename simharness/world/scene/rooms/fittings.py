@@ -2,8 +2,8 @@
 
 They are for pictures alone and hide nothing: all lies behind the plane of a wall, or nearer to it than any camera
 (:data:`simharness.world.scene.placement.free_space.WALL_MARGIN`), and the line from a camera to a person is nearer to
-the wall nowhere. Sizes of courts are those of FIBA (Official Basketball Rules, 2022) and BWF (Laws of Badminton), as far as
-the floor has room.
+the wall nowhere. Sizes of courts are those of FIBA (Official Basketball Rules, 2022) and BWF (Laws of Badminton), as
+far as the floor has room.
 """
 
 from collections.abc import Sequence
