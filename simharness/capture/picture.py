@@ -269,6 +269,17 @@ def _in_front(mesh: Mesh, mirror: Mirror) -> Mesh:
         )
     if mesh.parts is not None:
         changed["parts"] = mesh.parts[kept]
+    if (finish := mesh.finish) is not None:  # a new corner has the grain of the nearest old one, and no folds
+        near = np.take_along_axis(mesh.faces[source], weights.argmax(axis=2), axis=1).ravel()
+        grain = np.where(finish.toward[near] == near, cut_faces.ravel(), finish.toward[near])
+        changed["finish"] = replace(
+            finish,
+            materials=finish.materials[kept],
+            toward=np.concatenate([finish.toward, grain]),
+            rest=np.concatenate([finish.rest, finish.rest[near]]),
+            place=np.concatenate([finish.place, finish.place[near]]),
+            looseness=np.concatenate([finish.looseness, np.zeros(len(near))]),
+        )
     return replace(
         mesh,
         vertices=np.concatenate([mesh.vertices, corners.reshape(-1, 3)]).astype(np.float32),

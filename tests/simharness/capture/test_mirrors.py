@@ -10,7 +10,7 @@ from mvpose import Camera
 from simharness.capture.picture import reflected, with_mirrors
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.types.lighting import Lighting
-from simharness.types.mesh import Mesh
+from simharness.types.mesh import Finish, Mesh
 from simharness.types.mirror import Mirror
 
 angles = st.floats(-3.1, 3.1)
@@ -136,6 +136,24 @@ def test_reflected_meshes_keep_colours_textures_and_labels():
     whole = reflected(replace(marked, vertices=marked.vertices + np.float32([2, 0, 0])), GLASS)
     np.testing.assert_array_equal(whole.parts, marked.parts)
     np.testing.assert_array_equal(whole.uv[:, ::-1], marked.uv)
+
+
+def test_a_body_across_the_plane_of_the_glass_keeps_its_materials_and_grain():
+    thing = ball((0.1, 0.0, 1.0), 0.5, (0.5, 0.5, 0.5))
+    n, k = len(thing.vertices), len(thing.faces)
+    toward = np.where(np.arange(n) % 2, np.arange(n), (np.arange(n) + 1) % n)  # every second one has a grain
+    values = [np.linspace(0, 1, n)] * 3
+    finish = Finish((np.arange(k) % 7).astype(np.int8), toward, *values)
+    cut = reflected(replace(thing, finish=finish), GLASS)
+    assert len(cut.faces)
+    assert len(cut.vertices) > n
+    labels = reflected(replace(thing, parts=finish.materials), GLASS).parts
+    np.testing.assert_array_equal(cut.finish.materials, labels)
+    np.testing.assert_array_equal(cut.finish.toward[:n], toward)
+    new = np.arange(n, len(cut.vertices))
+    itself = cut.finish.toward[new] == new
+    assert 0 < itself.mean() < 1
+    assert (cut.finish.toward[new][~itself] < n).all()
 
 
 def test_from_behind_a_mirror_is_a_board():
