@@ -16,6 +16,7 @@ two crops, by the share of hidden joints, and by the parameter ``look_alike``.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from collections.abc import Sequence as Many
 from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -284,7 +285,7 @@ class DescriptorModel:
 
     def draw(
         self,
-        identity: Sequence[tuple[str | int, ...]],
+        identity: Many[tuple[str | int, ...]],
         *,
         bearing: ArrayLike,
         hidden: ArrayLike,
@@ -376,7 +377,7 @@ def _middles(edges: Floats) -> Floats:
     return 0.5 * (edges[1:] + edges[:-1])
 
 
-def _check_ranges(ranks: Sequence[float], measured: Mapping[float, Any]) -> None:
+def _check_ranges(ranks: Many[float], measured: Mapping[float, Any]) -> None:
     """Raise a ValueError for ranks, distances or cosines that no measurement gives: the fit to them may not end."""
     if not (np.diff([0.0, *ranks, 1.0]) >= 0).all():
         raise ValueError("quantiles must increase from 0 to 1")
@@ -388,7 +389,7 @@ def _check_ranges(ranks: Sequence[float], measured: Mapping[float, Any]) -> None
             raise ValueError("cosines must be between -1 and 1")
 
 
-def _cosine_deviation(summary: Mapping[str, Any], quantiles: Sequence[float]) -> float:
+def _cosine_deviation(summary: Mapping[str, Any], quantiles: Many[float]) -> float:
     """Return the standard deviation of cosines whose distances have the quantiles of a summary."""
     ranks = (np.arange(1000) + 0.5) / 1000
     return float(np.std(1 - np.interp(ranks, quantiles, summary["quantiles"]) ** 2 / 2))

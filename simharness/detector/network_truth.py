@@ -36,13 +36,13 @@ def with_detections(truth: Truth, found: Detections, ids: Ids) -> Truth:
     """
     count = len(found.view)
     similarity = np.zeros((count, len(truth.joints)))
-    for row, view in enumerate(found.view):
+    for row, view in enumerate(found.view.tolist()):
         similarity[row] = object_keypoint_similarity(
             found.keypoints[row], truth.pixels[view], truth.visibility[view], truth.boxes[view]
         )
     order = np.argsort(-similarity, axis=1, kind="stable")
     person = np.where(similarity.max(axis=1, initial=0.0) >= SIMILAR, order[:, 0], -1) if order.size else _nobody(count)
-    for row in np.flatnonzero(person < 0):
+    for row in np.flatnonzero(person < 0).tolist():
         person[row] = _person_at(found.keypoints[row], ids(int(found.view[row])), people=len(truth.joints))
     return replace(truth, person=person, error=_errors(truth, found, person, similarity))
 
