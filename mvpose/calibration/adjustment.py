@@ -20,8 +20,6 @@ of joints and of wrong error models is measured: the scatter of the gradients of
 independent keypoints (a sandwich estimate: White, Econometrica 1982).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

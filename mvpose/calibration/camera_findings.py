@@ -1,7 +1,5 @@
 """Findings about single cameras: sizes with intervals, and whether they are alarms or notes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ number: the scatter of the gradient between blocks of time says by how much (a s
 1982).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -13,8 +13,6 @@ another person that was matched with this one, or from an error of the detector 
 explanations are compared by their evidence: one error for all people, or the same error for one of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

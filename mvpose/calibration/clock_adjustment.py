@@ -12,8 +12,6 @@ and a second (cluster-robust, with the correction "CR3" for few clusters: Camero
 Cluster-Robust Inference", Journal of Human Resources 2015).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ Every pair of views is compared at every shift; offsets of all cameras follow fr
 a shift that suits one pair must suit the others as well.
 """
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -7,8 +7,6 @@ Only differences between clocks can be seen: the time of the cameras that agree 
 of all or more, else the mean time of all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The doctor: what is wrong with a rig, found from the people in the pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

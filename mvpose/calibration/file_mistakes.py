@@ -4,8 +4,6 @@ The prior of each mistake follows how often users report it (threads of Pose2Sim
 extrinsics from camera to world and units are the most frequent ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ Cameras are rows of 23 numbers: the 22 of :attr:`mvpose.Rig.packed` and the offs
 are described in :mod:`mvpose.calibration.normal_equations`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

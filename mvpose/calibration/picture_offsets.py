@@ -4,8 +4,6 @@ The grid is searched on few frames and with errors of keypoints that are as larg
 is found although no point of the grid is near enough to it for the true errors.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ A repeated picture has the same detections as the one before, to the last digit.
 later ones come a frame too early, so the clock of the camera is a frame later from then on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -3,8 +3,6 @@
 Single poses of different people often fit each other by chance, those of two people who move for seconds rarely do.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Changes of a reading: poses of cameras, maps of pixels, lenses, names of joints; and files that are read again so."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

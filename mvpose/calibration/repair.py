@@ -4,8 +4,6 @@ Matching over seconds and bundle adjustment alternate: matching with a wrong rig
 Only what the data determine is changed; the rest is held, with the reason.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args

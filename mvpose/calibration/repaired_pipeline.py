@@ -6,8 +6,6 @@ velocities in the picture over what is left, half a frame at most. Trackers need
 the pictures (:meth:`mvpose.calibration.clocks.Clocks.corrected`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -4,8 +4,6 @@ Where the scale is trusted, the size of people relative to adults is the only ev
 (:func:`relative_size`).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

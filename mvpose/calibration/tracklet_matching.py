@@ -14,8 +14,6 @@ errors of the cameras; the uncertainty of the rig shrinks, and the pairs are sco
 at first, so that early mistakes can be corrected.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

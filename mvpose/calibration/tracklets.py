@@ -9,8 +9,6 @@ metres: an adult has an area of (0.70 m)², so the size of a person in the pictu
 person.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

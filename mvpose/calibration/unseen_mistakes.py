@@ -3,8 +3,6 @@
 They show in the people: adults have known sizes, stand upright more often than not, and lie within the pictures.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

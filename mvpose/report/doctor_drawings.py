@@ -4,8 +4,6 @@ Over pictures: residual arrows of a camera, epipolar lines of a pair. Plots: the
 clock offsets with their intervals.
 """
 
-from __future__ import annotations
-
 import html
 import math
 from collections.abc import Iterator, Sequence

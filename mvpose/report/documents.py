@@ -1,7 +1,5 @@
 """HTML pages from templates."""
 
-from __future__ import annotations
-
 import importlib.metadata
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ one core. Without: by OpenCV, whose encoder takes no options, VP8 in WebM (60 a 
 times as large as by PyAV).
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import importlib.util

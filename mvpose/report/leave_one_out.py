@@ -4,8 +4,6 @@ A joint that is triangulated from all cameras hides a part of the error of each.
 joint as the others see it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Limbs of skeletons as they are drawn, which differ from the tree of the pictorial structure."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

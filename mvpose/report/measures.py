@@ -1,7 +1,5 @@
 """Numbers of a recording without truth: what is off in which picture, what joints rest on, whether people are rigid."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

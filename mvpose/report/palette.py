@@ -5,8 +5,6 @@ first six and the grey of unmatched detections are at least 17 CIELAB units apar
 deuteranopic vision.
 """
 
-from __future__ import annotations
-
 Color = tuple[int, int, int]
 
 TRUTH: Color = (255, 255, 255)

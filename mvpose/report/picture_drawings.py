@@ -1,7 +1,5 @@
 """Drawings over pictures of a camera, as SVG: sharp at any size, and without a picture on plain ground."""
 
-from __future__ import annotations
-
 import base64
 import html
 import io

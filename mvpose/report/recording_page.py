@@ -1,7 +1,5 @@
 """Page of a recording without truth: who was where, and how far the people agree with the pictures and themselves."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Sequence

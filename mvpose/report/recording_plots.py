@@ -1,7 +1,5 @@
 """Plots of people through time as SVG: paths from above, time lines of identities, views of each person."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Mapping

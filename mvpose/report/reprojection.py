@@ -4,8 +4,6 @@ A page has no truth. What it can compare are the estimated joints, projected int
 were detected there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Cameras from above on the axes of a plot, and labels of places, each where it hides no other label, place or line."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

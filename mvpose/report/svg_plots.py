@@ -1,7 +1,5 @@
 """Matplotlib plots as SVG: inline in a page, in the page's own colours, or arranged in one standalone file."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Tables of numbers: for pages, cells with text and a shade; for Markdown, lines."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Verdict of the doctor in plain words, as both pages show it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -9,8 +9,6 @@ and the past (Zhang et al., "4D Association Graph", CVPR 2020, and the journal v
 people alike).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

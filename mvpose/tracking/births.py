@@ -1,7 +1,5 @@
 """Births of tracks, from detections that belong to nobody known."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.arrays import Floats, Integers

@@ -6,8 +6,6 @@ knowledge, not a new one in every frame: they shape the joints that are reported
 or they would count once for every frame.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 The tracker gives every frame; :mod:`mvpose.tracking.drift_charts` has the test. Estimates do not depend on it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -13,8 +13,6 @@ Where people stand as a camera sees them says which views count: their depth, wh
 image.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 
 import numpy as np

@@ -4,8 +4,6 @@ A frame of few people takes tens of microseconds, as long as a dozen calls of Nu
 all tracks, update them by their detections, judge who is there, and report.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.kernels import njit

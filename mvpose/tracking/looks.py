@@ -7,8 +7,6 @@ large depends on the people: where somebody else, who was seen at the same time,
 person does, appearance says nothing.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.affinity import AppearanceAffinity

@@ -12,8 +12,6 @@ chance. The displacement is that of the body as a whole, the mean over the joint
 only while two cameras see the track: where one does, or none, the place is partly a guess.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple

@@ -9,8 +9,6 @@ A joint is placed by triangulation from the pictures of the other cameras alone.
 this time, its place is that which the past predicts.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ A camera with a rolling shutter shows every joint at the time of its row. How fa
 that of the picture follows from the velocity of its track, and the ray is turned by as much at the depth of the joint.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from dataclasses import dataclass

@@ -11,8 +11,6 @@ person whom several cameras saw at once is the evidence instead of the rays, exc
 them saw.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple

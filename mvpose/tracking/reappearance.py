@@ -1,7 +1,5 @@
 """People whom a tracker knows, those whom it follows and lost ones, and the identities of those who come back."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

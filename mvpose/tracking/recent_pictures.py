@@ -4,8 +4,6 @@ Where cameras run freely, or pictures are lost, no frame may show somebody new t
 that no track claims waits a moment for the picture of another camera.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Self
 

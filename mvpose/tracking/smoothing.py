@@ -6,8 +6,6 @@ is taken for a person later was one before: its first frames are reported, too, 
 lag never is.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from copy import copy as shallow_copy

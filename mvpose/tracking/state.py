@@ -1,7 +1,5 @@
 """State of a tracker as named arrays, saved to one file and restored from it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path

@@ -4,8 +4,6 @@ A frame goes through prediction, affinity, matching, update, birth and existence
 gives the people of the pipeline.
 """
 
-from __future__ import annotations
-
 import math
 import time as clock
 from collections.abc import Mapping
