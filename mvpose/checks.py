@@ -1,7 +1,5 @@
 """Validation of arrays and numbers at public interfaces."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any

@@ -1,7 +1,5 @@
 """Output of a 2D pose detector for one frame, in all views."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Self
 

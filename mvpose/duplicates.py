@@ -4,8 +4,6 @@ Detectors often report one person twice in a view, with two nearly equal poses. 
 per view into a person, so the second detections would form a ghost beside the person.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

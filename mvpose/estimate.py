@@ -1,7 +1,5 @@
 """Result types of the method: matching of detections to people, and the people in 3D."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Self

@@ -1,7 +1,5 @@
 """What an estimator is: the protocols that every method fulfils, of this package and of its users."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from typing import Protocol, runtime_checkable
 

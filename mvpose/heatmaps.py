@@ -4,8 +4,6 @@ A map covers the crop of one detection on a grid: the centre of cell (row, colum
 ``origin + stride * (column, row)``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

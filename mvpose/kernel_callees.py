@@ -6,8 +6,6 @@ the time of compilation in vain. Here only the kernel that Python calls gets the
 callees, compiled and optimised as before. A callee that Python calls later is compiled again.
 """
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator
 from typing import Any

@@ -5,8 +5,6 @@ Where there is none (Windows, folders that cannot be written, some network drive
 which costs time and changes nothing else. The same holds for a process that waits in vain.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import time

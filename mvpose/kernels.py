@@ -10,8 +10,6 @@ Python's collector of cyclic garbage rests during compilation, which makes milli
 searches take an eighth of the time.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import functools

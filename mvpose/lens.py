@@ -3,8 +3,6 @@
 The terms are k1, k2, p1, p2, k3. The kernels take one point, so other kernels can call them in their loops.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.kernels import njit

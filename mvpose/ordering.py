@@ -6,8 +6,6 @@ detections. The order follows from pixels and scores alone. It is the same for a
 any world frame, and for a mirrored scene or skeleton, because it starts from the height in the picture.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.arrays import Integers

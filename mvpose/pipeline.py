@@ -1,7 +1,5 @@
 """Estimation pipeline for one frame: affinity, matching, reconstruction."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Presets: the variants of the method by name; :func:`preset` makes them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from mvpose.affinity import AppearanceAffinity, FusedAffinity, GeometricAffinity

@@ -3,8 +3,6 @@
 Mappings that depend on the vertical (the published head mappings of Shelf) assume that z is up in the world.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal

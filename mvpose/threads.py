@@ -1,7 +1,5 @@
 """Limit of BLAS to one thread, because threading small matrices costs more than it gains."""
 
-from __future__ import annotations
-
 import threading
 from contextlib import AbstractContextManager
 from functools import cache

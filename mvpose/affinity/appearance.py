@@ -1,7 +1,5 @@
 """Affinity from appearance: descriptors of a person re-identification network."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

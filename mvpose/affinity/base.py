@@ -1,7 +1,5 @@
 """Shared parts of the affinities: protocol, sigmoid, and grouping of detections by view for the kernels."""
 
-from __future__ import annotations
-
 import math
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """Affinity from the symmetric point-to-epipolar-line distance in pixels, the geometric cue of the paper."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Affinity from appearance and geometry combined (paper, section 3.2)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal, get_args

@@ -4,8 +4,6 @@ It uses the same evidence as the epipolar distance of the paper (:mod:`mvpose.af
 not change with resolution, focal length or the distance of the people, so one threshold serves every rig.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Exit codes: 0 success, 1 faults found by the doctor, 2 bad input, 3 the run itse
 one line on stderr. Commands import numerical modules only when they run.
 """
 
-from __future__ import annotations
-
 import sys
 
 __all__ = ["main"]

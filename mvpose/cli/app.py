@@ -1,7 +1,5 @@
 """The commands of the program."""
 
-from __future__ import annotations
-
 from mvpose.cli import detect_command, doctor_command, estimate_command, networks_command, repair_command, view_command
 from mvpose.cli.program import PROGRAM
 

@@ -1,7 +1,5 @@
 """Videos and folders of pictures of a recording: opened, of one rate and of the calibrated size, each of its camera."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ A wrong calibration, exchanged cameras or another picture size still give people
 keypoints from which they were made, which needs no truth to see.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Short examination of the calibration of every recording that is estimated: the doctor on some of its frames."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """``mvpose networks``: which networks there are, where they come from, and how to have them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

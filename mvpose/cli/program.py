@@ -1,7 +1,5 @@
 """The program ``mvpose``."""
 
-from __future__ import annotations
-
 from mvpose.commands.programs import Program
 
 

@@ -1,7 +1,5 @@
 """Detections of videos in files, written while they are made, so that an interrupted run goes on where it stopped."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """``mvpose view``: the page of a folder of results."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Errors that end a command with exit code 3."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Options that several commands share, declared once as the fields of a dataclass."""
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import typing

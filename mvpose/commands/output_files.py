@@ -1,7 +1,5 @@
 """Files and folders of a command's results: writable before anything runs, and complete when they appear."""
 
-from __future__ import annotations
-
 import json
 import os
 import secrets

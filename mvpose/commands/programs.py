@@ -3,8 +3,6 @@
 Exit codes: 0 success, 1 a regression or a fault was found, 2 bad input, 3 the run itself failed, 130 interrupted.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import os

@@ -1,7 +1,5 @@
 """Members of ZIP archives and arrays of NumPy archives (npz), which may be damaged or made to exhaust the memory."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Container

@@ -4,8 +4,6 @@ Every folder has a manifest of its files with their digests. A later run replace
 changed; all other files are the user's and stay.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

@@ -4,8 +4,6 @@ Every reader of the package takes the bytes of a file from :func:`read_bytes`, a
 this module, so that a pipe, a device, an enormous or a deeply nested file is refused in the same way everywhere.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Texts within messages: one line of bounded length, whatever a file holds."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import re

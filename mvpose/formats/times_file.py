@@ -4,8 +4,6 @@ A first line may name the columns. Then those of the cameras are taken, in which
 is called a time; other columns, such as the number of the frame, are left out.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Multi-way matching with cycle consistency (paper, section 3.2), which groups detections of all views into people."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 

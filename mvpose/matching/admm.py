@@ -19,8 +19,6 @@ the fractions of both kinds with which S starts (`_WITHIN`, `_BETWEEN`) took the
 The optimum of the convex problem does not depend on the start.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 SciPy's solver cannot be called from numba, and one call of it costs more than all local moves of a frame.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

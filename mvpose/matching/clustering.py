@@ -11,8 +11,6 @@ All steps take time m^2: a contraction costs one row, because parts store their 
 solved only for a view with a detection that would gain in another part.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

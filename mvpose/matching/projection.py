@@ -10,8 +10,6 @@ reach full precision where hundreds were needed. The alternation decides when to
 a round. The prices of the last call are an excellent start for the next.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -1,7 +1,5 @@
 """Rounding of a relaxed permutation matrix to people: the paper's threshold of 1/2, made cycle-consistent."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -4,8 +4,6 @@ An ONNX file holds its card, or a JSON file of its name beside it, with the dige
 of it.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Mapping

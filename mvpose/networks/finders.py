@@ -1,7 +1,5 @@
 """Detectors of people by the file of their network."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import cast
 

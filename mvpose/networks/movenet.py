@@ -5,8 +5,6 @@ centre the places of the person's joints and the size of its box; at each cell t
 a person is where the heat map of the joint, weighted by the distance from the regressed place, is greatest.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

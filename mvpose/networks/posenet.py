@@ -5,8 +5,6 @@ place. Every cell votes for the place that it names, with its probability; the v
 the heat maps, scaled so that the peak of each has the greatest probability of its joint.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Appearance descriptors of people from a person re-identification (re-ID) network."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -10,8 +10,6 @@ eliminated one after another, and each is joined to at most two of those that re
 "Nonserial Dynamic Programming", 1972). On a tree this is the usual passing of messages from the leaves to the root.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple

@@ -14,8 +14,6 @@ taken from published anthropometry, and uses neither those data sets nor a simul
 - head: ANSUR II (interpupillary and bitragion breadths, tragion to nose) and Drillis & Contini's segment heights.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

@@ -19,8 +19,6 @@ The freedoms of the priors and the value within the published range were chosen 
 detectors and seeds than those of the suite ``ci``.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.kernels import njit

@@ -6,8 +6,6 @@ if it is more likely right than wrong given the joint there, that is, if its res
 the state; at a true joint position most views do.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

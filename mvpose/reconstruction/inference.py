@@ -4,8 +4,6 @@ Both eliminate the joints in the order of :class:`mvpose.reconstruction.bone_gra
 passed on to the one or two joints that it is still joined to. A second pass in the opposite order completes the result.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.kernels import njit

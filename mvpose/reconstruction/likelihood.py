@@ -13,8 +13,6 @@ weights (n, K), 0 where a view has no such mode, and the angle of a pixel (n,). 
 the posterior probability that it is right, given the joint at the point.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

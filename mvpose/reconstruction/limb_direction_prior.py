@@ -7,8 +7,6 @@ holds for a person who lies down. The paper's prior has bone lengths only (secti
 such joints at an arbitrary depth.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

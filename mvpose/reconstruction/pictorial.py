@@ -13,8 +13,6 @@ Gaussians at their modes (:mod:`mvpose.reconstruction.likelihood`); the maps the
 likeliest.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Result type of every reconstruction, and the layout of one person's rays for the kernels."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ step lowers the posterior. The covariances are the marginals of the Gaussian at 
 estimated from the person's residuals.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mvpose.arrays import Floats

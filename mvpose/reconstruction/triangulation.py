@@ -6,8 +6,6 @@ One wrong view spoils this point, so the default method is robust: residuals are
 RA-L 2020), and where no majority of the views agrees, every pair of views is tried.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -5,8 +5,6 @@ offset from that of its parent. Joints of the skeleton that are centres of rotat
 are the origins themselves; others (nose, eyes, ears, toes ...) have fixed offsets in a segment.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self

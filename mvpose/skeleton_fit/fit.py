@@ -4,8 +4,6 @@ Both sides have the same lengths, and the head and the feet are symmetric. Lengt
 head and the feet, are medians over frames, so that wrong joints do not count.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -14,8 +14,6 @@ The normal equations are block tridiagonal, and are solved as a banded system.
 The search starts with every bone in its measured direction, joint by joint.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ shoulder, elbow, wrist, hip, ankle); American Medical Association, Guides to the
 girdle). They are averages of adults.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

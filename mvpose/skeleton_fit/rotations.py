@@ -1,7 +1,5 @@
 """Rotation matrices and rotation vectors of any leading shape, by SciPy."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

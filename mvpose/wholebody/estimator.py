@@ -1,7 +1,5 @@
 """Estimators of the whole body, made of estimators of the body: of the 17 joints of COCO in the detections."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator

@@ -13,8 +13,6 @@ A file has a name and a table of the joints in the order of the detector::
 side as its mirror image, any other joint itself, unless ``mirror`` says otherwise.
 """
 
-from __future__ import annotations
-
 import tomllib
 from functools import cache
 from pathlib import Path

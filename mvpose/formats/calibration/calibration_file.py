@@ -1,7 +1,5 @@
 """Calibration format: how the files of one program are recognised, read and written."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

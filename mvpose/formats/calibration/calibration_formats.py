@@ -13,8 +13,6 @@ To add a format, write one module and register it once:
 Readers convert to our conventions: metres, z up, ``x_cam = R x + t``, OpenCV's camera axes.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Sequence
 from pathlib import Path

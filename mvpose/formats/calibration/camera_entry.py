@@ -4,8 +4,6 @@ Names of two letters or fewer count as they are written, because K and k, T and 
 case and punctuation. Values may lie in maps within the entry (``intrinsics: {camera_matrix: ...}``).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Any

@@ -4,8 +4,6 @@ A file of one camera holds its values (:mod:`.camera_entry`): YAML, XML or JSON 
 or TOML; there may be two files, of intrinsics and extrinsics: ``cam1_intrinsics.yml`` and ``cam1_extrinsics.yml``.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -5,8 +5,6 @@ For each camera NAME of the list ``names``: ``K_NAME`` (3x3), ``dist_NAME`` (k1 
 ``x_cam = Rot X + T``, metres, z up.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -7,8 +7,6 @@ types of XML, by which a small file unpacks to any size or reads other files, ar
 either.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator

@@ -11,8 +11,6 @@ OpenCV prescribes no layout for many cameras. The reader accepts:
 The writer uses the first layout.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ Rodrigues vector, ``x_cam = R X + T``, metres, z up. Pose2Sim itself writes four
 k3; files with five terms are read, too.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ Each camera has the pixels of its picture (``fov_video``), intrinsics in 64ths o
 model, its centre in millimetres, and a rotation whose rows are the camera's axes in the world: right, up and backwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree

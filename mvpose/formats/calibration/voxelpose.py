@@ -4,8 +4,6 @@ One JSON object with a key for each camera, with ``fx fy cx cy`` (pixels), ``R``
 (3x1), ``k`` (k1 k2 k3) and ``p`` (p1 p2). ``T`` is the camera centre in millimetres: ``x_cam = R (X - T)``.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

@@ -5,8 +5,6 @@
 width, height in pixels. People of all frames are in one list, in any order; a frame without people has no entry.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

@@ -5,8 +5,6 @@ To add a format, write one module beside this one with a constant ``FORMAT``, a
 :data:`FORMATS`. Programs that use mvpose as a library call :func:`register` instead.
 """
 
-from __future__ import annotations
-
 from mvpose.formats.detections import coco_results, mmpose, openpose, rtmlib
 from mvpose.formats.detections.detection_file import WHAT, DetectionFile, DetectionFormat, summary
 

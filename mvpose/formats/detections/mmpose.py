@@ -4,8 +4,6 @@ A frame is ``{"frame_id", "instances": [{"keypoints", "keypoint_scores", "bbox",
 one picture, it is the instances themselves, or an object with them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -7,8 +7,6 @@ between shoulders and hips, respectively, where both were detected, and leaves t
 heat maps have no place in the format.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ What is certainly wrong is refused here, before anything is estimated; what only
 (cameras that moved, exchanged views, conventions) is the part of :mod:`mvpose.calibration`.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ The skeleton of files is that which is declared, or else the one with this numbe
 becomes COCO-17, or stays on its skeleton where all joints are requested and :mod:`mvpose.wholebody` knows it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -3,8 +3,6 @@
 Arrays of npz files are ``keypoints`` (T, n, J, 2) or (T, J, 2) and ``scores``.
 """
 
-from __future__ import annotations
-
 from mvpose.formats.detections.detection_file import DetectionFile, DetectionFormat, PicturePeople, picture_people
 from mvpose.formats.joint_names import JointNames
 

@@ -4,8 +4,6 @@ The number of joints alone does not tell: BODY_25 and BODY_25B of OpenPose both 
 far too long or too short for a body, while those of a body that is seen obliquely are shortened alike.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Sources of detections, folders with a file for each picture or files of all: found below paths, given to cameras."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Sequence

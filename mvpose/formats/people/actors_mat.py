@@ -4,8 +4,6 @@
 1 x 1 array where the actor is not annotated.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -6,8 +6,6 @@ v' = Rz Rx Ry v. Source: M. Meredith and S. Maddock, "Motion Capture File Format
 2001.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -5,8 +5,6 @@ files that we write, millimetres, z up, the residual is the standard deviation o
 over the axes, in whole millimetres up to 255, or 0 where it is unknown.
 """
 
-from __future__ import annotations
-
 import io
 import re
 import warnings

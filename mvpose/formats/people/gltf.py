@@ -7,8 +7,6 @@ The lengths and rotations are those of a fitted body (:mod:`mvpose.skeleton_fit`
 Source: Khronos Group, glTF 2.0 Specification, 2021.
 """
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Iterator

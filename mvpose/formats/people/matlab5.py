@@ -4,8 +4,6 @@ SciPy's reader is not used: on some damaged files it crashes the process. Only w
 is read: arrays of real numbers, and cells of them.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 import zlib

@@ -14,8 +14,6 @@ at less (van den Tillaar and Ettema, "A force-velocity relationship and coordina
 Journal of Sports Science and Medicine 3, 2004).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -6,8 +6,6 @@ x, y, z and the confidence of each joint; 0 0 0 -1 is the data set's mark of an 
 in the number of its frame. A person who is absent in a frame has no body in its file.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """What readers and writers of people get: files or people, the choices of the user, and what several formats need."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -6,8 +6,6 @@ content of every file, a function ``read(files) -> People``, or both (:mod:`.peo
 score and as people to re-enact. Programs that use mvpose as a library call :func:`register` instead.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence

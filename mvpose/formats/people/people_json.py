@@ -5,8 +5,6 @@ Metres, z up. ``joints17`` (or another number of joints) has x, y, z and the sco
 has no body there.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator

@@ -5,8 +5,6 @@ seconds, or ``rate`` the frames per second; ``ids`` (n,) are the identities, ``s
 Only ``joints`` is needed: frames and people are then counted, and joints are those of a declared skeleton.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator
 from pathlib import Path

@@ -5,8 +5,6 @@ name of the joint. ``cov_xx`` to ``cov_zz`` are the six different elements of th
 square metres; empty where unknown. A joint that was not estimated has no row.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ Metres, z up. ``world/person_ID/joints`` are points, ``world/person_ID/bones`` t
 are ``time`` in seconds and ``frame``. Where a person is absent, its entities are cleared.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

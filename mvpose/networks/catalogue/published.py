@@ -1,7 +1,5 @@
 """The networks that mvpose can fetch: parts of public packages, pinned by digests."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

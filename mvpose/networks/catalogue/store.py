@@ -1,7 +1,5 @@
 """Networks on this machine by name: those that were fetched, and those that rtmlib has downloaded."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from pathlib import Path

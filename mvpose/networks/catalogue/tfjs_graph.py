@@ -1,7 +1,5 @@
 """Graph models of TensorFlow.js: a JSON file with the graph, and a file of weights."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math
