@@ -4,8 +4,6 @@ Conventions: metres; OpenCV camera axes (x right, y down, z forward); ``x_cam = 
 integer pixel coordinates are pixel centres.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -230,7 +228,7 @@ class Rig(Sealed):
         self._check_places()
 
     @classmethod
-    def unchecked(cls, cameras: Sequence[Camera]) -> Rig:
+    def unchecked(cls, cameras: Sequence[Camera]) -> "Rig":
         """Return a rig of cameras that may stand anywhere, for the search of what is wrong with their calibration."""
         rig = cls.__new__(cls)
         object.__setattr__(rig, "cameras", tuple(cameras))

@@ -5,8 +5,6 @@ to, as they are in memory at the time of compilation. The digest covers exactly 
 file of the kernel, in another one, or computed on import. What it cannot describe is an error, never skipped.
 """
 
-from __future__ import annotations
-
 import builtins
 import enum
 import hashlib
@@ -135,6 +133,6 @@ def _names(code: types.CodeType) -> tuple[str, ...]:
     return tuple(sorted(names))
 
 
-def _cells(function: types.FunctionType) -> zip[tuple[str, types.CellType]]:
+def _cells(function: types.FunctionType) -> "zip[tuple[str, types.CellType]]":
     """Return the variables of an enclosing function that a function refers to."""
     return zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)

@@ -4,8 +4,6 @@ A keypoint and its camera define a half-line on which the joint lies. Distances 
 a ray, are in metres for any resolution, focal length and lens, so one set of scales serves every rig.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,7 +41,7 @@ class Modes:
     grid: Floats
     cameras: Floats
 
-    def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Modes:
+    def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> "Modes":
         """Return the modes of some detections; all maps stay where they are, because copies would take long."""
         directions, weights, row = self.directions[which], self.weights[which], self.row[which]
         return Modes(directions, weights, row, self.values, self.grid[which], self.cameras[which])
@@ -72,7 +70,7 @@ class Rays:
     def __len__(self) -> int:
         return len(self.view)
 
-    def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Rays:
+    def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> "Rays":
         """Return the rays of some detections, given by a mask (m,) or by indices in a new order."""
         if which.dtype == np.bool_:
             which = np.flatnonzero(which)

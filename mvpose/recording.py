@@ -3,8 +3,6 @@
 A tracker answers frame by frame with :class:`mvpose.Estimate`; files and plots need each person through time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Self
@@ -180,7 +178,7 @@ class People(Sealed):
         """Return the people with ``first`` as the number of the first frame."""
         return replace(self, numbers=self.numbers - self.numbers[:1] + first)
 
-    def uniform(self) -> People:
+    def uniform(self) -> "People":
         """Return the people at times ``first + k * period``, where the period is the median of theirs.
 
         Joints between two frames are interpolated linearly where both have them; a lost frame is a gap. Frames are

@@ -1,7 +1,5 @@
 """``mvpose detect`` and ``mvpose run``: from videos to detections, and on to tracked people."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -139,7 +137,7 @@ def _check_folder(folder: Path) -> None:
     check_writable(folder, DETECT)
 
 
-def _detect(sources: Sequence[PictureSource], out: Path, networks: Networks) -> str:
+def _detect(sources: "Sequence[PictureSource]", out: Path, networks: Networks) -> str:
     """Write the detections of videos of one rate, and return the name of their skeleton."""
     from mvpose.cli.camera_pictures import common_rate
     from mvpose.cli.video_detection import detect_videos, networks_text

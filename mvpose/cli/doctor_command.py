@@ -1,7 +1,5 @@
 """``mvpose doctor``: what is wrong with a calibration, from the people in the pictures."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from collections.abc import Callable, Sequence
@@ -108,7 +106,7 @@ def repair_line(
 
 
 def _write_page(
-    folder: Path, inputs: Inputs, diagnosis: Diagnosis, up: str | None, command: Callable[[tuple[str, ...]], str]
+    folder: Path, inputs: "Inputs", diagnosis: "Diagnosis", up: str | None, command: Callable[[tuple[str, ...]], str]
 ) -> None:
     from mvpose.commands.errors import failing
     from mvpose.files.atomic_files import atomic_folder
@@ -137,7 +135,7 @@ def _write_page(
         )
 
 
-def _lines(diagnosis: Diagnosis, mends: str) -> list[str]:
+def _lines(diagnosis: "Diagnosis", mends: str) -> list[str]:
     """Return the diagnosis for a reader: the verdict, findings with what mends them, and the numbers."""
     lines = [f"verdict: {diagnosis.verdict}"]
     for finding in diagnosis.findings:

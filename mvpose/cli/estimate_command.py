@@ -1,7 +1,5 @@
 """``mvpose estimate``: from calibration and detections to tracked people in files."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -98,7 +96,7 @@ class Wanted:
     min_frames: Annotated[int, typer.Option(metavar="N", help="Leave out people who are there in fewer frames.")] = 5
 
     @property
-    def limits(self) -> OutputLimits:
+    def limits(self) -> "OutputLimits":
         """OutputLimits of what results hold.
 
         Raises:
@@ -139,7 +137,7 @@ def estimate_into(
     choices: Choices,
     wanted: Wanted,
     *,
-    sources: Sequence[PictureSource] | None = None,
+    sources: "Sequence[PictureSource] | None" = None,
 ) -> None:
     """Estimate the people of a recording, write them into a folder, and print how many there are.
 
@@ -198,7 +196,7 @@ def estimate_into(
     typer.echo(f"{len(people)} people in {people.frames} frames: {wanted.out}")
 
 
-def _of_pictures(choices: Choices, calibration: Path, sources: Sequence[PictureSource]) -> Choices:
+def _of_pictures(choices: Choices, calibration: Path, sources: "Sequence[PictureSource]") -> Choices:
     """Return options with the rate, and the size, of the pictures, where nothing else states them."""
     from mvpose.cli.camera_pictures import common_rate
     from mvpose.formats.calibration.calibration_formats import read_calibration
@@ -213,7 +211,7 @@ def _of_pictures(choices: Choices, calibration: Path, sources: Sequence[PictureS
     return choices
 
 
-def _without_effect(wanted: Wanted, choices: Choices, inputs: Inputs, *, tracks: bool, pictures: bool) -> list[str]:
+def _without_effect(wanted: Wanted, choices: Choices, inputs: "Inputs", *, tracks: bool, pictures: bool) -> list[str]:
     """Return a remark about each option that was given and has no effect.
 
     Args:

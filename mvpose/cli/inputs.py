@@ -1,7 +1,5 @@
 """Calibration and detections of a recording, read and checked: the first step of every command about one."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -54,15 +52,15 @@ class Inputs:
         doubt: why the given upward axis may be wrong; "" where nothing speaks against it.
     """
 
-    rig: Rig
-    frames: list[Detections]
-    numbers: NDArray[np.int64]
+    rig: "Rig"
+    frames: "list[Detections]"
+    numbers: "NDArray[np.int64]"
     period: float
     paths: tuple[Path, ...] = ()
     doubt: str = ""
 
     @property
-    def skeleton(self) -> mvpose.Skeleton:
+    def skeleton(self) -> "mvpose.Skeleton":
         """Skeleton of the detections."""
         from mvpose import COCO17
 
@@ -187,7 +185,7 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     return Inputs(rig, recorded.detections(times), recorded.numbers, period, paths, doubt)
 
 
-def doubt_about(rig: Rig, up: str) -> str:
+def doubt_about(rig: "Rig", up: str) -> str:
     """Return why the given upward axis of a calibration's world may be wrong; "" where nothing speaks against it."""
     from mvpose.formats.detections.plausibility import up_axis
 
@@ -196,7 +194,7 @@ def doubt_about(rig: Rig, up: str) -> str:
     return "" if right else f"--up={up}: the cameras stand upright where the {stands} axis of the world points up"
 
 
-def _read_rig(path: Path, only: Sequence[str], *, examined: bool) -> Rig:
+def _read_rig(path: Path, only: Sequence[str], *, examined: bool) -> "Rig":
     """Read a calibration; for the doctor also one whose cameras make no rig, such as one in millimetres.
 
     Raises:
@@ -228,7 +226,7 @@ def _noted() -> Iterator[None]:
         note(str(error))
 
 
-def _project(detections: Sequence[Path]) -> ProjectSettings:
+def _project(detections: Sequence[Path]) -> "ProjectSettings":
     """Return the settings of the Pose2Sim project in which detections lie."""
     from mvpose.formats.detections.sources import find_sources
     from mvpose.formats.pose2sim_project import ProjectSettings
@@ -236,7 +234,7 @@ def _project(detections: Sequence[Path]) -> ProjectSettings:
     return ProjectSettings.near(source.path for source in find_sources(detections))
 
 
-def _skeleton(given: str) -> JointNames:
+def _skeleton(given: str) -> "JointNames":
     """Return the joints of a known skeleton, or of a TOML file."""
     from mvpose.formats.joint_names import JointNames, known_skeleton
     from mvpose.wholebody import read_skeleton, register
@@ -249,8 +247,8 @@ def _skeleton(given: str) -> JointNames:
 
 
 def _times(
-    choices: Choices, numbers: NDArray[np.int64], cameras: Sequence[str], project: ProjectSettings
-) -> tuple[NDArray[np.float64], float]:
+    choices: Choices, numbers: "NDArray[np.int64]", cameras: Sequence[str], project: "ProjectSettings"
+) -> "tuple[NDArray[np.float64], float]":
     """Return the time of each picture, (T, V), seconds, and the time between frames."""
     import numpy as np
 
@@ -270,7 +268,7 @@ def _times(
     return np.repeat((numbers * period)[:, None], len(cameras), axis=1), period
 
 
-def _project_rate(project: ProjectSettings) -> tuple[float | None, str]:
+def _project_rate(project: "ProjectSettings") -> tuple[float | None, str]:
     """Return the frames per second of a project, of its settings or its videos, and where they are stated."""
     rate, origin = project.rate()
     folders = [file.parent / "videos" for file in project.files if (file.parent / "videos").is_dir()]

@@ -1,7 +1,5 @@
 """``mvpose repair``: a better calibration, from the people in the pictures."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from dataclasses import replace
@@ -118,7 +116,7 @@ def repair(
     typer.echo("\n".join(lines))
 
 
-def _mended(inputs: Inputs, mends: list[Mend]) -> Inputs:
+def _mended(inputs: "Inputs", mends: "list[Mend]") -> "Inputs":
     """Return the recording with a mended rig.
 
     Raises:
@@ -132,7 +130,7 @@ def _mended(inputs: Inputs, mends: list[Mend]) -> Inputs:
     return replace(inputs, rig=Rig(cameras))
 
 
-def _freedoms(given: str) -> tuple[Freedom, ...]:
+def _freedoms(given: str) -> "tuple[Freedom, ...]":
     names = [name.strip() for name in given.split(",") if name.strip()]
     known: dict[str, Freedom] = {"extrinsics": "extrinsics", "focal": "focal", "center": "center"}
     for name in names:
@@ -141,14 +139,14 @@ def _freedoms(given: str) -> tuple[Freedom, ...]:
     return tuple(known[name] for name in names)
 
 
-def _size(given: str) -> Size:
+def _size(given: str) -> "Size":
     known: dict[str, Size] = {"calibration": "calibration", "people": "people", "both": "both"}
     if given not in known:
         raise ValueError(f"--rig-size {given}: expected calibration, people or both")
     return known[given]
 
 
-def write_new(original: Path, path: Path, rig: Rig) -> None:
+def write_new(original: Path, path: Path, rig: "Rig") -> None:
     """Write a rig in the format of a calibration; files appear when all are complete.
 
     Raises:
@@ -167,7 +165,7 @@ def write_new(original: Path, path: Path, rig: Rig) -> None:
             shutil.move(each, path.parent / each.name)
 
 
-def _write_times(path: Path, inputs: Inputs) -> None:
+def _write_times(path: Path, inputs: "Inputs") -> None:
     """Write the times of the pictures by corrected clocks, without lost and repeated pictures."""
     from mvpose.calibration import estimate_clocks
     from mvpose.commands.errors import failing
@@ -181,7 +179,7 @@ def _write_times(path: Path, inputs: Inputs) -> None:
     write_atomic(path, ("\n".join(lines) + "\n").encode())
 
 
-def _lines(result: Repair) -> list[str]:
+def _lines(result: "Repair") -> list[str]:
     """Return a line for each camera: its turn, its shift, its clock, and its residuals."""
     import numpy as np
 

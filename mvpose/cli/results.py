@@ -1,7 +1,5 @@
 """Files of tracked people in a folder that appears when it is complete."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -61,11 +59,11 @@ def write_results(
     *,
     formats: Sequence[str],
     options: Options,
-    left_out: LeftOut,
+    left_out: "LeftOut",
     page: bool = True,
-    views: Sequence[PictureSource] | None = None,
+    views: "Sequence[PictureSource] | None" = None,
     films: bool = True,
-    diagnosis: Diagnosis | None = None,
+    diagnosis: "Diagnosis | None" = None,
 ) -> None:
     """Write people in some formats, what they were estimated from, and the page of the recording.
 
@@ -113,11 +111,11 @@ def _write_page(
     name: str,
     people: People,
     inputs: Inputs,
-    views: Sequence[PictureSource] | None,
+    views: "Sequence[PictureSource] | None",
     *,
     films: bool,
-    diagnosis: Diagnosis | None,
-    left_out: LeftOut,
+    diagnosis: "Diagnosis | None",
+    left_out: "LeftOut",
 ) -> None:
     """Write the page, with pictures and films where there are any."""
     from mvpose.report.recording_page import write_page

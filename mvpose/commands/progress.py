@@ -2,8 +2,6 @@
 for the trials of a study.
 """
 
-from __future__ import annotations
-
 import contextlib
 import time
 from collections.abc import Callable, Iterator
@@ -142,7 +140,7 @@ class Bars:
             console=console,
         )
 
-    def __enter__(self) -> Bars:
+    def __enter__(self) -> "Bars":
         self._progress.start()
         return self
 

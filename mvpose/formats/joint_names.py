@@ -3,8 +3,6 @@
 Names are compared by :func:`canonical`, so that "LHip", "left hip", "Subject:L_Hip" and "left_hip" are the same joint.
 """
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -63,7 +61,7 @@ class JointNames:
     def _rows(self) -> dict[str, int]:
         return {canonical(joint): row for row, joint in reversed(list(enumerate(self.joints)))}
 
-    def renamed(self, names: Mapping[str, str]) -> JointNames:
+    def renamed(self, names: Mapping[str, str]) -> "JointNames":
         """Return the skeleton with some joints under our names.
 
         Args:

@@ -1,7 +1,5 @@
 """Pictures of one camera: a video, or a folder of pictures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -45,7 +43,7 @@ class PictureSource:
     size: tuple[int, int]
     numbers: tuple[int, ...] = ()
 
-    def numbered_for(self, frames: Sequence[int]) -> tuple[PictureSource, str]:
+    def numbered_for(self, frames: Sequence[int]) -> "tuple[PictureSource, str]":
         """Return the source with numbers of pictures that are those of frames, and a remark where that is not sure.
 
         Frame k of a folder is the file with the number k in its name. Where the names have other numbers, and there are

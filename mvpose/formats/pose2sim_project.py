@@ -4,8 +4,6 @@ A trial takes what its own file does not state from those of the folders above i
 ``[pose] pose_model``, older ones ``[pose-2d]``; both have ``[project] frame_rate``. A model ``CUSTOM`` is a tree in it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,7 +37,7 @@ class ProjectSettings:
     tables: tuple[Mapping[str, Any], ...] = ()
 
     @classmethod
-    def near(cls, places: Iterable[Path]) -> ProjectSettings:
+    def near(cls, places: Iterable[Path]) -> "ProjectSettings":
         """Return the settings of the project in which some folders lie, or files; none without a project.
 
         Raises:

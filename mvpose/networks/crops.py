@@ -7,8 +7,6 @@ OpenCV is not used because mvpose does not depend on it, and because ``warpAffin
 at any reduction, so that small crops of large boxes alias and flicker as the box moves.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -34,11 +32,11 @@ class Placement(NamedTuple):
     origin: Floats
     stride: Floats
 
-    def select(self, rows: NDArray[np.bool_]) -> Placement:
+    def select(self, rows: NDArray[np.bool_]) -> "Placement":
         """Return the placement of some of the crops, given by a mask (m,)."""
         return Placement(self.origin[rows], self.stride[rows])
 
-    def mirrored(self, middle: float) -> Placement:
+    def mirrored(self, middle: float) -> "Placement":
         """Return the crops mirrored left-right: pixel u becomes pixel ``2 * middle - u``."""
         origin, stride = self.origin.copy(), self.stride.copy()
         origin[:, 0] += 2.0 * middle * stride[:, 0]

@@ -11,8 +11,6 @@ The outputs of the file determine its kind:
 Class 0 is people, as in COCO.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -66,12 +64,12 @@ class PeopleInPicture:
     keypoint_scores: Floats | None = None
 
     @classmethod
-    def joined(cls, parts: Sequence[PeopleInPicture]) -> PeopleInPicture:
+    def joined(cls, parts: "Sequence[PeopleInPicture]") -> "PeopleInPicture":
         """Return the people of several, who all have keypoints."""
         columns = ("boxes", "scores", "keypoints", "keypoint_scores")
         return cls(*(np.concatenate([getattr(each, column) for each in parts]) for column in columns))
 
-    def select(self, rows: NDArray[np.int64]) -> PeopleInPicture:
+    def select(self, rows: NDArray[np.int64]) -> "PeopleInPicture":
         """Return some people, in a given order."""
         kept = [None if each is None else each[rows] for each in (self.keypoints, self.keypoint_scores)]
         return PeopleInPicture(self.boxes[rows], self.scores[rows], *kept)
@@ -120,7 +118,7 @@ class PersonDetector:
 
     def __init__(
         self,
-        model: str | Path | PictureSession,
+        model: "str | Path | PictureSession",
         *,
         kind: Kind | None = None,
         least: float = 0.3,

@@ -4,8 +4,6 @@ Heads are trained with one of three conventions for the input pixel of an output
 :class:`mvpose.networks.card.Card`. The wrong convention causes errors of up to 2 pixels of the input.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn
@@ -205,7 +203,7 @@ class Cells:
     count: int
 
     @classmethod
-    def from_convention(cls, convention: str, count: int, extent: int) -> Cells:
+    def from_convention(cls, convention: str, count: int, extent: int) -> "Cells":
         """Create the cells of an axis of ``extent`` pixels by a convention of ``Card.cells``."""
         if convention == "span":
             return cls(0.0, (extent - 1) / max(count - 1, 1), count)

@@ -1,7 +1,5 @@
 """Session of a network in an ONNX file, run by onnxruntime on crops."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Callable
@@ -24,7 +22,7 @@ _LONGEST_MESSAGE = 400  # characters
 _GREY = 128  # value of the test crops
 
 
-def as_session(model: str | Path | Session) -> Session:
+def as_session(model: "str | Path | Session") -> "Session":
     """Return a session unchanged, or open one with the defaults for a file."""
     return model if isinstance(model, Session) else Session(model)
 
@@ -108,7 +106,7 @@ class Session:
         self.outputs = self._chosen_outputs()
         self.shapes = self._output_shapes()
 
-    def __reduce__(self) -> tuple[Callable[[], Session], tuple[()]]:
+    def __reduce__(self) -> "tuple[Callable[[], Session], tuple[()]]":
         return self._reopen, ()
 
     @property

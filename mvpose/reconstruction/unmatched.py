@@ -16,8 +16,6 @@ to belong to one body until the pose is found, so a pose may take a limb of a ne
 is why the paper matches first.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import NamedTuple
@@ -102,7 +100,7 @@ class UnmatchedPictorialStructure:
         number[people] = np.arange(len(people))
         return Poses(*_polish(by_view, skeleton, found, people, self.noise)), number[labels]
 
-    def _find(self, rays: Rays, skeleton: Skeleton) -> _FoundPoses:
+    def _find(self, rays: Rays, skeleton: Skeleton) -> "_FoundPoses":
         space = hypothesize(rays, skeleton, noise=self.noise, agreement=self.agreement, most=self.most_states)
         trees = link(space, skeleton, noise=self.noise, reach=self.reach)
         graph = bone_graph(skeleton)

@@ -1,7 +1,5 @@
 """Forward kinematics of a body, and the derivatives of its joints."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -62,7 +60,7 @@ class Freedom:
     axes: Floats
 
     @classmethod
-    def of_body(cls, body: ArticulatedBody) -> Freedom:
+    def of_body(cls, body: ArticulatedBody) -> "Freedom":
         """Return all axes of a body."""
         pairs = [(k, axis) for k, segment in enumerate(body.segments) for axis in segment.axes]
         return cls(body, np.array([k for k, _ in pairs]), np.array([axis for _, axis in pairs]))

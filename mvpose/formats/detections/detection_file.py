@@ -1,7 +1,5 @@
 """Files of detections of one camera: their content, the people in a picture, and what a format is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -45,7 +43,7 @@ class PicturePeople:
         return len(self.scores)
 
     @classmethod
-    def nobody(cls, joints: int = 17) -> PicturePeople:
+    def nobody(cls, joints: int = 17) -> "PicturePeople":
         """Return an empty picture."""
         return cls(np.zeros((0, joints, 2)), np.zeros((0, joints)), np.zeros((0, 4)), np.zeros(0))
 

@@ -1,7 +1,5 @@
 """Fitted bodies as hierarchies of nodes with rotations over time, the common ground of BVH and glTF."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +38,7 @@ class Hierarchy:
     rotations: Floats
     seen: slice
 
-    def turned(self, axes: Floats) -> Hierarchy:
+    def turned(self, axes: Floats) -> "Hierarchy":
         """Return the hierarchy in other axes of the world: ``axes`` (3, 3) is the rotation to them."""
         rotations = axes @ self.rotations @ axes.T
         parts = (self.offsets @ axes.T, self.tips @ axes.T, self.root @ axes.T, rotations)

@@ -4,8 +4,6 @@ Tensors keep the layout of TensorFlow, (n, height, width, channels), and integer
 stand between two transpositions, which onnxruntime cancels against each other when it opens the file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +23,7 @@ _ACTIVATIONS = ("Relu", "Relu6")
 
 def convert(
     model: GraphModel, *, pictures: str, outputs: Mapping[str, str], sigmoid: Collection[str], card: Card
-) -> ModelProto:
+) -> "ModelProto":
     """Convert the part of a graph between two sets of tensors to ONNX.
 
     Args:
