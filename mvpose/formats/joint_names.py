@@ -5,9 +5,12 @@ Names are compared by :func:`canonical`, so that "LHip", "left hip", "Subject:L_
 
 import difflib
 import re
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,35 +93,12 @@ class JointNames:
         return np.array([self._rows.get(canonical(joint), -1) for joint in wanted])
 
 
-# fmt: off
+_FILE: dict[str, dict[str, Any]] = tomllib.loads((Path(__file__).parent / "data" / "joints.toml").read_text("utf-8"))
 _ORDERS = {
     "coco17": COCO17.joints,
-    "mpii16": (
-        "right_ankle", "right_knee", "right_hip", "left_hip", "left_knee", "left_ankle", "pelvis", "thorax",
-        "head_bottom", "head_top", "right_wrist", "right_elbow", "right_shoulder", "left_shoulder", "left_elbow",
-        "left_wrist",
-    ),  # the file's "upper neck" is the joint that Shelf calls the bottom of the head
-    "h36m17": (
-        "pelvis", "right_hip", "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle", "spine", "thorax",
-        "neck", "head", "left_shoulder", "left_elbow", "left_wrist", "right_shoulder", "right_elbow", "right_wrist",
-    ),
-    "aic14": (
-        "right_shoulder", "right_elbow", "right_wrist", "left_shoulder", "left_elbow", "left_wrist", "right_hip",
-        "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle", "head_top", "head_bottom",
-    ),
-    "crowdpose14": (
-        "left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hip",
-        "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle", "head_top", "head_bottom",
-    ),
-    "shelf14": SHELF14.joints, "panoptic19": PANOPTIC19.joints, "panoptic15": PANOPTIC19.joints[:15],
+    **{name: tuple(joints) for name, joints in _FILE["orders"].items()},
+    **{"shelf14": SHELF14.joints, "panoptic19": PANOPTIC19.joints, "panoptic15": PANOPTIC19.joints[:15]},
 }
-_OTHER_NAMES = {
-    "coco": "coco18", "mpii": "mpii15", "lsp": "shelf14", "blazepose": "blazepose33",
-    "coco133": "wholebody133", "coco133wrist": "wholebody133", "halpe26lower": "halpe26",
-    "body": "coco17", "bodywithfeet": "halpe26", "lowerbody": "halpe26",
-    "wholebody": "wholebody133", "wholebodywrist": "wholebody133",
-}  # of Pose2Sim's models
-# fmt: on
 
 
 @cache
@@ -152,7 +132,7 @@ def known_skeleton(name: str) -> JointNames:
         ValueError: an unknown name; the message lists the known ones.
     """
     plain = re.sub(r"[^a-z0-9]", "", name.lower())
-    plain = _OTHER_NAMES.get(plain, plain)
+    plain = _FILE["other_names"].get(plain, plain)
     if plain not in KNOWN:
         raise ValueError(f"no skeleton {name!r} is known; {_nearest(plain, KNOWN)}")
     return KNOWN[plain]
