@@ -11,6 +11,7 @@ from mvpose.commands.errors import failing
 from mvpose.commands.programs import note
 from mvpose.commands.progress import single_stage
 from mvpose.files.atomic_files import atomic_folder
+from mvpose.files.message_text import prefixed
 from mvpose.formats.people import Options, check_formats, write_people
 from mvpose.formats.people.people_tables import INPUTS
 from mvpose.recording import People
@@ -34,10 +35,8 @@ def formats_of(given: str) -> tuple[str, ...]:
         ValueError: an unknown name, or a format whose package is not installed.
     """
     names = tuple(name.strip().lower() for name in given.split(",") if name.strip())
-    try:
+    with prefixed("--format"):
         check_formats(names)
-    except ValueError as error:
-        raise ValueError(f"--format: {error}") from None
     return tuple(dict.fromkeys((*ALWAYS, *names)))
 
 

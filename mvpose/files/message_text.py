@@ -3,7 +3,8 @@
 import itertools
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 LONGEST = 500
@@ -66,3 +67,12 @@ def all_in_one_line(mistakes: Sequence[str]) -> str:
 
 def _escaped(match: re.Match[str]) -> str:
     return match[0].encode("unicode_escape").decode()
+
+
+@contextmanager
+def prefixed(place: object, hint: str = "") -> Iterator[None]:
+    """Put a place, such as a path, before the message of any ValueError of a block, and a hint behind it."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{place}: {error}{hint}") from None

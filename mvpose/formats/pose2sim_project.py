@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mvpose.files.input_files import SETTINGS, parse_toml, read_bytes
-from mvpose.files.message_text import shown
+from mvpose.files.message_text import prefixed, shown
 from mvpose.formats.joint_names import JointNames, known_skeleton
 
 FILE = "Config.toml"
@@ -70,10 +70,8 @@ class ProjectSettings:
         if model.upper() == CUSTOM:
             tree, _ = self.value(*((section, "CUSTOM") for section in _POSES))
             return _of_tree(tree, origin), origin
-        try:
+        with prefixed(f"{origin}: not used"):
             return known_skeleton(model), origin
-        except ValueError as error:
-            raise ValueError(f"{origin}: not used: {error}") from None
 
     def rate(self) -> tuple[float | None, str]:
         """Return the frames per second, and where they are stated; None where they are "auto" or not stated."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.files.input_files import read_bytes
-from mvpose.files.message_text import listed
+from mvpose.files.message_text import listed, prefixed
 from mvpose.formats.joint_names import canonical
 
 _TIMES = ("t", "s", "time", "times", "timestamp", "timestamps", "seconds", "time_s", "time_seconds")
@@ -39,10 +39,8 @@ def read_times(path: Path, frames: int, cameras: Sequence[str]) -> tuple[Floats,
     columns, remark = None, ""
     if lines and any(re.search(r"[A-Za-z]", each) and not _is_number(each) for each in lines[0]):
         columns, remark = _columns(path, lines.pop(0), cameras)
-    try:
+    with prefixed(path, "; expected times in seconds, a line for each frame"):
         values = [[float(each) if each else float("nan") for each in line] for line in lines]
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}; expected times in seconds, a line for each frame") from None
     wanted = (max(columns) + 1,) if columns else (1, len(cameras))
     if len(values) != frames or any(len(line) < wanted[0] if columns else len(line) not in wanted for line in values):
         widths = sorted({len(line) for line in values})

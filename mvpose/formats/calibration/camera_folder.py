@@ -11,7 +11,7 @@ from typing import Any
 
 from mvpose import Rig
 from mvpose.files.input_files import natural_order
-from mvpose.files.message_text import listed, shown
+from mvpose.files.message_text import listed, prefixed, shown
 from mvpose.formats.calibration.calibration_file import CalibrationFile
 from mvpose.formats.calibration.camera_entry import is_camera, read_camera
 from mvpose.formats.calibration.opencv import values_of, write_values
@@ -73,10 +73,8 @@ def read_folder(folder: Path, *, size: tuple[int, int], only: Sequence[str]) -> 
         if twice:
             raise ValueError(f"{file}: two files of the camera {name!r} have {shown(twice[0])}; remove one of them")
         both |= values
-    try:
+    with prefixed(folder):
         return Rig([read_camera(name, entry, size) for name, entry in entries.items() if not only or name in only])
-    except ValueError as error:
-        raise ValueError(f"{folder}: {error}") from None
 
 
 def write_folder(folder: Path, rig: Rig, *, suffix: str) -> None:

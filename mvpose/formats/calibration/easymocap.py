@@ -12,6 +12,7 @@ from typing import Any
 from scipy.spatial.transform import Rotation
 
 from mvpose import Camera, Rig
+from mvpose.files.message_text import prefixed
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
 from mvpose.formats.calibration.camera_entry import camera, check_names, image_size
 from mvpose.formats.calibration.file_storage import matrix, missing_half, read_beside, write_storage
@@ -39,10 +40,8 @@ def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
     names = values.get("names")
     if not isinstance(names, list):
         raise ValueError(f"{path}: no list 'names'; expected {_WHAT}")
-    try:
+    with prefixed(path):
         return Rig([_camera(str(name), values, size, path) for name in names])
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def write_calibration(path: str | Path, rig: Rig) -> None:

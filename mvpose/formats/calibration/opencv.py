@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from mvpose import Camera, Rig
+from mvpose.files.message_text import prefixed
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
 from mvpose.formats.calibration.camera_entry import check_names, is_camera, read_camera
 from mvpose.formats.calibration.file_storage import (
@@ -57,15 +58,13 @@ def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
     path = Path(path)
     plain = _plain_values(CalibrationFile(path, _WHAT))
     values = read_beside(path, what=_WHAT) if plain is None else plain
-    try:
+    with prefixed(path):
         stereo = _stereo(values, path)
         entries = stereo or _entries(values)
         if not entries:
             keys = ", ".join(list(values)[:8]) or "no keys"
             raise ValueError(f"no camera found, only {keys}; expected {_WHAT}")
         return Rig([read_camera(name, entry, size) for name, entry in entries.items()])
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def write_calibration(path: str | Path, rig: Rig) -> None:
@@ -135,10 +134,8 @@ def _entries(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
 def _plain_values(file: CalibrationFile) -> dict[str, Any] | None:
     """Return the named values of a JSON or TOML file; None for other files."""
     plain = file.json if file.json is not None else None if file.storage is not None else file.toml
-    try:
+    with prefixed(file.path):
         return None if plain is None else dict(with_matrices(plain))
-    except ValueError as error:
-        raise ValueError(f"{file.path}: {error}") from None
 
 
 def _stereo(values: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:

@@ -14,6 +14,7 @@ import numpy as np
 from mvpose import Camera, Rig
 from mvpose.checks import as_array
 from mvpose.files.input_files import CALIBRATION, read_json_object
+from mvpose.files.message_text import prefixed
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
 from mvpose.formats.calibration.camera_entry import camera, check_names, image_size, is_camera
 
@@ -42,7 +43,7 @@ def read_calibration(path: str | Path, *, types: Collection[str] = ("hd",)) -> R
     entries = read_json_object(path, what=_WHAT, most=CALIBRATION).get("cameras")
     if not isinstance(entries, list):
         raise ValueError(f"{path}: no list 'cameras'; expected {_WHAT}")
-    try:
+    with prefixed(path):
         chosen = [
             _camera(index, entry)
             for index, entry in enumerate(entries)
@@ -55,8 +56,6 @@ def read_calibration(path: str | Path, *, types: Collection[str] = ("hd",)) -> R
                 f"2; the file has {', '.join(found) or 'none'}: name the cameras (cameras.only) to take others"
             )
         return Rig(chosen)
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def write_calibration(path: str | Path, rig: Rig, *, kind: str = "hd") -> None:

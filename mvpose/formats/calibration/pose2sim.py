@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose import Camera, Rig
 from mvpose.files.input_files import CALIBRATION, parse_toml, read_bytes
-from mvpose.files.message_text import one_line, shown
+from mvpose.files.message_text import one_line, prefixed, shown
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
 from mvpose.formats.calibration.camera_entry import camera, check_names, image_size
 
@@ -41,10 +41,8 @@ def read_calibration(path: str | Path) -> Rig:
         sections = parse_toml(content.decode("utf-8-sig"))
     except ValueError as error:
         raise ValueError(f"{path}: not TOML ({one_line(str(error), 160)}); expected {_WHAT}") from None
-    try:
+    with prefixed(path):
         return Rig([_camera(name, entry) for name, entry in sections.items() if name != _METADATA])
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def write_calibration(path: str | Path, rig: Rig) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from mvpose import Camera, Rig
 from mvpose.checks import as_array
 from mvpose.files.input_files import CALIBRATION, read_json_object
+from mvpose.files.message_text import prefixed
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
 from mvpose.formats.calibration.camera_entry import check_names
 
@@ -39,7 +40,7 @@ def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
     """
     path = Path(path)
     cameras = read_json_object(path, what=_WHAT, most=CALIBRATION)
-    try:
+    with prefixed(path):
         centers = np.array([_center(name, entry) for name, entry in cameras.items()]).reshape(-1, 3)
         if len(centers) and np.abs(centers).max() < _METRES:
             raise ValueError(
@@ -48,8 +49,6 @@ def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
                 "multiply every T by 1000"
             )
         return Rig([_camera(name, entry, size) for name, entry in cameras.items()])
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def write_calibration(path: str | Path, rig: Rig) -> None:

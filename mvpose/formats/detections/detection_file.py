@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 from mvpose.files.archives import arrays_of
 from mvpose.files.input_files import read_bytes, read_json
-from mvpose.files.message_text import listed, shown
+from mvpose.files.message_text import listed, prefixed, shown
 from mvpose.formats.joint_names import KNOWN, JointNames
 
 WHAT = "detections of one camera: OpenPose, COCO or AlphaPose results, MMPose predictions or RTMLib arrays"
@@ -81,10 +81,8 @@ class DetectionFile:
         """
         if self.path.suffix.lower() != ".npz":
             return {}
-        try:
+        with prefixed(self.path, "; expected the arrays keypoints and scores"):
             return arrays_of(self.content, only=("keypoints", "scores"))
-        except ValueError as error:
-            raise ValueError(f"{self.path}: {error}; expected the arrays keypoints and scores") from None
 
     @property
     def entries(self) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mvpose.files.archives import MOST
 from mvpose.files.input_files import read_bytes
-from mvpose.files.message_text import one_line
+from mvpose.files.message_text import one_line, prefixed
 from mvpose.formats.joint_names import KNOWN, skeleton_of
 from mvpose.formats.people.matlab5 import read_variable
 from mvpose.formats.people.people_files import PeopleFiles
@@ -45,10 +45,8 @@ def read(files: PeopleFiles) -> People:
                     f"{pose.shape}"
                 )
     numbers = np.arange(frames)
-    try:
+    with prefixed(path):
         return People(files.times(numbers), np.arange(len(actors)), joints, skeleton=skeleton_of(names))
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def _read_actors(path: Path) -> list[np.ndarray]:

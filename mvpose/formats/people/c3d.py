@@ -16,7 +16,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.files.input_files import read_bytes
-from mvpose.files.message_text import one_line, shown
+from mvpose.files.message_text import one_line, prefixed, shown
 from mvpose.formats.joint_names import JointNames, skeleton_of
 from mvpose.formats.people.people_files import (
     METRES,
@@ -135,12 +135,10 @@ def _read_file(path: Path, files: PeopleFiles) -> People:
     axes = files.axes("y" if screen == "+y" else "z")
     numbers = int(frames[0][0]) + np.arange(len(frames))
     ids, names, joints = _by_person(path, labels, markers @ axes.T)
-    try:
+    with prefixed(path):
         times = files.times(numbers - 1, rate=rate)
         people = np.array(ids), joints
         return People(times, *people, skeleton=skeleton_of(JointNames(path.name, names)), numbers=numbers)
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def _by_person(path: Path, labels: tuple[str, ...], markers: Floats) -> tuple[list[int], tuple[str, ...], Floats]:

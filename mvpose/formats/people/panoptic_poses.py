@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
 from mvpose.files.input_files import read_json_object
-from mvpose.files.message_text import one_line
+from mvpose.files.message_text import one_line, prefixed
 from mvpose.formats.joint_names import KNOWN, skeleton_of
 from mvpose.formats.people.people_files import Export, PeopleFiles
 from mvpose.recording import People
@@ -102,7 +102,7 @@ def read(files: PeopleFiles) -> People:
         times = [0.001 * float(scene.get("univTime", np.nan)) for scene in scenes]
     except (TypeError, ValueError):
         times = [np.nan] * len(scenes)
-    try:
+    with prefixed(folder):
         return People(
             files.times(np.array(numbers), times),
             np.array(ids, np.int64),
@@ -111,8 +111,6 @@ def read(files: PeopleFiles) -> People:
             skeleton=skeleton_of(skeleton),
             numbers=np.array(numbers),
         )
-    except ValueError as error:
-        raise ValueError(f"{folder}: {error}") from None
 
 
 def _joint_count(scenes: Sequence[dict[str, Any]]) -> int:

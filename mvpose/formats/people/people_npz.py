@@ -15,6 +15,7 @@ import numpy as np
 from mvpose.checks import as_array
 from mvpose.files.archives import arrays_of
 from mvpose.files.input_files import read_bytes
+from mvpose.files.message_text import prefixed
 from mvpose.formats.joint_names import JointNames, skeleton_of
 from mvpose.formats.people.people_files import Export, PeopleFiles
 from mvpose.recording import People
@@ -55,10 +56,8 @@ def read(files: PeopleFiles) -> People:
         raise ValueError(f"{path}: cannot be read ({error}); expected {_WHAT}: write it again") from None
     if "joints" not in arrays:
         raise ValueError(f"{path}: has no array 'joints'; expected {_WHAT}: add it")
-    try:
+    with prefixed(path, f"; expected {_WHAT}"):
         return _people(path, arrays, files)
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}; expected {_WHAT}") from None
 
 
 def _people(path: Path, arrays: dict[str, Any], files: PeopleFiles) -> People:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from mvpose.files.input_files import read_bytes
+from mvpose.files.message_text import prefixed
 from mvpose.formats.joint_names import JointNames, skeleton_of
 from mvpose.formats.people.people_files import (
     METRES,
@@ -96,7 +97,7 @@ def _read_person(path: Path, files: PeopleFiles) -> People:
         raise ValueError(f"{path}: has no frames; expected {_WHAT}")
     markers = metres * np.array(values).reshape(-1, len(names), 3)
     markers[~np.isfinite(markers).all(axis=-1)] = np.nan
-    try:
+    with prefixed(path):
         return People(
             files.times(np.array(numbers), times, rate=rate),
             np.array([identity_of(path)]),
@@ -104,8 +105,6 @@ def _read_person(path: Path, files: PeopleFiles) -> People:
             skeleton=skeleton_of(JointNames(path.name, names)),
             numbers=np.array(numbers),
         )
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def _units_and_rate(path: Path, header: list[str]) -> tuple[float, float]:

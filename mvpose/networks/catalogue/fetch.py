@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from mvpose.files.atomic_files import atomic_folder
-from mvpose.files.message_text import one_line
+from mvpose.files.message_text import one_line, prefixed
 from mvpose.networks.catalogue.published import PACKAGE, PACKAGE_LICENCE, PublishedNetwork
 from mvpose.networks.catalogue.store import own_folder
 from mvpose.networks.catalogue.tfjs_conversion import convert
@@ -82,7 +82,7 @@ def converted(network: PublishedNetwork, graph: bytes, weights: bytes) -> bytes:
     Raises:
         ValueError: a graph that cannot be converted.
     """
-    try:
+    with prefixed(f"network {network.name}"):
         model = convert(
             read_graph(graph, weights),
             pictures=network.pictures,
@@ -90,8 +90,6 @@ def converted(network: PublishedNetwork, graph: bytes, weights: bytes) -> bytes:
             sigmoid=network.sigmoid,
             card=network.card,
         )
-    except ValueError as error:
-        raise ValueError(f"network {network.name}: {error}") from None
     return bytes(model.SerializeToString())
 
 
