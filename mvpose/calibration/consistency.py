@@ -10,11 +10,9 @@ Tracklets are matched as a whole over seconds. Single poses of different people 
 people who move rarely do.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -47,7 +45,7 @@ class Reading:
     exchanged: Bools
 
     @classmethod
-    def as_given(cls, cameras: Floats) -> Reading:
+    def as_given(cls, cameras: Floats) -> Self:
         """Return the reading that takes the files as they are."""
         pixels = np.zeros((len(cameras), 2, 3))
         pixels[:, 0, 0] = pixels[:, 1, 1] = 1.0
@@ -72,25 +70,20 @@ class Consistency:
 
         Entries below the diagonal are 0.
         """
-        views = len(reading.cameras)
-        keys = [_key(reading, view) for view in range(views)]
-        result = np.zeros((views, views, self.pieces.windows))
-        for i in range(views):
-            for j in range(i + 1, views):
-                result[i, j] = self._pair(reading, keys, i, j)
-        return result
+        return self._of_pairs(reading, self._pair)
 
     def ideal(self, reading: Reading) -> Floats:
         """Return what ``self(reading)`` would be if rays of the same people met as well as the errors allow, (V, V, W).
 
         All that is seen in both views at a time counts, whether it is of the same people or not.
         """
-        views = len(reading.cameras)
-        keys = [_key(reading, view) for view in range(views)]
-        result = np.zeros((views, views, self.pieces.windows))
-        for i in range(views):
-            for j in range(i + 1, views):
-                result[i, j] = best_evidence(*self._views(reading, keys, i, j), True)
+        return self._of_pairs(reading, lambda *pair: best_evidence(*self._views(*pair), True))
+
+    def _of_pairs(self, reading: Reading, value: Callable[[Reading, list[bytes], int, int], Floats]) -> Floats:
+        keys = [_key(reading, view) for view in range(len(reading.cameras))]
+        result = np.zeros((len(keys), len(keys), self.pieces.windows))
+        for i, j in zip(*np.triu_indices(len(keys), 1), strict=True):
+            result[i, j] = value(reading, keys, int(i), int(j))
         return result
 
     def agreement(self, reading: Reading) -> Floats:

@@ -7,10 +7,9 @@ is applied, and the search goes on with it, so that several cameras may have mis
 The findings name the mistakes and how to mend the files.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -142,7 +141,7 @@ class _Moved:
     largest: float
 
     @classmethod
-    def corrected(cls, consistency: Consistency, reading: Reading, correction: Callable[[Reading], Reading]) -> _Moved:
+    def corrected(cls, consistency: Consistency, reading: Reading, correction: Callable[[Reading], Reading]) -> Self:
         """Return a reading with corrected cameras."""
         moved = correction(reading)
         before, after = reading.cameras, moved.cameras
@@ -157,7 +156,7 @@ class _Moved:
         """Whether the corrections are plausible for cameras that were measured by eye, and smaller than for a crop."""
         return self.unlikely < _PLAUSIBLE * 3.0 * len(self.reading.cameras) and self.largest < _LARGEST_TURN
 
-    def explains_more_than(self, other: _Moved) -> bool:
+    def explains_more_than(self, other: Self) -> bool:
         """Whether it is clearly likelier than another reading, moves of the cameras included."""
         gain = _TEMPER * (self.evidence - other.evidence) - (self.unlikely - other.unlikely)
         return gain > _LEAST_ODDS

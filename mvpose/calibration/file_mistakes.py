@@ -60,152 +60,76 @@ TURNED = Mistake("moved-camera", 0.05, "{who} is turned against its calibration"
 
 def _changes() -> Iterator[tuple[Mistake, Change]]:
     """Yield each mistake with the change that undoes it."""
-    yield (
-        Mistake(
-            "extrinsics-inverted",
-            4.0,
-            "the extrinsics of {who} map from camera to world; mvpose expects world to camera",
-            "inverted",
-        ),
-        extrinsics(lambda R, t, C: (R.T, t)),
-    )
+    text = "the extrinsics of {who} map from camera to world; mvpose expects world to camera"
+    yield Mistake("extrinsics-inverted", 4.0, text, "inverted"), extrinsics(lambda R, t, C: (R.T, t))
     transposed = Mistake("rotation-transposed", 2.0, "the rotation of {who} is transposed", "transposed")
     yield transposed, extrinsics(lambda R, t, C: (R.T, -R @ t))
-    yield (
-        replace(transposed, mend="transposed-in-place"),
-        extrinsics(lambda R, t, C: (R.T, C)),
-    )
-    center = Mistake(
-        "translation-is-center",
-        2.0,
-        "the translation of {who} is the position of the camera in the world",
-        "t-is-center",
-    )
+    yield replace(transposed, mend="transposed-in-place"), extrinsics(lambda R, t, C: (R.T, C))
+    text = "the translation of {who} is the position of the camera in the world"
+    center = Mistake("translation-is-center", 2.0, text, "t-is-center")
     yield center, extrinsics(lambda R, t, C: (R, t))
-    yield (
-        replace(
-            center,
-            text="the position of {who} was read as a translation twice",
-            mend="center-is-t",
-        ),
-        extrinsics(lambda R, t, C: (R, -R.T @ C)),
-    )
-    gl = Mistake(
-        "axis-flipped",
-        1.0,
-        "the axes of {who} are those of OpenGL and Blender (y up, z backwards); mvpose expects y down, z forward",
-        "opengl",
-    )
+    text = "the position of {who} was read as a translation twice"
+    yield replace(center, text=text, mend="center-is-t"), extrinsics(lambda R, t, C: (R, -R.T @ C))
+    text = "the axes of {who} are those of OpenGL and Blender (y up, z backwards); mvpose expects y down, z forward"
+    gl = Mistake("axis-flipped", 1.0, text, "opengl")
     yield gl, extrinsics(lambda R, t, C: (_GL @ R, C))
-    yield (
-        replace(
-            gl,
-            text="the extrinsics of {who} are those of OpenGL, Blender or NeRF from camera to world",
-            mend="opengl-inverted",
-        ),
-        extrinsics(lambda R, t, C: (_GL @ R.T, t)),
-    )
+    text = "the extrinsics of {who} are those of OpenGL, Blender or NeRF from camera to world"
+    yield replace(gl, text=text, mend="opengl-inverted"), extrinsics(lambda R, t, C: (_GL @ R.T, t))
     turned = replace(gl, prior=0.5, text="{who}: two axes of the camera point the other way")
     for which, signs in (("xy", [-1.0, -1.0, 1.0]), ("xz", [-1.0, 1.0, -1.0])):
         yield replace(turned, mend=f"flipped-{which}"), extrinsics(turned_camera(np.diag(signs)))
-    world = replace(
-        gl, prior=0.5, of_all=False, text="the world of {who} has another vertical axis than that of the others"
-    )
+    text = "the world of {who} has another vertical axis than that of the others"
+    world = replace(gl, prior=0.5, text=text, of_all=False)
     for mend, turn in (("world-y-up", _UP), ("world-y-down", _UP.T)):
         yield replace(world, mend=mend), extrinsics(turned_world(turn))
     for factor, unit in ((1e-3, "millimetres"), (1e-2, "centimetres"), (0.1, "decimetres"), (0.0254, "inches")):
-        for scale, text in (
-            (factor, f"the translation of {{who}} is in {unit}"),
-            (1.0 / factor, f"the translation of {{who}} was divided by {1 / factor:g}"),
-        ):
-            size = (("factor", scale),)
-            yield (
-                Mistake("wrong-unit", 0.5, text, f"unit:{scale:.6g}", size=size, of_all=False),
-                extrinsics(rescaled(scale)),
-            )
+        given, divided = f"is in {unit}", f"was divided by {1 / factor:g}"
+        for scale, what in ((factor, given), (1.0 / factor, divided)):
+            text, size = f"the translation of {{who}} {what}", (("factor", scale),)
+            wrong = Mistake("wrong-unit", 0.5, text, f"unit:{scale:.6g}", size=size, of_all=False)
+            yield wrong, extrinsics(rescaled(scale))
     for factor in (0.25, 1 / 3, 0.5, 2 / 3, 0.75, 4 / 3, 1.5, 2.0, 3.0, 4.0):
         text = f"the pictures of {{who}} are {1 / factor:.3g} times as large as those of the calibration"
         mend = f"resolution:{1 / factor:.6g}"
         yield Mistake("image-size", 0.4, text, mend, size=(("times", 1.0 / factor),)), scaled_picture(factor)
-    axes = Mistake(
-        "axes-swapped",
-        1.0,
-        "x and y of the keypoints of {who} are exchanged",
-        "",
-        "exchange x and y of the keypoints in the files of {who}",
-    )
-    yield axes, mapped_pixels(lambda w, h: [[0, 1, 0], [1, 0, 0]])
-    for mend, text, matrix in (
-        ("rotated-clockwise", "clockwise", lambda w, h: [[0, 1, 0], [-1, 0, h - 1]]),
-        ("rotated-anticlockwise", "anticlockwise", lambda w, h: [[0, -1, w - 1], [1, 0, 0]]),
-    ):
-        yield (
-            replace(
-                axes,
-                text=f"the pictures of {{who}} are turned by 90 degrees {text} against those of the calibration",
-                mend=mend,
-                advice="",
-            ),
-            mapped_pixels(matrix),
-        )
-    flipped = Mistake("axis-flipped", 0.5, "", "")  # of x in all pictures: the same to the views as mirrored pictures
-    yield (
-        replace(
-            flipped,
-            text="y of the keypoints of {who} counts from the lower edge; mvpose expects it from the upper one",
-            advice="count y of the keypoints in the files of {who} from the upper edge: height - 1 - y",
-        ),
-        mapped_pixels(lambda w, h: [[1, 0, 0], [0, -1, h - 1]]),
-    )
-    yield (
-        replace(
-            flipped,
-            text="x of the keypoints of {who} counts from the right edge; mvpose expects it from the left one",
-            advice="count x of the keypoints in the files of {who} from the left edge: width - 1 - x",
-            of_all=False,
-        ),
-        mapped_pixels(lambda w, h: [[-1, 0, w - 1], [0, 1, 0]]),
-    )
-    yield (
-        Mistake(
-            "mirrored-view",
-            1.0,
-            "the pictures of {who} are mirrored",
-            "mirrored",
-            "mirror the pictures of {who} back before the detection",
-        ),
-        mapped_pixels(lambda w, h: [[-1, 0, w - 1], [0, 1, 0]], exchanged=True),
-    )
-    yield (
-        Mistake(
-            "left-right-exchanged",
-            0.5,
-            "left and right joints of {who} have each other's names",
-            "",
-            "exchange left and right joints in the files of {who}, or detect again in pictures that are not mirrored",
-            of_all=False,
-        ),
-        exchanged_sides,
-    )
-    model = Mistake(
-        "distortion-model",
-        1.0,
-        "the keypoints of {who} are of pictures whose distortion was removed already",
-        "undistorted",
-    )
+    yield from _changes_of_pixels()
+    text = "the keypoints of {who} are of pictures whose distortion was removed already"
+    model = Mistake("distortion-model", 1.0, text, "undistorted")
     yield model, other_lens(lambda terms: np.zeros(5))
-    yield (
-        replace(model, text="the distortion of {who} has the other sign", mend="distortion-sign"),
-        other_lens(lambda terms: -terms),
-    )
-    yield (
-        replace(
-            model,
-            text="the distortion terms of {who} are in the order k1 k2 k3 p1 p2; mvpose expects k1 k2 p1 p2 k3",
-            mend="distortion-order",
-        ),
-        other_lens(lambda terms: terms[[0, 1, 3, 4, 2]]),
-    )
+    text = "the distortion of {who} has the other sign"
+    yield replace(model, text=text, mend="distortion-sign"), other_lens(lambda terms: -terms)
+    text = "the distortion terms of {who} are in the order k1 k2 k3 p1 p2; mvpose expects k1 k2 p1 p2 k3"
+    yield replace(model, text=text, mend="distortion-order"), other_lens(lambda terms: terms[[0, 1, 3, 4, 2]])
+
+
+def _changes_of_pixels() -> Iterator[tuple[Mistake, Change]]:
+    """Yield mistakes about axes of pictures and sides of people."""
+    text = "x and y of the keypoints of {who} are exchanged"
+    advice = "exchange x and y of the keypoints in the files of {who}"
+    axes = Mistake("axes-swapped", 1.0, text, "", advice)
+    yield axes, mapped_pixels(lambda w, h: [[0, 1, 0], [1, 0, 0]])
+    for way, matrix in (
+        ("clockwise", lambda w, h: [[0, 1, 0], [-1, 0, h - 1]]),
+        ("anticlockwise", lambda w, h: [[0, -1, w - 1], [1, 0, 0]]),
+    ):
+        text = f"the pictures of {{who}} are turned by 90 degrees {way} against those of the calibration"
+        yield replace(axes, text=text, mend=f"rotated-{way}", advice=""), mapped_pixels(matrix)
+    text = "y of the keypoints of {who} counts from the lower edge; mvpose expects it from the upper one"
+    advice = "count y of the keypoints in the files of {who} from the upper edge: height - 1 - y"
+    yield Mistake("axis-flipped", 0.5, text, "", advice), mapped_pixels(lambda w, h: [[1, 0, 0], [0, -1, h - 1]])
+    # Of x in all pictures: the same to the views as mirrored pictures.
+    text = "x of the keypoints of {who} counts from the right edge; mvpose expects it from the left one"
+    advice = "count x of the keypoints in the files of {who} from the left edge: width - 1 - x"
+    yield Mistake("axis-flipped", 0.5, text, "", advice, of_all=False), mapped_pixels(_mirrored)
+    text, advice = "the pictures of {who} are mirrored", "mirror the pictures of {who} back before the detection"
+    yield Mistake("mirrored-view", 1.0, text, "mirrored", advice), mapped_pixels(_mirrored, exchanged=True)
+    text = "left and right joints of {who} have each other's names"
+    advice = "exchange left and right joints in the files of {who}, or detect again in pictures that are not mirrored"
+    yield Mistake("left-right-exchanged", 0.5, text, "", advice, of_all=False), exchanged_sides
+
+
+def _mirrored(width: int, height: int) -> list[list[float]]:
+    return [[-1, 0, width - 1], [0, 1, 0]]
 
 
 CHANGES = tuple(_changes())

@@ -4,13 +4,11 @@ A finding is an *alarm* where the calibration, the clocks or the pictures are wr
 where a difference is measured that good rigs have as well; and *unknown* where the recording does not determine it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 
@@ -221,7 +219,7 @@ class Diagnosis(Sealed):
         residuals: Floats,
         usual: Floats | None = None,
         within: Mapping[str, float] = MappingProxyType({}),
-    ) -> Diagnosis:
+    ) -> Self:
         """Return the diagnosis of findings, with the verdict that follows from them.
 
         Findings are given in the order in which their mends are applied.

@@ -6,10 +6,8 @@ Applications", 1996), over so many of them that its error is the same at a pictu
 neighbours would not do: half-way between them it averages their errors, and views would agree best half a frame apart.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -20,6 +18,20 @@ from mvpose.kernels import njit
 
 _BANDWIDTH = 0.3  # s, on each side: most of the swing of a limb (once a second: Winter 2009) is left
 _FRAMES = 1.6  # least bandwidth in frames: a neighbour on each side has weight
+
+
+class TrackSamples(NamedTuple):
+    """Tracks at K times.
+
+    Attributes:
+        points: normalised coordinates, (G, V, K, 2); NaN where the track is not known.
+        velocities: their change, (G, V, K, 2), 1/s.
+        sigma: standard deviation of the keypoints around, (G, V, K).
+    """
+
+    points: Floats
+    velocities: Floats
+    sigma: Floats
 
 
 @dataclass(frozen=True)
@@ -43,7 +55,7 @@ class ImageTracks:
     period: float
 
     @classmethod
-    def of_sightings(cls, rig: Rig, sightings: Sightings, *, without: Bools | None = None) -> ImageTracks:
+    def of_sightings(cls, rig: Rig, sightings: Sightings, *, without: Bools | None = None) -> Self:
         """Return the tracks of sightings.
 
         Args:
@@ -72,20 +84,6 @@ class ImageTracks:
         """Return the tracks of each view at times (K, V), seconds by the clock of the view."""
         bandwidth = max(_BANDWIDTH, _FRAMES * self.period)
         return TrackSamples(*_sample(self.points, self.sigma, self.times, np.ascontiguousarray(at), bandwidth))
-
-
-class TrackSamples(NamedTuple):
-    """Tracks at K times.
-
-    Attributes:
-        points: normalised coordinates, (G, V, K, 2); NaN where the track is not known.
-        velocities: their change, (G, V, K, 2), 1/s.
-        sigma: standard deviation of the keypoints around, (G, V, K).
-    """
-
-    points: Floats
-    velocities: Floats
-    sigma: Floats
 
 
 def _of_shared_people(sightings: Sightings) -> Bools:

@@ -6,11 +6,10 @@ that what is written is what was examined. Pictures that are other than those of
 cropped, turned) change the intrinsics of the cameras, as the pictures stay.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -50,7 +49,7 @@ class Mend:
     cameras: tuple[str, ...] = ()
 
     @classmethod
-    def parsed(cls, text: str) -> Mend:
+    def parsed(cls, text: str) -> Self:
         """Return the mend of a text.
 
         Raises:

@@ -15,9 +15,8 @@ wrong tracklet among right ones would be taken for a camera that moved, because 
 people whose keypoints in one view fit much worse than the rest are left out there (:func:`without_mismatches`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -31,6 +30,7 @@ from mvpose.calibration.joint_elimination import (
     triangulate,
 )
 from mvpose.calibration.sightings import Sightings
+from mvpose.calibration.tracklets import frame_times
 from mvpose.camera import Camera
 
 ROTATION, TRANSLATION, POSE = slice(0, 3), slice(3, 6), slice(0, 6)
@@ -88,23 +88,15 @@ class JointViews:
         """Joint of each sighting, (k,)."""
         return np.repeat(np.arange(len(self.start) - 1), np.diff(self.start))
 
-    def of_person(self, person: int) -> JointViews:
+    def of_person(self, person: int) -> Self:
         """Return the joints of one person, in the same blocks of time."""
         joints = self.person == person
         counts = np.diff(self.start)
         rows = np.repeat(joints, counts)
-        return JointViews(
-            np.append(0, np.cumsum(counts[joints])),
-            self.block[joints],
-            self.person[joints],
-            self.view[rows],
-            self.pixels[rows],
-            self.sigma[rows],
-            self.velocity[rows],
-            self.blocks,
-            None if self.cluster is None else self.cluster[joints],
-            None if self.importance is None else self.importance[joints],
-        )
+        of_joints = {name: getattr(self, name) for name in ("block", "person", "cluster", "importance")}
+        chosen = {name: None if values is None else values[joints] for name, values in of_joints.items()}
+        chosen |= {name: getattr(self, name)[rows] for name in ("view", "pixels", "sigma", "velocity")}
+        return replace(self, start=np.append(0, np.cumsum(counts[joints])), **chosen)
 
 
 @dataclass(frozen=True)
@@ -252,9 +244,8 @@ def joint_views(sightings: Sightings) -> tuple[JointViews, Integers]:
     Returns:
         The joints by blocks of time, and the row of each of their sightings among those given, (k,).
     """
-    when = np.full(len(sightings.times), np.nan)
-    pictures = np.isfinite(sightings.times).any(axis=1)
-    when[pictures] = np.nanmedian(sightings.times[pictures], axis=1)
+    when = frame_times(sightings.times)
+    pictures = np.isfinite(when)
     slot = np.where(pictures, np.floor((when - when[pictures].min(initial=np.inf)) / _JOINT_SPACING + 1e-9), -1)
     chosen = np.zeros(len(when), np.bool_)
     chosen[np.unique(slot, return_index=True)[1]] = True

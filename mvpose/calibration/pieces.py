@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mvpose.arrays import Floats, Integers
-from mvpose.calibration.tracklets import Tracklets, chosen_frames
+from mvpose.calibration.tracklets import Tracklets, chosen_frames, frame_times
 
 _SPACING = 0.2  # seconds between frames that are compared; errors of detectors last longer
 _WINDOW = 2.0  # seconds over which tracklets are matched as a whole; in it a walking person takes four steps
@@ -52,8 +52,7 @@ def cut_into_windows(tracklets: Tracklets, *, spacing: float = _SPACING, window:
     """Return the detections of frames about ``spacing`` seconds apart, in windows of ``window`` seconds."""
     views = tracklets.times.shape[1]
     chosen = chosen_frames(tracklets, spacing=spacing)
-    when = np.full(len(chosen), np.nan)
-    when[chosen] = np.nanmedian(tracklets.times[chosen], axis=1)
+    when = frame_times(tracklets.times)
     kept = chosen[tracklets.frame]
     frame, view, tracklet = tracklets.frame[kept], tracklets.view[kept], tracklets.tracklet[kept]
     number = np.floor((when[frame] - when[chosen].min(initial=np.inf)) / window + 1e-9).astype(np.int64)

@@ -1,9 +1,8 @@
 """Sightings: keypoints matched over time and views, the input of all that judges or repairs a rig."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -80,20 +79,10 @@ class Sightings(Sealed):
         """Number of views, V, also those without a sighting."""
         return self.times.shape[1]
 
-    def select(self, which: Bools | Integers) -> Sightings:
+    def select(self, which: Bools | Integers) -> Self:
         """Return some sightings, by a mask (k,) or by indices."""
-        assert self.velocity is not None
-        return Sightings(
-            self.frame[which],
-            self.view[which],
-            self.person[which],
-            self.joint[which],
-            self.pixels[which],
-            self.sigma[which],
-            self.times,
-            self.skeleton,
-            self.velocity[which],
-        )
+        names = ("frame", "view", "person", "joint", "pixels", "sigma", "velocity")
+        return replace(self, **{name: getattr(self, name)[which] for name in names})
 
     @property
     def points(self) -> tuple[Integers, int]:

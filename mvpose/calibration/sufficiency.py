@@ -4,10 +4,9 @@ Views may contribute nothing: those without detections, or with detections of ot
 Pictures that are mirrored and exchanged names of left and right are among the conventions (:mod:`.conventions`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -45,6 +44,38 @@ at another time, 0.85 and more for cameras that see the same people (simulated r
 
 _MAJORITY = 0.60  # mean agreement of the other views, below which they see different people themselves
 _SHARED = 0.40  # agreement from which two views see the same people
+
+
+@dataclass(frozen=True)
+class PairAgreement:
+    """How well pairs of views agree.
+
+    Attributes:
+        pairs: evidence of each pair as a share of what it would be without errors, (V, V), 0 to 1; NaN where the two
+            views have no detections at the same time.
+    """
+
+    pairs: Floats
+
+    @classmethod
+    def measured(cls, consistency: Consistency, *readings: Reading) -> Self:
+        """Return the agreement of all pairs of views, at each time under the best of some readings."""
+        evidence = np.max([consistency(each) for each in readings], axis=0).sum(axis=2)
+        ideal = consistency.ideal(readings[0]).sum(axis=2)
+        evidence, ideal = evidence + evidence.T, ideal + ideal.T
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return cls(np.where(ideal > 0, evidence / ideal, np.nan))
+
+    @property
+    def best(self) -> Floats:
+        """Agreement of each view with the one that it agrees with best, (V,); 0 without any."""
+        return np.nan_to_num(self.pairs).max(axis=1)
+
+    @property
+    def mean(self) -> Floats:
+        """Mean agreement of each view with the others, (V,); 0 without any."""
+        known = np.isfinite(self.pairs)
+        return np.where(known, self.pairs, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
 
 
 def travelled(places: Floats) -> float:
@@ -123,38 +154,6 @@ def _uncertainty(fit: CameraFit, view: int) -> tuple[float, float]:
 
 def _cannot(text: str, mend: str, camera: str | None = None, view: int | None = None) -> Finding:
     return Finding("cannot-tell", f"cannot tell: {text}", "unknown", 0.5, camera, view, cost=0.0, mend=mend)
-
-
-@dataclass(frozen=True)
-class PairAgreement:
-    """How well pairs of views agree.
-
-    Attributes:
-        pairs: evidence of each pair as a share of what it would be without errors, (V, V), 0 to 1; NaN where the two
-            views have no detections at the same time.
-    """
-
-    pairs: Floats
-
-    @classmethod
-    def measured(cls, consistency: Consistency, *readings: Reading) -> PairAgreement:
-        """Return the agreement of all pairs of views, at each time under the best of some readings."""
-        evidence = np.max([consistency(each) for each in readings], axis=0).sum(axis=2)
-        ideal = consistency.ideal(readings[0]).sum(axis=2)
-        evidence, ideal = evidence + evidence.T, ideal + ideal.T
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return cls(np.where(ideal > 0, evidence / ideal, np.nan))
-
-    @property
-    def best(self) -> Floats:
-        """Agreement of each view with the one that it agrees with best, (V,); 0 without any."""
-        return np.nan_to_num(self.pairs).max(axis=1)
-
-    @property
-    def mean(self) -> Floats:
-        """Mean agreement of each view with the others, (V,); 0 without any."""
-        known = np.isfinite(self.pairs)
-        return np.where(known, self.pairs, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
 
 
 def silent_views(detections: Integers, names: Sequence[str]) -> list[Finding]:

@@ -146,13 +146,8 @@ def link(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) -> Tra
         tracklet[chosen] = links + count
         count += int(links.max(initial=-1)) + 1
     order = np.lexsort((number, tracklet))
-    tracklet, number, view, keypoints, sigma = (
-        tracklet[order],
-        number[order],
-        view[order],
-        keypoints[order],
-        sigma[order],
-    )
+    tracklet, number, view = tracklet[order], number[order], view[order]
+    keypoints, sigma = keypoints[order], sigma[order]
     velocity = _velocities(tracklet, times[number, view], keypoints, _WINDOW)
     descriptors = None
     if all(each.descriptors is not None for each in kept):

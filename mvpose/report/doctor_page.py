@@ -1,13 +1,11 @@
 """Page of the doctor: what is wrong with a rig, in plain words and in pictures, before and after the repair."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from markupsafe import Markup
@@ -24,6 +22,7 @@ from mvpose.report import doctor_drawings as drawings
 from mvpose.report.documents import fill_template, program_version
 from mvpose.report.leave_one_out import Missing, leave_one_out, mean_field
 from mvpose.report.picture_drawings import Pictures, picture_element
+from mvpose.report.tables import number
 from mvpose.report.verdict import quantities, sentence, sentence_of
 
 PAGE, NUMBERS = "doctor.html", "doctor.json"
@@ -121,7 +120,7 @@ class DoctorCase:
     after: Missing | None
 
     @classmethod
-    def of(cls, rig: Rig, sightings: Sightings, diagnosis: Diagnosis, repair: Repair | None) -> DoctorCase:
+    def of(cls, rig: Rig, sightings: Sightings, diagnosis: Diagnosis, repair: Repair | None) -> Self:
         """Compare the sightings with both rigs."""
         after = None
         if repair is not None and repair.refused is None:
@@ -184,16 +183,16 @@ def _cameras(case: DoctorCase) -> list[dict[str, Any]]:
         usual = math.nan if case.diagnosis.usual is None else float(case.diagnosis.usual[view])
         row: dict[str, Any] = {
             "name": name,
-            "before": _pixels(before[view]),
+            "before": number(before[view]),
             "large": before[view] >= ALARM["times_usual"] * usual,
-            "usual": _pixels(usual),
+            "usual": number(usual),
             "accused": view in case.accused,
         }
         if after is not None and case.repair is not None:
             correction, covariance = case.repair.corrections[view], case.repair.covariance[view]
             row["turned"] = _with_spread(correction[:3], covariance[:3, :3], 180.0 / math.pi, "°", 2)
             row["moved"] = _with_spread(correction[3:], covariance[3:, 3:], 100.0, " cm", 1)
-            row["after"] = _pixels(after[view])
+            row["after"] = number(after[view])
         rows.append(row)
     return rows
 
@@ -206,10 +205,6 @@ def _with_spread(vector: Floats, covariance: Floats, factor: float, unit: str, d
     along = vector / length if length > 0 else np.array([1.0, 0.0, 0.0])
     spread = _NINETY * math.sqrt(max(float(along @ covariance @ along), 0.0))
     return f"{factor * length:.{digits}f}{unit} ± {factor * spread:.{digits}f}"
-
-
-def _pixels(value: float) -> str:
-    return f"{value:.1f}" if math.isfinite(value) else "–"
 
 
 def _fields(case: DoctorCase) -> dict[str, Any] | None:
@@ -232,7 +227,7 @@ def _fields(case: DoctorCase) -> dict[str, Any] | None:
         for kind, missing in kinds.items():
             field = fields[view, kind]
             parts += drawings.draw_field(camera, field, kind=kind, factor=factor)
-            notes.append(_pixels(case.residuals(missing)[view]))
+            notes.append(number(case.residuals(missing)[view]))
         label = f"residual arrows of camera {case.names[view]}"
         views.append(
             {
@@ -276,12 +271,12 @@ def _lines(case: DoctorCase, pictures: Pictures | None) -> dict[str, Any] | None
         views.append({"name": case.names[view], "svg": Markup(element)})
     rows = [
         {
-            "number": number + 1,
+            "number": row + 1,
             "joint": joint.name,
-            "before": _pixels(drawings.distance_from_line(*before, joint)),
-            "after": "" if after is None else _pixels(drawings.distance_from_line(*after, joint)),
+            "before": number(drawings.distance_from_line(*before, joint)),
+            "after": "" if after is None else number(drawings.distance_from_line(*after, joint)),
         }
-        for number, joint in enumerate(joints)
+        for row, joint in enumerate(joints)
     ]
     return {"views": views, "rows": rows, "frame": joints[0].frame}
 

@@ -7,13 +7,11 @@ freedom that the estimate states, and else with the three that a joint's error h
 beside real errors.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -67,7 +65,7 @@ class ExaminedRecording:
     group: Integers
 
     @classmethod
-    def of(cls, people: People, rig: Rig, frames: Sequence[Detections]) -> ExaminedRecording:
+    def of(cls, people: People, rig: Rig, frames: Sequence[Detections]) -> Self:
         """Measure a recording."""
         seen = reproject(rig, frames, people)
         supports, views = supporting_views(seen, people), views_of_people(seen, people)

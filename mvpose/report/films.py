@@ -4,19 +4,17 @@ VP9 in MP4, or VP8 in WebM without PyAV (:mod:`.film_file`). Drawings look as th
 (:mod:`.picture_drawings`): broad limbs for people in 3D, thin lines with dots for detections.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats, Integers
+from mvpose.camera import Camera
 from mvpose.files.message_text import one_line
 from mvpose.report.examined_recording import ExaminedRecording
 from mvpose.report.film_file import FilmFile, film_suffix
@@ -24,9 +22,6 @@ from mvpose.report.limbs import SMALL_FACE, face_of, limbs_of, plain_face
 from mvpose.report.overlay import USUAL_HEIGHT, Overlay
 from mvpose.report.palette import INK, TRUTH, UNMATCHED, Color, identity_color
 from mvpose.report.picture_drawings import jpeg_uri, near_picture
-
-if TYPE_CHECKING:
-    from mvpose.camera import Camera
 
 Rgb = NDArray[np.uint8]
 MovingPictures = Callable[[int, Integers], Iterator[Rgb | None]]

@@ -88,8 +88,8 @@ def residual_table(
     return Table((*(Cell(name) for name in names), Cell("all")), (*body, ("all", last)), total=True)
 
 
-def _shaded(value: float, most: float) -> Cell:
-    return Cell(number(value), share=value / most if math.isfinite(value) and most > 0 else 0.0)
+def _shaded(value: float, most: float, digits: int = 1) -> Cell:
+    return Cell(number(value, digits), share=value / most if math.isfinite(value) and most > 0 else 0.0)
 
 
 def error_table(errors: Floats, by_group: Floats, groups: Sequence[str], people: People, rows: Sequence[int]) -> Table:
@@ -105,15 +105,11 @@ def error_table(errors: Floats, by_group: Floats, groups: Sequence[str], people:
     shown = 1000 * by_group[list(rows)]
     most = float(np.nanmax(shown)) if np.isfinite(shown).any() else 1.0
     body = [
-        (name, tuple(_rounded(value, most) for value in column))
+        (name, tuple(_shaded(value, most, 0) for value in column))
         for name, column in zip(groups, shown.T.tolist(), strict=True)
     ]
     last = tuple(Cell(number(1000 * errors[row], 0)) for row in rows)
     return Table(_heads(people, rows), (*body, ("all joints", last)), total=True)
-
-
-def _rounded(value: float, most: float) -> Cell:
-    return Cell(number(value, 0), share=value / most if math.isfinite(value) and most > 0 else 0.0)
 
 
 def bone_table(bones: Sequence[Bone], people: People, rows: Sequence[int]) -> Table:

@@ -3,13 +3,11 @@
 Without scripts, and in print, a still drawing shows the view as it is at first.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from markupsafe import Markup
@@ -90,7 +88,7 @@ class Piece3D:
     style: Style3D
 
     @classmethod
-    def of_lines(cls, lines: Sequence[Floats], style: Style3D) -> Piece3D:
+    def of_lines(cls, lines: Sequence[Floats], style: Style3D) -> Self:
         """Return separate lines, each (2, 3) metres."""
         pairs = tuple((2 * k, 2 * k + 1) for k in range(len(lines)))
         return cls(np.concatenate([np.zeros((0, 3)), *lines]), Shape3D(lines=pairs), style)
@@ -207,7 +205,7 @@ class _Eye(NamedTuple):
     extent: tuple[float, float, float]
 
     @classmethod
-    def of(cls, scene: Scene3D) -> _Eye:
+    def of(cls, scene: Scene3D) -> Self:
         points = scene.fitted[np.isfinite(scene.fitted).all(axis=1)]
         offsets = points - scene.center
         radius = max(_LEAST_RADIUS, float(np.linalg.norm(offsets[:, :2], axis=1).max(initial=0.0)))

@@ -13,9 +13,7 @@ Where a camera has moved so far that its detections fit nobody, no keypoint show
 whom other cameras see in its picture, while the detections there belong to nobody.
 """
 
-from __future__ import annotations
-
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -80,7 +78,7 @@ class Charts(NamedTuple):
     since: Floats
 
     @classmethod
-    def empty(cls, cameras: int) -> Charts:
+    def empty(cls, cameras: int) -> Self:
         """Return the charts of cameras that nobody has looked at."""
         V, nan = cameras, np.nan
         return cls(

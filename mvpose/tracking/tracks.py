@@ -1,7 +1,5 @@
 """Tracked people as arrays, the lost ones who may come back, and what a tracker knows after a frame."""
 
-from __future__ import annotations
-
 from copy import copy as shallow_copy
 from dataclasses import dataclass, fields, replace
 from typing import NamedTuple, Self
@@ -81,28 +79,11 @@ class Tracks:
     @classmethod
     def none(cls, *, joints: int, bones: int, cameras: int, dimensions: int = 0) -> Self:
         """Return an empty set of tracks."""
-        real, truth = np.float64, np.bool_
-        return cls(
-            ids=np.empty(0, np.int64),
-            state=np.empty((0, joints, 6), real),
-            covariance=np.empty((0, joints, 6, 6), real),
-            scores=np.empty((0, joints), real),
-            length=np.empty((0, bones), real),
-            variance=np.empty((0, bones), real),
-            span=np.empty(0, real),
-            born_at=np.empty(0, real),
-            origin=np.empty((0, cameras), truth),
-            hits=np.empty((0, cameras), real),
-            misses=np.empty((0, cameras), real),
-            absent=np.empty((0, cameras), real),
-            found=np.empty((0, cameras), real),
-            anchor=np.empty((0, joints, 3), real),
-            moved=np.empty(0, real),
-            reported=np.empty(0, truth),
-            looks=np.empty((0, dimensions), real),
-            described=np.empty(0, real),
-            rival=np.empty(0, real),
-        )
+        scores, places = np.empty((0, joints)), np.empty((0, joints, 3))
+        poses, ids = Poses(places, scores, np.empty((0, joints, 3, 3)), scores), np.empty(0, np.int64)
+        prior = BonePrior(np.zeros((bones, 2), np.int64), np.ones(bones), np.ones(bones))
+        speed, sizes = np.zeros(joints), {"cameras": cameras, "dimensions": dimensions}
+        return cls.born(poses, ids=ids, time=0.0, span=0.0, speed=speed, bones=prior, **sizes)
 
     @classmethod
     def born(
@@ -171,7 +152,7 @@ class Tracks:
         """Time since which no two cameras have found the track, (n,), seconds."""
         return np.sort(self.found, axis=1)[:, -2]
 
-    def resume(self, k: int, lost: Tracks, other: int) -> None:
+    def resume(self, k: int, lost: Self, other: int) -> None:
         """Give track k the identity of a lost one, with the bone lengths and the looks that it had learned."""
         self.ids[k] = lost.ids[other]
         self.length[k], self.variance[k] = lost.length[other], lost.variance[other]
