@@ -239,12 +239,9 @@ def _remark(fit: CameraFit, view: int, names: Sequence[str], depth: Floats, dete
     cost = (np.radians(size["degrees"]) * depth[view] + size["metres"]) / len(names)
     high = possible_errors(fit, view)
     if determined and not is_excluded(high):
-        text = (
-            f"{names[view]} may be off by up to {high['degrees']:.2f} degrees and {100 * high['metres']:.0f} cm: its "
-        )
-        text += (
-            f"estimated correction of {size['degrees']:.2f} degrees and {100 * size['metres']:.1f} cm is too uncertain"
-        )
+        text = f"{names[view]} may be off by up to {high['degrees']:.2f} degrees and {100 * high['metres']:.0f} cm: its"
+        text += f" estimated correction of {size['degrees']:.2f} degrees and {100 * size['metres']:.1f} cm is too "
+        text += "uncertain"
         return [Finding("moved-camera", text, "unknown", 0.5, names[view], view, size, interval, cost, repair=_REPAIR)]
     change, sigma = fit.change[view, :6], np.sqrt(np.diagonal(fit.covariance[view])[:6])
     if (np.abs(change) / sigma).max() < 3.0 or (size["degrees"] < 0.1 and size["metres"] < 0.01) or not determined:

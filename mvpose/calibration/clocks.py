@@ -17,7 +17,7 @@ from scipy.stats import t as student
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.calibration.clock_adjustment import ClockAdjustment, adjust
 from mvpose.calibration.clock_search import coarse_offsets
-from mvpose.calibration.findings import ALARM, NEW_TIMES, Finding, camera_names
+from mvpose.calibration.findings import ALARM, NEW_TIMES, Finding, Severity, camera_names
 from mvpose.calibration.joint_tracks import ImageTracks
 from mvpose.calibration.picture_order import ClockStep, find_step, joined_steps, repeated_pictures
 from mvpose.calibration.sightings import Sightings, gather
@@ -87,50 +87,36 @@ class Clocks(Sealed):
         for view, name in enumerate(self.names):
             ms, (low, high) = 1e3 * self.offsets[view], 1e3 * self.interval[view]
             if not self.determined[view]:
-                yield Finding(
-                    "clock-offset",
-                    f"the clock of {name} is not determined: people move too little where other cameras see them, too",
-                    severity="unknown",
-                    probability=0.5,
-                    camera=name,
-                    view=view,
-                    mend="record ten seconds of a person who walks where this camera and two others see them",
+                text = (
+                    f"the clock of {name} is not determined: people move too little where other cameras see them, too"
                 )
+                mend = "record ten seconds of a person who walks where this camera and two others see them"
+                yield Finding("clock-offset", text, "unknown", 0.5, name, view, mend=mend)
                 continue
             if low <= 0.0 <= high:
                 continue
             deviation = max((high - low) / 2 / norm.ppf((1 + _SHARE) / 2), 1e-6)
             harmful = ALARM["ms"]
             probability = norm.sf((harmful - ms) / deviation) + norm.cdf((-harmful - ms) / deviation)
-            alarm = max(low, -high) > harmful
+            late, cost = "later" if ms > 0 else "earlier", float(probability * _TYPICAL_SPEED * abs(ms) / 1e3)
             yield Finding(
-                "clock-offset",
-                f"{name} takes its pictures {abs(ms):.1f} ms {'later' if ms > 0 else 'earlier'} than their time stamps",
-                severity="alarm" if alarm else "note",
-                probability=float(probability),
-                camera=name,
-                view=view,
-                size={"ms": float(ms)},
-                interval={"ms": (float(low), float(high))},
-                cost=float(probability * _TYPICAL_SPEED * abs(ms) / 1e3),
-                repair=(NEW_TIMES, "TIMES"),
-            )
+                "clock-offset", f"{name} takes its pictures {abs(ms):.1f} ms {late} than their time stamps",
+                "alarm" if max(low, -high) > harmful else "note", float(probability), name, view, {"ms": float(ms)},
+                {"ms": (float(low), float(high))}, cost, repair=(NEW_TIMES, "TIMES"),
+            )  # fmt: skip
 
     def _dropped_findings(self) -> Iterable[Finding]:
         for step in self.steps:
             name, count = self.names[step.view], abs(step.frames)
             lost = "misses" if step.frames > 0 else "has"
+            kind = "dropped-pictures" if step.frames > 0 else "repeated-pictures"
+            text = f"{name} {lost} {count} picture{'s' * (count > 1)} {'too many ' * (step.frames < 0)}at "
+            text += f"{step.time:.2f} s: all later ones belong to {'later' if step.frames > 0 else 'earlier'} frames"
             yield Finding(
-                "dropped-pictures" if step.frames > 0 else "repeated-pictures",
-                f"{name} {lost} {count} picture{'s' * (count > 1)} {'too many ' * (step.frames < 0)}at "
-                f"{step.time:.2f} s: all later ones belong to {'later' if step.frames > 0 else 'earlier'} frames",
-                probability=float(1.0 - 2.0 * norm.sf(step.deviations)),
-                camera=name,
-                view=step.view,
-                size={"pictures": float(count), "since_s": step.time},
-                cost=_TYPICAL_SPEED * count * self.period,
+                kind, text, "alarm", float(1.0 - 2.0 * norm.sf(step.deviations)), name, step.view,
+                {"pictures": float(count), "since_s": step.time}, cost=_TYPICAL_SPEED * count * self.period,
                 repair=(NEW_TIMES, "TIMES"),
-            )
+            )  # fmt: skip
 
     def _repeated_findings(self) -> Iterable[Finding]:
         for view, name in enumerate(self.names):
@@ -138,16 +124,11 @@ class Clocks(Sealed):
             if not count:
                 continue
             share = count / max(int(np.isfinite(self.times[:, view]).sum()), 1)
-            yield Finding(
-                "repeated-pictures",
-                f"{name} delivers the same picture again in {count} frames ({100 * share:.1f} %)",
-                severity="alarm" if share > 0.01 else "note",
-                camera=name,
-                view=view,
-                size={"pictures": float(count), "percent": 100 * share},
-                cost=_TYPICAL_SPEED * self.period * share,
-                repair=(NEW_TIMES, "TIMES"),
-            )
+            text = f"{name} delivers the same picture again in {count} frames ({100 * share:.1f} %)"
+            size, cost = {"pictures": float(count), "percent": 100 * share}, _TYPICAL_SPEED * self.period * share
+            severity: Severity = "alarm" if share > 0.01 else "note"
+            repair = (NEW_TIMES, "TIMES")
+            yield Finding("repeated-pictures", text, severity, 1.0, name, view, size, cost=cost, repair=repair)
 
 
 def estimate_clocks(

@@ -218,14 +218,8 @@ def mistake_finding(verdict: FoundMistake, names: Sequence[str]) -> Finding:
     possible = bool(mistake.mend) and (everyone or mistake.mend != "mirrored")
     name, _, values = mistake.mend.partition(":")
     mend = Mend(name, values, () if everyone else tuple(named)) if possible else None
-    return Finding(
-        mistake.kind,
-        mistake.text.replace("{who}", who),
-        probability=min(verdict.probability, 1.0),
-        camera=named[0] if not everyone else None,
-        view=mistake.views[0] if not everyone else None,
-        size=dict(mistake.size),
-        cost=verdict.probability * len(mistake.views) / len(names),
-        mend=mistake.advice.replace("{who}", who),
-        repair=() if mend is None else ("--mend", str(mend)),
-    )
+    camera, view = (None, None) if everyone else (named[0], mistake.views[0])
+    text, advice = (each.replace("{who}", who) for each in (mistake.text, mistake.advice))
+    repair, cost = () if mend is None else ("--mend", str(mend)), verdict.probability * len(mistake.views) / len(names)
+    probability, size = min(verdict.probability, 1.0), dict(mistake.size)
+    return Finding(mistake.kind, text, "alarm", probability, camera, view, size, {}, cost, advice, repair)

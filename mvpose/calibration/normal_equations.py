@@ -16,7 +16,7 @@ people whose keypoints in one view fit much worse than the rest are left out the
 """
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -94,7 +94,9 @@ class JointViews:
         counts = np.diff(self.start)
         rows = np.repeat(joints, counts)
         of_joints = {name: getattr(self, name) for name in ("block", "person", "cluster", "importance")}
-        chosen = {name: None if values is None else values[joints] for name, values in of_joints.items()}
+        chosen: dict[str, Any] = {
+            name: None if values is None else values[joints] for name, values in of_joints.items()
+        }
         chosen |= {name: getattr(self, name)[rows] for name in ("view", "pixels", "sigma", "velocity")}
         return replace(self, start=np.append(0, np.cumsum(counts[joints])), **chosen)
 

@@ -118,12 +118,8 @@ def unknowns(
         which = "the rig has two cameras" if views == 2 else "only two cameras see the same people"
         return [_cannot(f"{which}, and errors of two cameras look like other places of people", "add a third camera")]
     if not pairs or np.mean(pairs) < _AGREES:
-        return [
-            _cannot(
-                f"no calibration explains the detections: {DIFFERENT}, or several cameras are far off",
-                f"check that the pictures are of one time, and {RECORD}",
-            )
-        ]
+        text = f"no calibration explains the detections: {DIFFERENT}, or several cameras are far off"
+        return [_cannot(text, f"check that the pictures are of one time, and {RECORD}")]
     if joints < _JOINTS or seconds < _SECONDS:
         return [_cannot(f"{SHORT} {seconds:.1f} s only ({joints} joints)", RECORD)]
     if moved < _TRAVELLED:
@@ -132,15 +128,9 @@ def unknowns(
     for view in used:
         turn, shift = _uncertainty(fit, view)
         if turn > _TURN or shift > _SHIFT:
-            findings.append(
-                _cannot(
-                    f"{names[view]} shares too few people with the other cameras: its pose is determined to "
-                    f"{np.degrees(turn):.1f} degrees and {100 * shift:.0f} cm only",
-                    RECORD,
-                    camera=names[view],
-                    view=view,
-                )
-            )
+            text = f"{names[view]} shares too few people with the other cameras: its pose is determined to "
+            text += f"{np.degrees(turn):.1f} degrees and {100 * shift:.0f} cm only"
+            findings.append(_cannot(text, RECORD, camera=names[view], view=view))
     if len(findings) > 0.5 * len(used):
         return [_cannot("people were seen in too few places to determine the poses of most cameras", RECORD)]
     return findings
@@ -168,17 +158,10 @@ def silent_views(detections: Integers, names: Sequence[str]) -> list[Finding]:
     for view, count in enumerate(detections.tolist()):
         if count > _SILENT * usual:
             continue
-        findings.append(
-            Finding(
-                "silent-view",
-                f"{names[view]} has {count or 'no'} detections, a view of this rig has usually {usual:.0f}",
-                camera=names[view],
-                view=view,
-                size={"detections": float(count)},
-                cost=0.05,
-                mend="check the pictures and the detector of this camera, or leave it out of the rig",
-            )
-        )
+        text = f"{names[view]} has {count or 'no'} detections, a view of this rig has usually {usual:.0f}"
+        mend = "check the pictures and the detector of this camera, or leave it out of the rig"
+        size = {"detections": float(count)}
+        findings.append(Finding("silent-view", text, camera=names[view], view=view, size=size, cost=0.05, mend=mend))
     return findings
 
 
@@ -201,32 +184,17 @@ def strangers(agreement: PairAgreement, detections: Integers, names: Sequence[st
         return findings  # the other views see different people themselves
     many = _FEW * float(np.median(detections[detections > 0]))
     for view in np.flatnonzero(alone).tolist():
+        name = names[view]
         if detections[view] < many:
-            findings.append(
-                Finding(
-                    "silent-view",
-                    f"{names[view]} has {detections[view]} detections, and they fit none of the other cameras",
-                    severity="note",
-                    camera=names[view],
-                    view=view,
-                    size={"detections": float(detections[view])},
-                    cost=0.05,
-                    mend="a detector finds few people from steeply above or far away: move the camera or leave it out",
-                )
-            )
+            text = f"{name} has {detections[view]} detections, and they fit none of the other cameras"
+            mend = "a detector finds few people from steeply above or far away: move the camera or leave it out"
+            size = {"detections": float(detections[view])}
+            findings.append(Finding("silent-view", text, "note", 1.0, name, view, size, cost=0.05, mend=mend))
             continue
-        findings.append(
-            Finding(
-                "other-people",
-                f"the people in the pictures of {names[view]} are not those of the other cameras: other people are in "
-                "them, they are of another time or place, or the calibration of this camera is entirely wrong",
-                probability=0.95,
-                camera=names[view],
-                view=view,
-                size={"agreement": float(agreement.mean[view])},
-                cost=1.0 / views,
-                mend="compare the pictures of this camera with those of the others at one time; calibrate it again, or "
-                "leave it out of the rig",
-            )
-        )
+        text = f"the people in the pictures of {name} are not those of the other cameras: other people are in them, "
+        text += "they are of another time or place, or the calibration of this camera is entirely wrong"
+        mend = "compare the pictures of this camera with those of the others at one time; calibrate it again, or "
+        mend += "leave it out of the rig"
+        size = {"agreement": float(agreement.mean[view])}
+        findings.append(Finding("other-people", text, "alarm", 0.95, name, view, size, cost=1.0 / views, mend=mend))
     return findings

@@ -57,38 +57,21 @@ def unit_findings(reading: Reading, ratio: float) -> tuple[Reading, list[Finding
     size = {"times_adults": float(ratio)}
     interval = {"times_adults": (float(ratio / 1.15), float(ratio * 1.15))}
     if 1 / _ODD < ratio < _ODD:
-        note = Finding(
-            "wrong-unit",
-            f"people are {ratio:.2f} times as large as adults: they are children or very tall, or the scale of the "
-            "calibration (the squares of the board) is wrong",
-            severity="note",
-            probability=0.5,
-            size=size,
-            interval=interval,
-            cost=abs(float(np.log(ratio))) * 0.3,
-            mend="measure a distance between two cameras; the true over the calibrated one is the FACTOR of "
-            "`mvpose repair --mend unit:FACTOR`",
-        )
-        return reading, [note]
+        text = f"people are {ratio:.2f} times as large as adults: they are children or very tall, or the scale of the "
+        text += "calibration (the squares of the board) is wrong"
+        mend = "measure a distance between two cameras; the true over the calibrated one is the FACTOR of "
+        mend += "`mvpose repair --mend unit:FACTOR`"
+        cost = abs(float(np.log(ratio))) * 0.3
+        return reading, [Finding("wrong-unit", text, "note", 0.5, None, None, size, interval, cost, mend)]
     factor = min(_UNITS, key=lambda each: abs(np.log(each / ratio)))
     named = abs(np.log(factor / ratio)) < np.log(_SAME_UNIT)
     scale = factor if named else float(f"{ratio:.2g}")
     cameras = reading.cameras.copy()
     cameras[:, 14:17] /= scale
-    text = (
-        f"the translations of all cameras are {_UNITS[factor]}: "
-        if named
-        else "the translations of all cameras are not in metres: "
-    ) + f"people are {ratio:.3g} times as large as adults"
-    alarm = Finding(
-        "wrong-unit",
-        text,
-        probability=0.99,
-        size=size,
-        interval=interval,
-        cost=1.0,
-        repair=("--mend", f"unit:{1 / scale:.6g}"),
-    )
+    text = f"the translations of all cameras are {_UNITS[factor] if named else 'not in metres'}: "
+    text += f"people are {ratio:.3g} times as large as adults"
+    repair = ("--mend", f"unit:{1 / scale:.6g}")
+    alarm = Finding("wrong-unit", text, "alarm", 0.99, None, None, size, interval, 1.0, repair=repair)
     return replace(reading, cameras=cameras), [alarm]
 
 
@@ -113,26 +96,14 @@ def size_findings(rig: Sequence[Camera], tracklets: Tracklets, names: Sequence[s
     text = "the size of the pictures of {} is stated as {} x {}, but is {} x {}, by principal points and keypoints"
     if len(sizes) == len(rig) and len(set(sizes.values())) == 1:
         width, height = sizes[0]
-        found = Finding(
-            "picture-size",
-            text.format("all cameras", *rig[0].size, width, height),
-            probability=0.97,
-            cost=0.05,
-            repair=("--mend", f"size:{width}x{height}"),
-        )
-        return [found]
-    return [
-        Finding(
-            "picture-size",
-            text.format(names[view], *rig[view].size, width, height),
-            probability=0.97,
-            camera=names[view],
-            view=view,
-            cost=0.05 / len(rig),
-            repair=("--mend", f"size:{width}x{height}@{names[view]}"),
-        )
-        for view, (width, height) in sizes.items()
-    ]
+        text, repair = text.format("all cameras", *rig[0].size, width, height), ("--mend", f"size:{width}x{height}")
+        return [Finding("picture-size", text, "alarm", 0.97, cost=0.05, repair=repair)]
+    findings = []
+    for view, (width, height) in sizes.items():
+        of_view = text.format(names[view], *rig[view].size, width, height)
+        repair, cost = ("--mend", f"size:{width}x{height}@{names[view]}"), 0.05 / len(rig)
+        findings.append(Finding("picture-size", of_view, "alarm", 0.97, names[view], view, cost=cost, repair=repair))
+    return findings
 
 
 def _better_size(camera: Camera, keypoints: Floats) -> tuple[int, int] | None:
@@ -200,15 +171,10 @@ def world_findings(
     line += f"and {(rig.centers @ vertical).max():.2f} m"
     if len(low) <= 0.5 * len(rig):
         return [], [line]
-    below = Finding(
-        "world-turned",
-        f"{len(low)} of {len(rig)} cameras are below the floor on which people walk (feet at {floor:.2f} m): the "
-        "calibration is mirrored",
-        probability=0.95,
-        cost=1.0,
-        mend="calibrate again, with views of the board from the side: flat ones fit its mirror image as well",
-    )
-    return [below], [line]
+    text = f"{len(low)} of {len(rig)} cameras are below the floor on which people walk (feet at {floor:.2f} m): the "
+    text += "calibration is mirrored"
+    mend = "calibrate again, with views of the board from the side: flat ones fit its mirror image as well"
+    return [Finding("world-turned", text, "alarm", 0.95, cost=1.0, mend=mend)], [line]
 
 
 def _turned(mean: Floats, vertical: Floats, angle: float, up: str | None) -> Finding:
@@ -224,12 +190,7 @@ def _turned(mean: Floats, vertical: Floats, angle: float, up: str | None) -> Fin
         text = f"people stand along {where} of the world, not along {up or 'z'}: {np.degrees(angle):.0f} degrees off"
     wrong = f"--up={up} is wrong: " if up is not None else ""
     mend = f"{wrong}give --up={near} instead" if on_axis else f"{wrong}calibrate the floor again"
-    return Finding(
-        "world-turned",
-        text,
-        probability=0.97,
-        size={"degrees": float(np.degrees(angle))},
-        cost=0.5,
-        mend=mend if up is not None else "",
-        repair=() if up is not None else ("--mend", f"up:{axis}"),
-    )
+    size = {"degrees": float(np.degrees(angle))}
+    if up is not None:
+        return Finding("world-turned", text, "alarm", 0.97, size=size, cost=0.5, mend=mend)
+    return Finding("world-turned", text, "alarm", 0.97, size=size, cost=0.5, repair=("--mend", f"up:{axis}"))

@@ -174,18 +174,11 @@ def _add_bones(A, b, j, joints, covariance, ends, length, variance):
         x, y, z = x / reach, y / reach, z / reach
         weight = 1.0 / (variance[k] + _DEFINITION2 + _along(covariance[other], x, y, z))
         at = x * joints[other, 0] + y * joints[other, 1] + z * joints[other, 2] + length[k]
-        A[0, 0] += weight * x * x
-        A[1, 1] += weight * y * y
-        A[2, 2] += weight * z * z
-        A[0, 1] += weight * x * y
-        A[1, 0] += weight * x * y
-        A[0, 2] += weight * x * z
-        A[2, 0] += weight * x * z
-        A[1, 2] += weight * y * z
-        A[2, 1] += weight * y * z
-        b[0] += weight * x * at
-        b[1] += weight * y * at
-        b[2] += weight * z * at
+        way = x, y, z
+        for r in range(3):
+            b[r] += weight * way[r] * at
+            for c in range(3):
+                A[r, c] += weight * way[min(r, c)] * way[max(r, c)]
 
 
 @njit(cache=True, borrows=True)
