@@ -84,8 +84,9 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
     agreement = PairAgreement.measured(consistency, reading, _corrected(reading, result), moved)
     found_strangers = strangers(agreement, detections, names)
     if found_strangers:
-        away = [each.view for each in found_strangers if each.view is not None]
-        sightings = sightings.select(~np.isin(sightings.view, away))
+        sightings = sightings.select(
+            ~np.isin(sightings.view, [each.view for each in found_strangers if each.view is not None])
+        )
         joints, rows = joint_views(sightings)
         result = fit(mended.packed, joints)
     findings += found_strangers

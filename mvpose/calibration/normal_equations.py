@@ -94,9 +94,7 @@ class JointViews:
         counts = np.diff(self.start)
         rows = np.repeat(joints, counts)
         of_joints = {name: getattr(self, name) for name in ("block", "person", "cluster", "importance")}
-        chosen: dict[str, Any] = {
-            name: None if values is None else values[joints] for name, values in of_joints.items()
-        }
+        chosen: dict[str, Any] = {k: None if v is None else v[joints] for k, v in of_joints.items()}
         chosen |= {name: getattr(self, name)[rows] for name in ("view", "pixels", "sigma", "velocity")}
         return replace(self, start=np.append(0, np.cumsum(counts[joints])), **chosen)
 
