@@ -11,7 +11,7 @@ import typer
 from mvpose.cli.estimate_command import Wanted, estimate_into
 from mvpose.cli.inputs import Calibration, Choices, picture_size
 from mvpose.cli.program import PROGRAM
-from mvpose.commands.option_groups import grouped
+from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
@@ -30,42 +30,32 @@ Videos = Annotated[
 class Networks:
     """Options about networks, as given."""
 
-    detector: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="Detector of people, a name of [cyan]mvpose networks list[/] or an ONNX file: YOLOX, RTMDet or YOLO; "
-            "or MoveNet, RTMO and YOLO-pose, which need no --pose.",
-        ),
-    ] = "movenet"
-    pose: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="Pose head, a name or an ONNX file: RTMPose or another SimCC head, or one of heat maps (HRNet, "
-            "ViTPose), such as rtmpose-m_body8-halpe26 of rtmlib.",
-        ),
-    ] = None
-    detector_kind: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND", help="Kind of the detector, if its file does not show it: yolox, rtmdet, rtmo or yolo."
-        ),
-    ] = None
-    min_score: Annotated[
-        float | None,
-        typer.Option(
-            metavar="P",
-            help="People with a lower score are left out. [dim]\\[default: 0.3; of MoveNet 0.1][/]",
-            min=0.0,
-            max=1.0,
-        ),
-    ] = None
-    provider: Annotated[str, typer.Option(metavar="NAME", help="Where the networks run: cpu, cuda or auto.")] = "auto"
-    threads: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Pictures at once on the CPU. [dim]\\[default: one for each core][/]", min=1),
-    ] = None
+    detector: str = option(
+        "movenet",
+        "Detector of people, a name of [cyan]mvpose networks list[/] or an ONNX file: YOLOX, RTMDet or YOLO; "
+        "or MoveNet, RTMO and YOLO-pose, which need no --pose.",
+        metavar="NAME|FILE",
+    )
+    pose: str | None = option(
+        None,
+        "Pose head, a name or an ONNX file: RTMPose or another SimCC head, or one of heat maps (HRNet, "
+        "ViTPose), such as rtmpose-m_body8-halpe26 of rtmlib.",
+        metavar="NAME|FILE",
+    )
+    detector_kind: str | None = option(
+        None, "Kind of the detector, if its file does not show it: yolox, rtmdet, rtmo or yolo.", metavar="KIND"
+    )
+    min_score: float | None = option(
+        None,
+        "People with a lower score are left out. [dim]\\[default: 0.3; of MoveNet 0.1][/]",
+        metavar="P",
+        min=0.0,
+        max=1.0,
+    )
+    provider: str = option("auto", "Where the networks run: cpu, cuda or auto.", metavar="NAME")
+    threads: int | None = option(
+        None, "Pictures at once on the CPU. [dim]\\[default: one for each core][/]", metavar="N", min=1
+    )
 
 
 _LEFT = "detections that are complete are kept, and another run goes on from there"

@@ -9,7 +9,7 @@ import typer
 
 from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
 from mvpose.cli.program import PROGRAM
-from mvpose.commands.option_groups import given, grouped
+from mvpose.commands.option_groups import given, grouped, option
 from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
@@ -33,67 +33,39 @@ class Wanted:
     """Options about results, as given."""
 
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]
-    method: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME", help="track or track-fast, which follow people; full or fast, without identities."
-        ),
-    ] = "track"
-    formats: Annotated[
-        str,
-        typer.Option(
-            "--format",
-            metavar="NAME,...",
-            help="Formats beside poses.parquet and people.json: trc, c3d, csv, panoptic, bvh, gltf, lengths, rrd.",
-        ),
-    ] = "trc,json"
-    files_up: Annotated[
-        str | None,
-        typer.Option(
-            metavar="AXIS",
-            help="Axis that points up in the files of --format, y or z. [dim]\\[default: that of each format][/]",
-        ),
-    ] = None
-    together: Annotated[bool, typer.Option("--together", help="One C3D file for all people; labels have a prefix.")] = (
-        False
+    method: str = option(
+        "track", "track or track-fast, which follow people; full or fast, without identities.", metavar="NAME"
     )
-    lag: Annotated[
-        float, typer.Option(metavar="S", help="Seconds of later frames that track and track-fast may use; inf: all.")
-    ] = 0.2
-    page: Annotated[bool, typer.Option("--page/--no-page", help="Write recording.html, a page about the result.")] = (
-        True
+    formats: str = option(
+        "trc,json",
+        "Formats beside poses.parquet and people.json: trc, c3d, csv, panoptic, bvh, gltf, lengths, rrd.",
+        "--format",
+        metavar="NAME,...",
     )
-    pictures: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="VIDEO",
-            help="Videos or folders of pictures of the cameras, or a folder with them, for page and films. Repeatable.",
-        ),
-    ] = None
-    films: Annotated[
-        bool,
-        typer.Option(
-            "--films/--no-films", help="Write a film of each camera with the people drawn in, where there are pictures."
-        ),
-    ] = True
-    doctor: Annotated[
-        bool,
-        typer.Option("--doctor/--no-doctor", help="Let the doctor examine the calibration, with 100 frames."),
-    ] = True
-    trust: Annotated[
-        bool, typer.Option("--trust", help="Write people even if calibration and detections contradict each other.")
-    ] = False
+    files_up: str | None = option(
+        None,
+        "Axis that points up in the files of --format, y or z. [dim]\\[default: that of each format][/]",
+        metavar="AXIS",
+    )
+    together: bool = option(False, "One C3D file for all people; labels have a prefix.", "--together")
+    lag: float = option(0.2, "Seconds of later frames that track and track-fast may use; inf: all.", metavar="S")
+    page: bool = option(True, "Write recording.html, a page about the result.", "--page/--no-page")
+    pictures: list[Path] | None = option(
+        None,
+        "Videos or folders of pictures of the cameras, or a folder with them, for page and films. Repeatable.",
+        metavar="VIDEO",
+    )
+    films: bool = option(
+        True, "Write a film of each camera with the people drawn in, where there are pictures.", "--films/--no-films"
+    )
+    doctor: bool = option(True, "Let the doctor examine the calibration, with 100 frames.", "--doctor/--no-doctor")
+    trust: bool = option(False, "Write people even if calibration and detections contradict each other.", "--trust")
 
-    max_error: Annotated[
-        float, typer.Option(metavar="M", help="Leave out joints with a larger expected error, metres; inf: none.")
-    ] = 0.25
-    max_speed: Annotated[
-        float,
-        typer.Option(
-            metavar="M/S", help="Leave out arms and legs that are faster, and trunks at half of it; inf: none."
-        ),
-    ] = 24.8
-    min_frames: Annotated[int, typer.Option(metavar="N", help="Leave out people who are there in fewer frames.")] = 5
+    max_error: float = option(0.25, "Leave out joints with a larger expected error, metres; inf: none.", metavar="M")
+    max_speed: float = option(
+        24.8, "Leave out arms and legs that are faster, and trunks at half of it; inf: none.", metavar="M/S"
+    )
+    min_frames: int = option(5, "Leave out people who are there in fewer frames.", metavar="N")
 
     @property
     def limits(self) -> "OutputLimits":

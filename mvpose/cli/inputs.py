@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mvpose.commands.option_groups import given
+from mvpose.commands.option_groups import given, option
 from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
@@ -71,47 +71,35 @@ class Inputs:
 class Choices:
     """Options of commands that read a recording, as given."""
 
-    fps: Annotated[float | None, typer.Option(metavar="N", help="Frames per second. [dim]\\[default: 25][/]")] = None
-    times: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Times of the pictures in seconds: a line for each frame, with one number, or one for each camera.",
-        ),
-    ] = None
-    size: Annotated[
-        str | None,
-        typer.Option(metavar="WxH", help="Size of the pictures in pixels, for calibrations that do not state it."),
-    ] = None
-    cameras: Annotated[
-        str | None, typer.Option(metavar="NAME,...", help="Cameras of the calibration to use. [dim]\\[default: all][/]")
-    ] = None
-    frames: Annotated[
-        str | None,
-        typer.Option(metavar="FIRST:LAST", help="Frames to use, by the numbers in the files: [cyan]0:500[/]."),
-    ] = None
-    skeleton: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Skeleton of the detections, if their number of joints does not show it: coco17, body25, halpe26, "
-            "wholebody133 ..., or a TOML file.",
-        ),
-    ] = None
-    joints: Annotated[
-        str,
-        typer.Option(
-            metavar="body|all",
-            help="Joints to estimate: the 17 of COCO, or all of the detections, with hands, face, feet.",
-        ),
-    ] = "body"
-    up: Annotated[
-        str | None,
-        typer.Option(
-            metavar="AXIS",
-            help="Axis of the calibration's world that points up: z, y, -y ... [dim]\\[default: z][/]",
-        ),
-    ] = None
+    fps: float | None = option(None, "Frames per second. [dim]\\[default: 25][/]", metavar="N")
+    times: Path | None = option(
+        None,
+        "Times of the pictures in seconds: a line for each frame, with one number, or one for each camera.",
+        metavar="FILE",
+    )
+    size: str | None = option(
+        None, "Size of the pictures in pixels, for calibrations that do not state it.", metavar="WxH"
+    )
+    cameras: str | None = option(
+        None, "Cameras of the calibration to use. [dim]\\[default: all][/]", metavar="NAME,..."
+    )
+    frames: str | None = option(
+        None, "Frames to use, by the numbers in the files: [cyan]0:500[/].", metavar="FIRST:LAST"
+    )
+    skeleton: str | None = option(
+        None,
+        "Skeleton of the detections, if their number of joints does not show it: coco17, body25, halpe26, "
+        "wholebody133 ..., or a TOML file.",
+        metavar="NAME",
+    )
+    joints: str = option(
+        "body",
+        "Joints to estimate: the 17 of COCO, or all of the detections, with hands, face, feet.",
+        metavar="body|all",
+    )
+    up: str | None = option(
+        None, "Axis of the calibration's world that points up: z, y, -y ... [dim]\\[default: z][/]", metavar="AXIS"
+    )
 
     @property
     def only(self) -> tuple[str, ...]:

@@ -5,20 +5,36 @@ import inspect
 import typing
 from collections.abc import Callable, Collection
 from contextvars import ContextVar
-from typing import Any
+from typing import Annotated, Any, TypeVar
 
 import typer
 
 Command = Callable[..., None]
+T = TypeVar("T")
 
 _GIVEN: ContextVar[frozenset[str]] = ContextVar("given", default=frozenset())
 _CONTEXT = "context_of_typer"
+_OPTION = "option"  # in the metadata of a field
+
+
+def option(default: T, text: str, *flags: str, **settings: Any) -> T:
+    """Return a field of a dataclass of options.
+
+    Args:
+        default: value of an option that is not given.
+        text: what it does, for the help.
+        flags: its names on the command line, if they do not follow from that of the field.
+        settings: further arguments of ``typer.Option``.
+    """
+    field: T = dataclasses.field(default=default, metadata={_OPTION: typer.Option(*flags, help=text, **settings)})
+    return field
 
 
 def grouped(*, without: Collection[str] = ()) -> Callable[[Command], Command]:
     """Return a decorator that gives a command the fields of its dataclass parameters as options.
 
-    The fields are annotated as parameters of a typer command. The command itself is called with the dataclasses.
+    The fields are annotated as parameters of a typer command, or made by :func:`option`. The command itself is called
+    with the dataclasses.
 
     Args:
         without: fields that are no options of this command; they keep their defaults.
@@ -64,6 +80,9 @@ def given(name: str) -> bool:
 def _options(kind: type[Any]) -> list[inspect.Parameter]:
     """Return the fields of a dataclass as parameters."""
     hints = typing.get_type_hints(kind, include_extras=True)
+    for field in dataclasses.fields(kind):
+        if _OPTION in field.metadata:
+            hints[field.name] = Annotated[hints[field.name], field.metadata[_OPTION]]
     return [
         inspect.Parameter(
             field.name,

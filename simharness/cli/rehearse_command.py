@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from mvpose.commands.option_groups import given, grouped
+from mvpose.commands.option_groups import given, grouped, option
 from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
 from simharness.cli.program import PROGRAM, AllWorkers, Workers
 
@@ -39,39 +39,30 @@ def add_to(app: typer.Typer) -> None:
 class Surroundings:
     """Options that say where people are, and who finds them."""
 
-    room: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="A room file (TOML) as of [cyan]simharness plan[/], or the name of a shipped room: walls, volume, "
-            "obstacles, people, clutter, detector and target. Cameras have to be in it.",
-        ),
-    ] = None
-    volume: Annotated[
-        str,
-        typer.Option(
-            metavar="XxY",
-            help="Where people are, metres: a rectangle around the origin, [cyan]4x3[/]; instead of the room file's. "
-            "[dim]\\[default: what three cameras see][/]",
-        ),
-    ] = ""
-    people: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            min=1,
-            max=_MOST_PEOPLE,
-            help="People in the volume, instead of the file's. [dim]\\[default: 4][/]",
-        ),
-    ] = None
-    detector: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PROFILE",
-            help="A detector profile, a shipped name or a TOML file, instead of the room file's. "
-            "[dim]\\[default: typical][/]",
-        ),
-    ] = None
+    room: Path | None = option(
+        None,
+        "A room file (TOML) as of [cyan]simharness plan[/], or the name of a shipped room: walls, volume, "
+        "obstacles, people, clutter, detector and target. Cameras have to be in it.",
+        metavar="FILE",
+    )
+    volume: str = option(
+        "",
+        "Where people are, metres: a rectangle around the origin, [cyan]4x3[/]; instead of the room file's. "
+        "[dim]\\[default: what three cameras see][/]",
+        metavar="XxY",
+    )
+    people: int | None = option(
+        None,
+        "People in the volume, instead of the file's. [dim]\\[default: 4][/]",
+        metavar="N",
+        min=1,
+        max=_MOST_PEOPLE,
+    )
+    detector: str | None = option(
+        None,
+        "A detector profile, a shipped name or a TOML file, instead of the room file's. [dim]\\[default: typical][/]",
+        metavar="PROFILE",
+    )
 
 
 def rehearse(
@@ -195,33 +186,21 @@ _PLAN = "simharness plan"
 class RoomOptions:
     """Options that choose among the lenses of a room file, or replace its keys."""
 
-    cameras: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Number of cameras, with those that hang already; instead of the file's."),
-    ] = None
-    lens: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME", help="A lens of the room file that may be used. Repeatable. [dim]\\[default: all][/]"
-        ),
-    ] = None
-    people: Annotated[int | None, typer.Option(metavar="N", help="Number of people, instead of the file's.")] = None
-    detector: Annotated[
-        str | None, typer.Option(metavar="PROFILE", help="Detector profile, instead of the file's.")
-    ] = None
-    objective: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND",
-            help="What is maximised: [cyan]share[/], [cyan]mean[/] or [cyan]worst[/]; instead of the file's.",
-        ),
-    ] = None
-    failing: Annotated[
-        int | None, typer.Option(metavar="K", help="Number of cameras that may fail, instead of the file's.")
-    ] = None
-    budget: Annotated[
-        float | None, typer.Option(metavar="SUM", help="Largest cost of the lenses, instead of the file's.")
-    ] = None
+    cameras: int | None = option(
+        None, "Number of cameras, with those that hang already; instead of the file's.", metavar="N"
+    )
+    lens: list[str] | None = option(
+        None, "A lens of the room file that may be used. Repeatable. [dim]\\[default: all][/]", metavar="NAME"
+    )
+    people: int | None = option(None, "Number of people, instead of the file's.", metavar="N")
+    detector: str | None = option(None, "Detector profile, instead of the file's.", metavar="PROFILE")
+    objective: str | None = option(
+        None,
+        "What is maximised: [cyan]share[/], [cyan]mean[/] or [cyan]worst[/]; instead of the file's.",
+        metavar="KIND",
+    )
+    failing: int | None = option(None, "Number of cameras that may fail, instead of the file's.", metavar="K")
+    budget: float | None = option(None, "Largest cost of the lenses, instead of the file's.", metavar="SUM")
 
     def changes(self) -> dict[tuple[str, ...], Any]:
         """Return the keys that are replaced, with their values."""

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.text import Text
 
 from mvpose.commands.errors import failing
-from mvpose.commands.option_groups import given, grouped
+from mvpose.commands.option_groups import given, grouped, option
 from mvpose.commands.programs import FAILED
 from simharness.cli.program import PROGRAM, BlameSeeds, Overrides, ScenarioFile, Workers
 
@@ -36,28 +36,24 @@ class Running:
     """How and where the trials of a study run, and where the results appear."""
 
     workers: Workers = 1
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: [cyan]tcp://host:8786[/].")
-    ] = None
-    shard: Annotated[
-        str | None,
-        typer.Option(
-            metavar="I/N",
-            help="Run only part I of N, for several machines: [cyan]1/3[/]; then [cyan]merge[/] their stores.",
-        ),
-    ] = None
-    store: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Folder of finished trials, which are not run again. [dim]\\[default: store, in --out][/]",
-            file_okay=False,
-        ),
-    ] = None
-    out: Annotated[
-        Path,
-        typer.Option(metavar="FOLDER", help="Folder in which the study gets a folder with its name.", file_okay=False),
-    ] = Path("results/studies")
+    scheduler: str | None = option(None, "Run on a Dask cluster: [cyan]tcp://host:8786[/].", metavar="ADDRESS")
+    shard: str | None = option(
+        None,
+        "Run only part I of N, for several machines: [cyan]1/3[/]; then [cyan]merge[/] their stores.",
+        metavar="I/N",
+    )
+    store: Path | None = option(
+        None,
+        "Folder of finished trials, which are not run again. [dim]\\[default: store, in --out][/]",
+        metavar="FOLDER",
+        file_okay=False,
+    )
+    out: Path = option(
+        Path("results/studies"),
+        "Folder in which the study gets a folder with its name.",
+        metavar="FOLDER",
+        file_okay=False,
+    )
 
 
 def add_to(app: typer.Typer) -> None:

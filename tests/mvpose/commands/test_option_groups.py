@@ -10,13 +10,13 @@ import typer
 from typer.testing import CliRunner
 
 from mvpose.cli.app import app
-from mvpose.commands.option_groups import grouped
+from mvpose.commands.option_groups import grouped, option
 
 
 @dataclass(frozen=True)
 class Drawing:
     color: Annotated[str, typer.Option(help="Colour.")]
-    width: Annotated[float, typer.Option("--wide", help="Width.")] = 2.0
+    width: float = option(2.0, "Width.", "--wide")
     path: Annotated[Path | None, typer.Option(help="File.")] = None
 
 
