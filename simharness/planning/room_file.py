@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from mvpose import Camera
 from mvpose.arrays import Floats
-from mvpose.files.message_text import all_in_one_line, listed, one_line
+from mvpose.files.message_text import all_in_one_line, listed, one_line, prefixed
 from simharness.planning.planned_room import LEAST_AREA, LensChoice, Room, make_mounts
 from simharness.planning.room_keys import LensKeys, ObstacleKeys, Outline, RoomKeys
 from simharness.scenario.layers import Origins, merge, nested, set_origin
@@ -199,7 +199,5 @@ def _fixed(room: Room, index: int) -> Camera:
         if box.distance(place) == 0.0:
             raise ValueError(f"{where} is inside obstacles[{k}] {room.keys.obstacles[k].name}: move one of them")
     name = given.name or f"fixed{index}"
-    try:
+    with prefixed(f"{key}.aim"):
         return room.lenses[lens].camera(place, given.aim, name=name)
-    except ValueError as error:
-        raise ValueError(f"{key}.aim: {error}") from None

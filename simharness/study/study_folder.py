@@ -33,7 +33,7 @@ from typing import Any
 import polars as pl
 
 from mvpose.files.input_files import read_bytes, read_json_object
-from mvpose.files.message_text import one_line
+from mvpose.files.message_text import one_line, prefixed
 from mvpose.presets import TRACKING, without_repair
 from simharness.runtime.parquet_tables import table_of
 from simharness.scenario.load import Setting, Study, Value
@@ -161,11 +161,9 @@ def read_study(folder: Path | str) -> Results:
             f"{folder}: not the result folder of a study: missing {', '.join(missing)}; give a folder that simharness "
             "study wrote"
         )
-    try:
+    with prefixed(f"{folder}: cannot be read", "; run the study again to write the folder again"):
         info = read_json_object(files[0], what="the description of a study")
         tables = dict(zip(TABLES, map(_read_table, files[1:]), strict=True))
-    except ValueError as error:
-        raise ValueError(f"{folder}: cannot be read: {error}; run the study again to write the folder again") from None
     return Results(info, folder=folder, **tables)
 
 
@@ -184,10 +182,8 @@ def document(study: Study) -> str:
 
 def _read_table(file: Path) -> pl.DataFrame:
     content = read_bytes(file, what="a table of a study", most=_LARGEST)
-    try:
+    with prefixed(file.name):
         return table_of(content)
-    except ValueError as error:
-        raise ValueError(f"{file.name}: {error}") from None
 
 
 _FIRST = ("trial", "case", "varied", "seed", "variant")

@@ -7,6 +7,7 @@ import numpy as np
 
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import read_json_object
+from mvpose.files.message_text import prefixed
 from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval
@@ -100,7 +101,5 @@ def read_blame(folder: Path) -> Blame | None:
     path = folder / FILE
     if not path.is_file():
         return None
-    try:
+    with prefixed(path, "; remove it, or write it again with --blame"):
         return Blame.of_json(read_json_object(path, what="what cost the score"))
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}; remove it, or write it again with --blame") from None

@@ -39,6 +39,7 @@ from mvpose.affinity import AppearanceAffinity
 from mvpose.checks import as_array
 from mvpose.commands.errors import RunError
 from mvpose.estimators import Estimator
+from mvpose.files.message_text import prefixed
 from mvpose.skeleton import Skeleton
 from simharness.scenario.sections.method_section import MethodSection, wrong_variants
 from simharness.trial.stages.estimation import track_frames
@@ -206,10 +207,8 @@ def sources_of(place: str) -> Mapping[str, bytes]:
 
 
 def _user_estimator(name: str, place: str) -> UserEstimator:
-    try:
+    with prefixed(f"method.estimators.{name}"):
         return user_estimator(name, place)
-    except ValueError as error:
-        raise ValueError(f"method.estimators.{name}: {error}") from None
 
 
 @functools.cache

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from mvpose import COCO17, Detections
+from mvpose.files.message_text import prefixed
 from mvpose.networks import PoseHead, ReId
 from mvpose.networks.catalogue.store import path_of
 from mvpose.networks.crops import Images
@@ -81,10 +82,8 @@ def network_file(scenario: Scenario, key: str) -> Path:
     Raises:
         ValueError: no such name; the message names the key.
     """
-    try:
+    with prefixed(key):
         return path_of(str(scenario.named_files[key]))
-    except ValueError as error:
-        raise ValueError(f"{key}: {error}") from None
 
 
 def people_finder(scenario: Scenario) -> PeopleFinder:
@@ -95,10 +94,8 @@ def people_finder(scenario: Scenario) -> PeopleFinder:
             message names the key.
     """
     file = network_file(scenario, "detector.network")
-    try:
+    with prefixed("detector.network"):
         finder = open_finder(file)
-    except ValueError as error:
-        raise ValueError(f"detector.network: {error}") from None
     if not finder.one_stage and not scenario.detector.onnx:
         raise ValueError(f"detector.network: {file.name} gives boxes alone; name a pose head in detector.onnx")
     return finder
@@ -111,10 +108,8 @@ def pose_head(scenario: Scenario) -> PoseHead:
         ValueError: the file is no pose head; the message names the key.
     """
     file = network_file(scenario, "detector.onnx")
-    try:
+    with prefixed("detector.onnx"):
         return open_head(file, skeleton=COCO17, likelihoods=scenario.detector.heatmaps.size != "none")
-    except ValueError as error:
-        raise ValueError(f"detector.onnx: {error}") from None
 
 
 def re_id(scenario: Scenario) -> ReId:
@@ -123,10 +118,8 @@ def re_id(scenario: Scenario) -> ReId:
     Raises:
         ValueError: the file is no re-ID network; the message names the key.
     """
-    try:
+    with prefixed("appearance.network"):
         return ReId(scenario.appearance.network) if scenario.appearance.network else ReId()
-    except ValueError as error:
-        raise ValueError(f"appearance.network: {error}") from None
 
 
 def descriptor_settings(scenario: Scenario) -> DescriptorSettings | None:
@@ -137,10 +130,8 @@ def descriptor_settings(scenario: Scenario) -> DescriptorSettings | None:
     """
     if scenario.appearance.source != "drawn":
         return None
-    try:
+    with prefixed("appearance.network"):
         model = DescriptorModel.of_network(Path(scenario.appearance.network or DEFAULT))
-    except ValueError as error:
-        raise ValueError(f"appearance.network: {error}") from None
     return DescriptorSettings(model, scenario.people.look_alike, scenario.people.alike)
 
 

@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from mvpose.camera import Camera, Rig
+from mvpose.files.message_text import prefixed
 from mvpose.formats.calibration.calibration_formats import read_calibration, select
 from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
 from simharness.scenario.sections.cameras_section import CamerasSection
@@ -67,10 +68,8 @@ def build_rig(cameras: CamerasSection, *, seed: int = 0, room: tuple[float, floa
         rig = _laid_out(cameras, seed, room)
     where = {"preset": "cameras.preset", "file": cameras.file}.get(cameras.layout, "cameras.distortion")
     for camera in rig:
-        try:
+        with prefixed(where):
             check_lens(camera)
-        except ValueError as error:
-            raise ValueError(f"{where}: {error}") from None
     return rig
 
 
