@@ -1,7 +1,7 @@
 """Findings about single cameras: sizes with intervals, and whether they are alarms or notes."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -83,17 +83,8 @@ def _of_all_lenses(findings: list[Finding], rig: Rig) -> list[Finding]:
     return [*(each for each in findings if each not in lenses), whole]
 
 
-class _Described(NamedTuple):
-    """What a fault is: text, sizes with intervals, sizes that are judged with their lowest values, loss (m), mend."""
-
-    kind: str
-    text: str
-    size: dict[str, float]
-    interval: dict[str, tuple[float, float]]
-    judged: dict[str, tuple[float, float]]
-    cost: float
-    mend: str
-    repair: tuple[str, ...]
+Limits = dict[str, tuple[float, float]]
+"""Sizes by which a fault is judged, with their lowest values."""
 
 
 def _finding(
@@ -110,41 +101,29 @@ def _finding(
     if kind == "clock-offset":  # offsets of clocks are findings of mvpose.calibration.clocks
         return None
     if kind == "moved-camera":
-        described = _of_pose(found, draws, starts, names[view], float(depth[view]), undetermined)
+        finding, limits = _of_pose(found, draws, starts, names[view], float(depth[view]), undetermined)
     else:
-        described = _of_lens(found, draws, fit, rig[view], names[view], float(depth[view]))
+        finding, limits = _of_lens(found, draws, fit, rig[view], names[view], float(depth[view]))
     probability = min(found.probability * found.kind_probability, 1.0)
     severity = judged(
-        {key: value for key, (value, _) in described.judged.items()},
-        {key: low for key, (_, low) in described.judged.items()},
+        {key: value for key, (value, _) in limits.items()},
+        {key: low for key, (_, low) in limits.items()},
         probability=probability,
         determined=not undetermined,
     )
-    return Finding(
-        described.kind,
-        described.text,
-        severity,
-        probability,
-        names[view],
-        view,
-        described.size,
-        described.interval,
-        cost=float(probability * described.cost / len(rig)),
-        mend=described.mend,
-        repair=described.repair,
-    )
+    cost = float(probability * finding.cost / len(rig))
+    return replace(finding, severity=severity, probability=probability, cost=cost)
 
 
 def _of_pose(
     found: CameraFault, draws: Floats, starts: Floats, name: str, depth: float, undetermined: bool
-) -> _Described:
-    """Describe a pose that is wrong, from the start, since some time, or more and more."""
+) -> tuple[Finding, Limits]:
+    """Return a pose that is wrong, from the start, since some time, or more and more, with its loss in metres."""
     kind, mend, repair = "moved-camera", "", _REPAIR
     size, interval = _pose_size(found.change, draws)
     limits = {key: (value, interval[key][0]) for key, value in size.items()}
     cost = np.radians(size["degrees"]) * depth + size["metres"]
-    text = f"{name} is not in its calibrated pose: it is off by {size['degrees']:.1f} degrees and "
-    text += f"{100 * size['metres']:.0f} cm"
+    text = _moved(name, size)
     if found.fault.course == "growing":
         kind, text = "drifting-camera", text + " at the end, growing from the start"
         mend = "fix the camera; a calibration holds for a short part of this recording alone: --frames chooses it"
@@ -157,11 +136,13 @@ def _of_pose(
         mend = "each part of the recording has a calibration of its own: add --frames with those after the change"
     if undetermined and len(found.fault.model.index) == 3:  # a repair would be refused
         repair = ("--mend", _turn(found.change, name))
-    return _Described(kind, text, size, interval, limits, cost, mend, repair)
+    return Finding(kind, text, "note", 1.0, name, found.fault.view, size, interval, cost, mend, repair), limits
 
 
-def _of_lens(found: CameraFault, draws: Floats, fit: CameraFit, camera: Camera, name: str, depth: float) -> _Described:
-    """Describe intrinsics that are wrong."""
+def _of_lens(
+    found: CameraFault, draws: Floats, fit: CameraFit, camera: Camera, name: str, depth: float
+) -> tuple[Finding, Limits]:
+    """Return intrinsics that are wrong, with their loss in metres."""
     kind, change = found.fault.model.kind, found.change
     if kind == "focal-length":
         size = {"percent": float(100 * np.expm1(change[6]))}
@@ -187,7 +168,8 @@ def _of_lens(found: CameraFault, draws: Floats, fit: CameraFit, camera: Camera, 
         text = f"the lens of {name} has another distortion than calibrated: {corner:.0f} px off near the edge"
         kind = "distortion-model" if camera.distortion.any() else kind
         mend = Mend("k1", f"{change[9]:.4f}", (name,))
-    return _Described(kind, text, size, interval, limits, cost, "", ("--mend", str(mend)))
+    repair = ("--mend", str(mend))
+    return Finding(kind, text, "note", 1.0, name, found.fault.view, size, interval, cost, repair=repair), limits
 
 
 def turn_finding(rig: Rig, cameras: Floats, covariance: Floats, view: int, names: Sequence[str]) -> Finding:
@@ -205,11 +187,15 @@ def turn_finding(rig: Rig, cameras: Floats, covariance: Floats, view: int, names
     change[:3] = Rotation.from_matrix(turn).as_rotvec()
     change[3:6] = cameras[view, 14:17] - rig[view].center
     size, interval = _pose_size(change, _draws(change, covariance))
-    text = f"{names[view]} is not in its calibrated pose: it is off by {size['degrees']:.1f} degrees and "
-    text += f"{100 * size['metres']:.0f} cm"
+    text = _moved(names[view], size)
     cost = (np.radians(size["degrees"]) * 3.0 + size["metres"]) / len(rig)
     repair = ("--mend", _turn(change, names[view]), *_REPAIR)
     return Finding("moved-camera", text, "alarm", 0.99, names[view], view, size, interval, cost, repair=repair)
+
+
+def _moved(name: str, size: Mapping[str, float]) -> str:
+    off = f"{size['degrees']:.1f} degrees and {100 * size['metres']:.0f} cm"
+    return f"{name} is not in its calibrated pose: it is off by {off}"
 
 
 def _turn(change: Floats, name: str) -> str:

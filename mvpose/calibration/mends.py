@@ -171,10 +171,8 @@ def of_pictures(camera: Camera, pixels: Floats) -> Camera:
     R = spun @ camera.R @ world
     scale = float(np.sqrt(abs(np.linalg.det(linear) / np.linalg.det(camera.K[:2, :2]))))
     sides = np.rint(np.abs(turn)) @ np.array(camera.size, float)
-    sizes = [
-        sides,
-        scale * sides,
-    ]  # of a file with the right size and wrong intrinsics, and of one where both are wrong
+    # Of a file with the right size and wrong intrinsics, and of one where both are wrong.
+    sizes = [sides, scale * sides]
     best = min(sizes, key=lambda each: float(np.abs(np.log((2 * np.maximum(center, 1.0) + 1.0) / each)).max()))
     width, height = np.maximum(np.rint(best), 1).astype(int).tolist()
     return replace(camera, K=K, R=R, t=-R @ world @ camera.center, distortion=distortion, size=(width, height))

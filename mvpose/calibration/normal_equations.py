@@ -289,10 +289,8 @@ def without_mismatches(cameras: Floats, sightings: Sightings, joints: JointViews
     cell = sightings.person[rows] * views + joints.view
     off = np.full(count * views, np.nan)
     known = np.isfinite(distance)
-    order = np.argsort(cell[known], kind="stable")
-    sorted_cells, sorted_distances = cell[known][order], distance[known][order]
-    used, start = np.unique(sorted_cells, return_index=True)
-    for each, part in zip(used, np.split(sorted_distances, start[1:]), strict=True):
+    for each in np.unique(cell[known]):
+        part = distance[known & (cell == each)]
         if len(part) >= _FEWEST:
             off[each] = np.median(part)
     wrong = _much_farther(off.reshape(count, views))

@@ -31,6 +31,8 @@ _COARSE_STEPS = (0.025, 0.0125)
 _STEPS = (0.01, 0.005, 0.0025)
 
 Offset = tuple[float, float]
+Shift = Callable[[float, float], Change]
+Trial = tuple[float, Reading, Offset]
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,8 @@ class OffsetSearch:
 
     def _on_grid(self, reading: Reading, views: tuple[int, ...]) -> list[Offset]:
         """Return the likeliest offsets of the grid, shares of the size of the picture, none beside another."""
-        scores = [self._at(self.coarse, reading, views, shifted_picture, offset)[0] for offset in _OFFSETS]
+        trial = self._trials(self.coarse, reading, views, shifted_picture)
+        scores = [trial(offset)[0] for offset in _OFFSETS]
         starts: list[Offset] = []
         for index in np.argsort(scores)[::-1]:
             x, y = _OFFSETS[index]
@@ -83,52 +86,38 @@ class OffsetSearch:
         return starts
 
     def _refined(
-        self,
-        reading: Reading,
-        views: tuple[int, ...],
-        change: Callable[[float, float], Change],
-        starts: Sequence[Offset],
+        self, reading: Reading, views: tuple[int, ...], change: Shift, starts: Sequence[Offset]
     ) -> tuple[Reading, Offset]:
         """Return the likeliest reading with an offset near some others, and the offset."""
-        best = max(
-            (self._climbed(self.coarse, reading, views, change, start, _COARSE_STEPS) for start in starts),
-            key=lambda each: each[0],
-        )
-        best = self._climbed(self.consistency, reading, views, change, best[2], _STEPS)
-        return best[1], best[2]
+        coarse = self._trials(self.coarse, reading, views, change)
+        best = max((_climbed(coarse, start, _COARSE_STEPS) for start in starts), key=lambda each: each[0])
+        _, found, offset = _climbed(self._trials(self.consistency, reading, views, change), best[2], _STEPS)
+        return found, offset
 
-    def _climbed(
-        self,
-        consistency: Consistency,
-        reading: Reading,
-        views: tuple[int, ...],
-        change: Callable[[float, float], Change],
-        start: Offset,
-        steps: Sequence[float],
-    ) -> tuple[float, Reading, Offset]:
-        """Return evidence, reading and offset at the end of steps to the likeliest of eight neighbours."""
-        best = self._at(consistency, reading, views, change, start)
-        for step in steps:
-            for _ in range(2):
-                x, y = best[2]
-                around = [(x + i * step, y + j * step) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
-                before = best
-                tried = (self._at(consistency, reading, views, change, offset) for offset in around)
-                best = max([best, *tried], key=lambda each: each[0])
-                if best is before:
-                    break
-        return best
+    def _trials(
+        self, consistency: Consistency, reading: Reading, views: tuple[int, ...], change: Shift
+    ) -> Callable[[Offset], Trial]:
+        """Return a function of an offset that gives the evidence of the reading with it, the reading, and itself."""
 
-    def _at(
-        self,
-        consistency: Consistency,
-        reading: Reading,
-        views: tuple[int, ...],
-        change: Callable[[float, float], Change],
-        offset: Offset,
-    ) -> tuple[float, Reading, Offset]:
-        other = changed(reading, self.sizes, change(*offset), views) or reading
-        return float(consistency(other).sum()), other, offset
+        def trial(offset: Offset) -> Trial:
+            other = changed(reading, self.sizes, change(*offset), views) or reading
+            return float(consistency(other).sum()), other, offset
+
+        return trial
+
+
+def _climbed(trial: Callable[[Offset], Trial], start: Offset, steps: Sequence[float]) -> Trial:
+    """Return evidence, reading and offset at the end of steps to the likeliest of eight neighbours."""
+    best = trial(start)
+    for step in steps:
+        for _ in range(2):
+            x, y = best[2]
+            around = [(x + i * step, y + j * step) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
+            before = best
+            best = max([best, *map(trial, around)], key=lambda each: each[0])
+            if best is before:
+                break
+    return best
 
 
 def blurred(pieces: Pieces, sizes: Sequence[Size]) -> Pieces:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mvpose.arrays import Floats, Integers
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.estimate import Estimate
@@ -84,7 +83,10 @@ def _improved(tracker: Tracker, moment: Moment, later: Moment, remember: bool) -
     """Return a moment improved by the next one, which is improved already."""
     tracks, after = moment.tracks, later.tracks
     assert later.predicted is not None, "moments to smooth are kept"
-    link = moment.link or _link(tracker, moment, later)
+    link = moment.link or _gains(
+        tracks.ids, tracks.state, tracks.covariance, after.ids, *later.predicted, later.elapsed,
+        tracker.motion.speed, tracker.motion.time,
+    )  # fmt: skip
     if remember:
         moment.link = link
     known_later = after.state, after.covariance, later.odds, later.presence, later.elapsed
@@ -97,16 +99,6 @@ def _improved(tracker: Tracker, moment: Moment, later: Moment, remember: bool) -
     improved.tracks, improved.odds, improved.presence, improved.shown = smoothed, odds, presence, shown
     improved.poses = None  # the first frame has a future, so it is no longer that of the pipeline alone
     return improved
-
-
-def _link(tracker: Tracker, moment: Moment, later: Moment) -> tuple[Integers, Floats]:
-    """Return the row of each track in the next moment, and the gains of its joints; see :func:`_gains`."""
-    assert later.predicted is not None, "moments to smooth are kept"
-    tracks, motion = moment.tracks, tracker.motion
-    return _gains(
-        tracks.ids, tracks.state, tracks.covariance, later.tracks.ids, *later.predicted, later.elapsed,
-        motion.speed, motion.time,
-    )  # fmt: skip
 
 
 @njit(cache=True)
