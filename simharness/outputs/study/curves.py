@@ -203,6 +203,8 @@ NAMES: Mapping[str, str] = MappingProxyType(
     {
         "cameras.count": "cameras",
         "cameras.preset": "rig",
+        "cameras.radius": "distance of the cameras from the middle",
+        "cameras.size": "size of the pictures",
         "cameras.spread": "angle from the first camera to the last",
         "clutter.coverage": "share of hidden joints",
         "detector.keypoints.quality": "factor of the profile's keypoint errors",
@@ -223,7 +225,12 @@ NAMES: Mapping[str, str] = MappingProxyType(
         "people.hidden": "time hidden from all cameras",
         "people.look_alike": "similarity of clothes, 1: one uniform",
         "people.passing": "distance between people who pass",
+        "sensor.exposure": "spread of the cameras' exposure",
+        "sensor.jpeg": "quality of JPEG, 0: none",
         "sensor.profile": "quality of the pictures",
+        "sensor.read_noise": "noise of the readout, of white",
+        "sensor.shutter": "exposure time",
+        "sensor.softness": "blur by lens and pixels",
     }
 )
 """Names of the keys that the studies of this project sweep: the descriptions of keys are too long for an axis."""

@@ -318,7 +318,8 @@ class TestCommand:
         assert "no such score" in self.refused(ran.folder, "--threshold", "pxp=90")
 
     def test_a_place_that_cannot_be_written_to(self, ran, tmp_path):
-        assert "there is no folder" in self.refused(ran.folder, "--out", tmp_path / "no" / "page.html")
+        (tmp_path / "file").write_text("not a folder")
+        assert "cannot be written" in self.refused(ran.folder, "--out", tmp_path / "file" / "page.html")
 
     def test_a_trial_without_a_recording(self, ran):
         assert "add --rerun FILE" in self.refused(ran.folder, "--trial", "0")
