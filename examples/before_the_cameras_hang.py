@@ -32,7 +32,7 @@ def on_the_walls() -> Rig:
 
 def main() -> None:
     """Compare rigs for four people in 4 by 4 m, then try every place for one more camera."""
-    layer = FastLayer.of(Volume.box(4.0, 4.0), detector=read_profile("typical"), people=4, orientations=4)
+    layer = FastLayer.in_volume(Volume.box(4.0, 4.0), detector=read_profile("typical"), people=4, orientations=4)
 
     def predict(cameras: list[Camera]) -> Prediction:
         return layer.predict([layer.terms(camera) for camera in cameras], variant="full")

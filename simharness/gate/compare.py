@@ -7,7 +7,7 @@ from typing import Literal
 from simharness.gate.baseline import GATED, TIME, Measurement
 from simharness.gate.score_tests import Pairs, Tested, pairs_of, test_of
 from simharness.gate.trial_command import TrialKey
-from simharness.scenario.sections.method_section import GateSection
+from simharness.scenario.sections.gate_section import GateSection
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.paired_tests import holm
 

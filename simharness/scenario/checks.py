@@ -11,7 +11,7 @@ from mvpose.detections import MOST_DETECTIONS
 from mvpose.files.message_text import all_in_one_line
 from simharness.scenario.layers import Origins
 from simharness.scenario.sections.cameras_section import CamerasSection
-from simharness.scenario.sections.method_section import GateSection
+from simharness.scenario.sections.gate_section import GateSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.sections.section import Section
 from simharness.scenario.toml_files import ScenarioError

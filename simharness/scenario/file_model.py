@@ -9,7 +9,7 @@ from pydantic import Field
 
 from simharness.scenario.sections.cameras_section import CamerasSection, SensorSection
 from simharness.scenario.sections.detector_section import DetectorSection
-from simharness.scenario.sections.method_section import GateSection
+from simharness.scenario.sections.gate_section import GateSection
 from simharness.scenario.sections.scenario import Scenario
 
 MOST_TRIALS = 1_000_000

@@ -46,7 +46,8 @@ from simharness.scenario.document import Document, read_document
 from simharness.scenario.file_model import MOST_TRIALS
 from simharness.scenario.layers import Origins, merge, set_origin
 from simharness.scenario.presets import Presets
-from simharness.scenario.sections.method_section import GateSection, wrong_variants
+from simharness.scenario.sections.gate_section import GateSection
+from simharness.scenario.sections.method_section import wrong_variants
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.sweep import Sweep, SweepReader, Value, value_at, vary
 from simharness.scenario.toml_files import ScenarioError

@@ -23,7 +23,7 @@ from simharness.scenario.sections.room_section import ClutterSection
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in FENCE.findall(page))
-    assert languages == {"python": 15, "toml": 13, "yaml": 1}
+    assert languages == {"python": 15, "toml": 14, "yaml": 1}
 
 
 def test_the_shares_of_the_face_are_valid():
@@ -31,6 +31,12 @@ def test_the_shares_of_the_face_are_valid():
     assert (
         DetectorSection.model_validate(tomllib.loads(block)).keypoints.face.ears[9] == 0.99
     )  # 270 degrees: the far side
+
+
+def test_the_network_of_the_detector_is_named():
+    (block,) = {block for block in blocks("toml") if 'source = "network"' in block}
+    section = DetectorSection.model_validate(tomllib.loads(block)["detector"])
+    assert section.networks == {"network": "movenet"}
 
 
 def test_objects_of_files_are_named_by_a_scenario():

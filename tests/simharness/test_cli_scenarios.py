@@ -165,9 +165,10 @@ class TestSchema:
         assert (tmp_path / "schema.json").read_text(encoding="utf-8") == dumps()
 
     def test_an_unwritable_file_is_refused(self, simharness, tmp_path):
-        result = simharness("schema", "--out", str(tmp_path / "none" / "schema.json"))
+        (tmp_path / "file").write_text("not a folder")
+        result = simharness("schema", "--out", str(tmp_path / "file" / "schema.json"))
         assert result.exit_code == 2
-        assert "schema.json: cannot be written: No such file or directory" in result.stderr
+        assert "schema.json: cannot be written" in result.stderr
 
 
 @pytest.mark.parametrize("command", ["scenarios", "show", "schema"])

@@ -9,7 +9,7 @@ import pytest
 from simharness.gate.baseline import FRAMES, GATED, TIME, Measurement
 from simharness.gate.compare import compare
 from simharness.gate.trial_command import TrialKey
-from simharness.scenario.sections.method_section import GateSection
+from simharness.scenario.sections.gate_section import GateSection
 from simharness.scoring.catalogue import SCORES
 
 GATE = GateSection()

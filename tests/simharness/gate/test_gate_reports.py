@@ -13,7 +13,7 @@ from simharness.gate.baseline import FRAMES, GATED, TIME, Measurement
 from simharness.gate.compare import FailedCase, GateResult, compare
 from simharness.gate.gate_reports import SPEED, WHOLE, difference, junit, markdown
 from simharness.gate.trial_command import TrialKey
-from simharness.scenario.sections.method_section import GateSection
+from simharness.scenario.sections.gate_section import GateSection
 from simharness.scoring.catalogue import SCORES
 
 COMMAND = "simharness run a.toml --set 'cases={}' --seed 3"

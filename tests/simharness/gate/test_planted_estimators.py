@@ -12,7 +12,7 @@ from simharness.gate.baseline import FRAMES, TIME
 from simharness.gate.compare import compare
 from simharness.gate.suite import run_suite
 from simharness.scenario.load import load_study
-from simharness.scenario.sections.method_section import GateSection
+from simharness.scenario.sections.gate_section import GateSection
 
 SUITE = f"""
 extends = {json.dumps(str(QUICKSTART))}

@@ -8,7 +8,7 @@ from simharness.gate.score_tests import least_corrected_p, least_seeds
 from simharness.gate.suite import baseline_of, fingerprint
 from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
 from simharness.scenario.load import load_study
-from simharness.scenario.sections.method_section import GateSection
+from simharness.scenario.sections.gate_section import GateSection
 
 
 @pytest.mark.parametrize("cases", [1, 3])

@@ -103,5 +103,5 @@ def test_scores_of_feet_are_those_of_the_paired_person():
 
 
 def test_a_network_that_reads_the_body_alone_is_refused(tmp_path):
-    with pytest.raises(ValueError, match="leave skeleton or onnx out"):
+    with pytest.raises(ValueError, match="leave skeleton or the network out"):
         load(QUICKSTART, overrides=[f"detector.onnx={tmp_path / 'head.onnx'}", "detector.skeleton=halpe26"])
