@@ -28,7 +28,6 @@ from mvpose.calibration.reading_changes import (
     turned_camera,
 )
 from mvpose.camera import Camera
-from mvpose.files.message_text import prefixed
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 _OF_ALL = ("mirrored", "up")  # changes of the whole world
@@ -103,11 +102,13 @@ class Mend:
             pair = dict(zip(self.cameras, (replace(other, name=one.name), replace(one, name=other.name)), strict=True))
             return [pair.get(name, camera) for name, camera in zip(names, cameras, strict=True)]
         change = MENDS[self.name].change(self.values)
-        with prefixed(f"--mend {self}"):
+        try:
             return [
                 change(camera) if not self.cameras or name in self.cameras else camera
                 for name, camera in zip(names, cameras, strict=True)
             ]
+        except ValueError as error:
+            raise ValueError(f"--mend {self}: {error}") from None
 
 
 @dataclass(frozen=True)

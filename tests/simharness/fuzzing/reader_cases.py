@@ -19,6 +19,7 @@ from test_mocap_bvh import BVH
 from test_people_readers import cells, tracks, write_c3d, write_mat, write_trc
 from test_store import make_record
 
+from mvpose.files.atomic_files import MANIFEST, atomic_folder, check_replaceable
 from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
 from mvpose.formats.calibration.calibration_formats import read_calibration
 from mvpose.formats.detections.recorded_frames import read_frames
@@ -29,7 +30,6 @@ from mvpose.skeleton import PANOPTIC19
 from simharness.detector.descriptors import DescriptorModel
 from simharness.gate.baseline import KEPT, Measurement, read_baseline, write_baseline
 from simharness.gate.trial_command import TrialKey
-from simharness.outputs.benchmark.layout import check_place
 from simharness.reality.recording_file import read_keys
 from simharness.scenario.load import load, load_study
 from simharness.scenario.presets import read_profile
@@ -61,6 +61,12 @@ class ReaderCase:
     file: str
     make: Callable[[Path], object]
     read: Callable[[Path], object]
+
+
+def results(folder):
+    """A folder of results of the command "fuzz", with its manifest."""
+    with atomic_folder(folder, "fuzz") as partial:
+        (partial / "poses.json").write_text("{}")
 
 
 def calibration(file, write):
@@ -246,11 +252,7 @@ CASES = {
     "run summary": ReaderCase("summary.json", lambda folder: write_run(make_record(people=2), folder), read_run),
     "run estimates": ReaderCase("estimates.npz", lambda folder: write_run(make_record(people=2), folder), read_run),
     "run timings": ReaderCase("timings.parquet", lambda folder: write_run(make_record(people=2), folder), read_run),
-    "export manifest": ReaderCase(
-        "manifest.json",
-        lambda folder: (folder / "manifest.json").write_text('{"format": "simharness export", "version": 1}'),
-        check_place,
-    ),
+    "manifest of results": ReaderCase(MANIFEST, results, lambda folder: check_replaceable(folder, "fuzz")),
     "network card": ReaderCase("net.json", network, lambda folder: Session(folder / "net.onnx")),
     "network distances": ReaderCase("net.json", measured_network, described),
     "ONNX network": ReaderCase(
