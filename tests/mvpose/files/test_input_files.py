@@ -126,7 +126,7 @@ SHIPPED = {
     "simharness/world/rigs/layouts.py", "simharness/world/humans/body.py", "simharness/detector/reported.py",
     "simharness/capture/outer_views.py", "simharness/world/scene/rooms/kinds.py",
     "simharness/world/humans/clothing_colors.py",
-    "simharness/trial/kernel_compilation.py",
+    "simharness/trial/kernel_compilation.py", "mvpose/formats/joint_names.py", "mvpose/networks/catalogue/published.py",
 }  # fmt: skip
 CALLS = re.compile(
     r"(?:^|\.)(?:read_text|read_bytes|loadmat|read_parquet|scan_parquet|FileStorage|imread)$|^(?:np\.load|json\.loads?|"

@@ -144,7 +144,9 @@ def test_an_axis_has_name_unit_and_key():
     assert ">error of camera positions, m (faults.translation)<" in study_plots.curve(
         "named", factor="faults.translation", **options
     )
-    assert ">sensor.shutter, s<" in study_plots.curve("unnamed", factor="sensor.shutter", **options)
+    assert ">detector.correlation.life, s<" in study_plots.curve(
+        "unnamed", factor="detector.correlation.life", **options
+    )
 
 
 def test_the_note_on_a_mean_is_short():
