@@ -150,8 +150,8 @@ def estimate_into(
         note(each)
     found = estimate_people(inputs, method, trust=wanted.trust)
     people, left_out = within_limits(found, wanted.limits, tracked=tracks)
-    if told := left_out.sentences():
-        note(f"left out: {'; '.join(told)}")
+    if sentences := left_out.sentences():
+        note(f"left out: {'; '.join(sentences)}")
     diagnosis = examine(inputs) if wanted.doctor else None
     write_results(
         wanted.out,

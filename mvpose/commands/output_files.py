@@ -71,10 +71,11 @@ def check_place(path: Path | None, *, option: str, mark: bytes) -> None:
     Args:
         path: the file; None: nothing is written.
         option: its option, for messages.
-        mark: what every file of this kind holds. An existing file without it is of another origin, and not replaced.
+        mark: what every file of this kind holds. An existing file without it is not replaced: another program
+            wrote it.
 
     Raises:
-        ValueError: the file cannot be written, or is of another origin.
+        ValueError: the file cannot be written, or was not written by this program.
     """
     if path is None:
         return

@@ -52,11 +52,12 @@ BESIDE_THE_SIMULATION = ("scenario/sections/gate_section.py",)
 """Modules in :data:`SIMULATION` that make neither: what the gate allows."""
 
 BORROWED = (
-    "formats/calibration", "formats/joint_names.py", "formats/people", "networks/detector.py", "networks/finders.py",
-    "networks/movenet.py", "networks/posenet.py", "recording.py", "wholebody",
+    "formats/calibration", "formats/joint_names.py", "formats/people", "networks/card.py", "networks/crops.py",
+    "networks/detector.py", "networks/finders.py", "networks/movenet.py", "networks/pose.py", "networks/posenet.py",
+    "networks/reid.py", "networks/session.py", "recording.py", "wholebody",
 )  # fmt: skip
-"""Folders and modules of ``mvpose`` that simulations use: readers of rigs and of people to re-enact, detectors of
-people in pictures, skeletons with feet and hands and their estimates."""
+"""Folders and modules of ``mvpose`` that simulations use: readers of rigs and of people to re-enact, networks that
+read pictures, skeletons with feet and hands and their estimates."""
 
 BESIDE_THE_METHOD = (
     "cli", "commands", "files", "formats", "networks/catalogue", "networks/detector.py", "networks/finders.py",

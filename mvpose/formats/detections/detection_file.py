@@ -157,7 +157,7 @@ def picture_people(
 
 
 def nameless_skeleton(joints: int) -> JointNames:
-    """Return a skeleton of nameless joints, of files that do not name theirs; :mod:`.skeleton_choice` names them."""
+    """Return a skeleton of joints without names, of files that give none; :mod:`.skeleton_choice` names them."""
     return JointNames(f"{joints} joints", tuple(f"joint {row}" for row in range(joints)))
 
 

@@ -54,7 +54,7 @@ def with_sizes(rig: Rig, extents: Floats, *, size: tuple[int, int] | None = None
 
 
 def check_size(rig: Rig, size: tuple[int, int]) -> None:
-    """Check that a given size of the pictures can be theirs.
+    """Check that a given size can be that of the pictures.
 
     Args:
         rig: cameras of the calibration, some of :data:`UNKNOWN_SIZE`.

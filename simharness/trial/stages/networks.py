@@ -62,9 +62,11 @@ class ReadFrames:
             ]
             if finder is not None:
                 found = find_people(finder, images)
+                if head is not None:  # before persons are assigned: a detector of boxes has no keypoints
+                    found = head.detect(images, found.view, found.boxes, box_scores=found.box_scores)
                 ids = functools.cache(lambda view, frame=frame: picture_source.image(self.exposures, frame, view).ids)
                 detected = Detected(found, with_detections(detected.truth, found, ids))
-            if head is not None:
+            elif head is not None:
                 detected = read_keypoints(head, detected, images)
             if network is not None:
                 detected = read_descriptors(network, detected, images)

@@ -203,6 +203,7 @@ class TestCode:
             ("mvpose/networks/data/reid.onnx", {"method"}),
             ("mvpose/formats/calibration/opencv.py", {"simulation"}),
             ("mvpose/formats/people/trc.py", {"simulation"}),
+            ("mvpose/networks/crops.py", {"simulation", "method"}),  # networks read the pictures of trials
             ("mvpose/formats/detections/openpose.py", set()),
             ("mvpose/files/input_files.py", set()),
             ("mvpose/pyproject.toml", set()),

@@ -100,6 +100,19 @@ def test_people_are_those_whom_a_network_finds(scenario, tmp_path):
         np.testing.assert_array_equal(before.truth.pixels, after.truth.pixels)
 
 
+def test_people_in_the_boxes_of_a_network_are_those_on_whom_the_keypoints_of_a_head_lie(scenario, tmp_path):
+    """A detector of boxes has no keypoints: only those of the head say whom a detection shows."""
+    full = ['method.variants=["full"]']
+    truth = detected_frames(load(scenario(""), overrides=full))[1][0].truth
+    view = int(np.isfinite(truth.pixels).all(axis=(1, 2, 3)).argmax())
+    constant_people(tmp_path / "yolox_boxes.onnx", truth.pixels[view], (200, 150), kind="boxes")
+    dots(tmp_path / "head.onnx")
+    boxes = 'source = "network"\nnetwork = "yolox_boxes.onnx"\nonnx = "head.onnx"'
+    found = detected_frames(load(scenario("", detector=boxes), overrides=full))[1]
+    assert all((frame.detections.scores > 0).any() for frame in found)
+    assert any((frame.truth.person >= 0).any() for frame in found)
+
+
 def test_a_trial_is_that_of_its_network(scenario, tmp_path):
     places = np.random.default_rng(0).uniform(20, 120, (2, 17, 2))
     identities = set()
