@@ -131,6 +131,9 @@ class PeopleSection(Section):
     alike: Count = Field(
         0, description="number of people to whom look_alike applies, counted from the first; 0: all people"
     )
+    camouflage: Share = Field(
+        0.0, description="share of the colour of the walls in all clothes; 1: all are dressed in that colour"
+    )
     playback: Literal["kinematic", "dynamic"] = Field(
         "kinematic", description="kinematic: as planned; dynamic: tracked by actuators under gravity and contact"
     )

@@ -320,6 +320,12 @@ def _toward(look: Look, uniform: Look, share: float, changes: list[bool]) -> Loo
     return replace(look, **clothes)
 
 
+def camouflaged(look: Look, color: Color, share: float) -> Look:
+    """Return a look whose clothes, hat and bag have a ``share`` of a color, such as that of the walls, mixed in."""
+    clothes: dict[str, Any] = {key: mix(getattr(look, key), color, share) for key in UNIFORM_COLORS}
+    return replace(look, **clothes)
+
+
 def _contrasting(color: Color, share: float) -> Color:
     """Pick an accent colour whose lightness differs clearly from that of a colour; ``share`` 0 to 1 selects it."""
     accents = [_color(code) for code in _ACCENTS]

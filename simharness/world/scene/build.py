@@ -25,7 +25,7 @@ from simharness.world.humans.clothing import dress
 from simharness.world.humans.figure import figure_mesh
 from simharness.world.humans.population import draw_shape, is_child
 from simharness.world.humans.shape import Shape
-from simharness.world.humans.wardrobe import Look, draw_looks
+from simharness.world.humans.wardrobe import Look, camouflaged, draw_looks
 from simharness.world.motion.choreography import choreograph
 from simharness.world.motion.mocap import load_people, recorded_shape
 from simharness.world.motion.motion import Motion, Presence, held, motion_clock
@@ -39,7 +39,7 @@ from simharness.world.scene.rooms.kinds import check_size, settled
 from simharness.world.scene.rooms.lamps import area_lights, has_ceiling
 from simharness.world.scene.rooms.openings import draw_openings
 from simharness.world.scene.rooms.room_lighting import room_lighting
-from simharness.world.scene.rooms.shell import make_interior
+from simharness.world.scene.rooms.shell import make_interior, wall_color
 
 CLOCK_MARGIN = 1.0  # seconds of motion before and after the sequence: clock errors of cameras are smaller
 _KEPT = 24  # people, about 5 MB each: those of a scene and of the next ones
@@ -122,6 +122,9 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     _check_area(scenario)
     clock = motion_clock(scenario.duration, margin=CLOCK_MARGIN)
     looks = draw_looks(seed, people.count, look_alike=people.look_alike, alike=people.alike)
+    if people.camouflage:
+        walls = wall_color(room, seed)
+        looks = tuple(camouflaged(look, walls, people.camouflage) for look in looks)
     cast = tuple(make_person(shape, look) for shape, look in zip(_shapes(scenario), looks, strict=True))
     movers = [person.mover for person in cast]
     plan = choreograph(scenario, movers, clock, widest=_largest_area(scenario), cameras=rig.centers)

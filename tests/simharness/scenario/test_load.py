@@ -46,8 +46,8 @@ class TestKeys:
         message = refusal(path)
         assert message.startswith(f"{path}: people.cuont is not a key; did you mean people.count?")
         assert (
-            "[people] has activities, alike, area, around, assist, children, count, group, hidden, look_alike, motion, "
-            "passing, playback, push, spacing, traffic" in message
+            "[people] has activities, alike, area, around, assist, camouflage, children, count, group, hidden, "
+            "look_alike, motion, passing, playback, push, spacing, traffic" in message
         )
 
     def test_a_key_of_another_section_is_found_there(self, scenario_file):

@@ -16,6 +16,7 @@ from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.lighting import AreaLight
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
+from simharness.world.humans.clothing_colors import Color
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import quad_mesh
 from simharness.world.scene.objects.solids import Solid
@@ -69,7 +70,7 @@ def make_room(room: RoomSection, seed: int, openings: Sequence[Opening] = ()) ->
     the other. In pictures the walls have holes at windows; for rays and contacts they are whole.
     """
     room = settled(room, seed)
-    x, y, z = room.size[0] / 2, room.size[1] / 2, room.size[2]
+    x, y = room.size[0] / 2, room.size[1] / 2
     rng = stream(seed, "room", "floor")
     texture = _chosen(FLOORS, room.floor, rng)(rng)
     slab = Box((0.0, 0.0, -_THICK / 2), (x, y, _THICK / 2))
@@ -78,12 +79,26 @@ def make_room(room: RoomSection, seed: int, openings: Sequence[Opening] = ()) ->
         return floor, _open_ground(x, y, texture)
     if not room.walls:
         return floor, _ground(room, seed, texture)
-    rng = stream(seed, "room", "wall")
-    paper = _chosen(WALLS, room.wall, rng)(rng, z)
+    paper = _paper(room, seed)
     return floor, *(
         _wall(wall, paper, [opening for opening in openings if (opening.wall, opening.kind) == (wall, "window")])
         for wall in room_walls(room)
     )
+
+
+def wall_color(room: RoomSection, seed: int) -> Color:
+    """Return the mean colour of the walls of a room, or of its floor where it has none, sRGB albedo from 0 to 1."""
+    room = settled(room, seed)
+    rng = stream(seed, "room", "floor")
+    finish = _paper(room, seed) if room.walls else _chosen(FLOORS, room.floor, rng)(rng)
+    red, green, blue = (finish.texture.reshape(-1, 3).mean(axis=0) / 255).tolist()
+    return red, green, blue
+
+
+def _paper(room: RoomSection, seed: int) -> TiledTexture:
+    """Return the finish of the walls of a room whose kind is drawn."""
+    rng = stream(seed, "room", "wall")
+    return _chosen(WALLS, room.wall, rng)(rng, room.size[2])
 
 
 def _chosen(finishes: Mapping[str, Choice], name: str, rng: np.random.Generator) -> Choice:

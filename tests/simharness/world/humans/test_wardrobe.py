@@ -15,6 +15,7 @@ from simharness.world.humans.wardrobe import (
     UNIFORM_CHOICES,
     UNIFORM_COLORS,
     UNIFORM_NUMBERS,
+    camouflaged,
     draw_look,
     draw_looks,
 )
@@ -90,6 +91,19 @@ def test_at_one_all_wear_one_uniform_and_keep_skin_and_hair():
 def test_colours_change_linearly_to_those_of_the_uniform():
     start, half, end = (np.array([look.top for look in draw_looks(3, 4, look_alike=share)]) for share in (0, 0.5, 1))
     np.testing.assert_allclose(half, (start + end) / 2)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_camouflage_mixes_the_colour_of_the_walls_into_clothes_alone(share):
+    walls = (0.2, 0.9, 0.4)
+    for look in draw_looks(2, 6):
+        dressed = camouflaged(look, walls, share)
+        for key in UNIFORM_COLORS:
+            expected = (1 - share) * np.array(getattr(look, key)) + share * np.array(walls)
+            np.testing.assert_allclose(getattr(dressed, key), expected)
+        assert {k: v for k, v in vars(dressed).items() if k not in UNIFORM_COLORS} == {
+            k: v for k, v in vars(look).items() if k not in UNIFORM_COLORS
+        }
 
 
 def test_every_cut_and_pattern_is_drawn():
