@@ -1,7 +1,5 @@
 """Simulated people, cameras and 2D detectors with exact ground truth, and scores of the method under test."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

@@ -7,8 +7,6 @@ them, as by least squares. The width of the distribution is estimated with the c
 intervals are narrow where the other cameras prove to be right.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +66,7 @@ class PriorWeights:
     information: Floats
 
     @classmethod
-    def wide(cls, prior: Prior, views: int) -> PriorWeights:
+    def wide(cls, prior: Prior, views: int) -> "PriorWeights":
         """Return the start: all cameras may be far off, so that none is taken to be right."""
         width = np.ones(PARAMETERS)
         for group in _ESTIMATED:
@@ -79,7 +77,7 @@ class PriorWeights:
         """Return half the squared standardised parameters, (V, 11)."""
         return 0.5 * float((self.information * parameters**2).sum())
 
-    def updated(self, prior: Prior, parameters: Floats, variances: Floats, free: Bools) -> PriorWeights:
+    def updated(self, prior: Prior, parameters: Floats, variances: Floats, free: Bools) -> "PriorWeights":
         """Return the weights for errors that were found.
 
         A Student variable is a normal one of unknown precision; this is a step of expectation maximisation of the
@@ -102,7 +100,7 @@ class PriorWeights:
             width[group] = np.sqrt((_BELIEF + total) / (_BELIEF + free[:, group].sum()))
         return PriorWeights(width, precision / (width * prior.sigmas()) ** 2)
 
-    def widened(self, variances: Floats, free: Bools) -> PriorWeights:
+    def widened(self, variances: Floats, free: Bools) -> "PriorWeights":
         """Return the weights for intervals: the widths are estimates from few cameras.
 
         A normal variable whose variance was estimated from n numbers has a Student distribution with n degrees of

@@ -4,8 +4,6 @@ Everything is painted through coverage masks that are drawn four times as large 
 width and position, and a translucent skeleton is evenly translucent where its limbs meet.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -251,7 +249,7 @@ def text_mask(text: str, size: float) -> NDArray[np.float32]:
 
 
 @cache
-def _font(size: int) -> FreeTypeFont | ImageFont:
+def _font(size: int) -> "FreeTypeFont | ImageFont":
     from PIL import ImageFont as fonts
 
     return fonts.load_default(size)

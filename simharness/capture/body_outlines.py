@@ -4,8 +4,6 @@ The skin of a part is nearly convex, so its extreme vertices in a few directions
 its outline from every viewpoint. Edges are clipped at the image border.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -42,7 +40,7 @@ class Outline:
     edges: NDArray[np.int64]
 
     @classmethod
-    def from_body(cls, body: Body) -> Outline:
+    def from_body(cls, body: Body) -> "Outline":
         """Choose the outermost vertices of a body: the extreme vertices of the skin of each bone in all directions."""
         directions = even_directions(_DIRECTIONS)
         share = np.zeros((len(body.vertices), len(body.bones)), np.float32)

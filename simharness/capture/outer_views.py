@@ -11,8 +11,6 @@ The model has no joints of the face: the ``face_...`` of a skeleton are unknown.
 ``tools.body.hands_and_feet``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
 from functools import cache
@@ -106,7 +104,7 @@ class OuterJoints:
     depths: Floats
 
     @classmethod
-    def of_body(cls, body: Body, skeleton: Skeleton) -> OuterJoints:
+    def of_body(cls, body: Body, skeleton: Skeleton) -> "OuterJoints":
         """Return the joints of a body beyond COCO17 in the order of a skeleton.
 
         Raises:

@@ -4,8 +4,6 @@ For studies that need no images. :mod:`simharness.capture.ray_casting` finds the
 visibility is the same as for pictures, :func:`simharness.capture.joint_visibility.classify`.
 """
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -85,7 +83,7 @@ class RayObserver:
 def cast_bands(
     caster: RayCaster,
     states: Sequence[PlaybackState],
-    cameras: CameraArrays,
+    cameras: "CameraArrays",
     pixels: Floats,
     targets: Floats,
     in_picture: Bools,
@@ -137,7 +135,7 @@ class CameraArrays:
     table: Floats
 
     @classmethod
-    def of_cameras(cls, cameras: Sequence[Camera], last: CameraArrays | None = None) -> CameraArrays:
+    def of_cameras(cls, cameras: Sequence[Camera], last: "CameraArrays | None" = None) -> "CameraArrays":
         """Return the parameters of cameras, or ``last`` if it holds these same objects: a rig that stands still."""
         if last is not None and len(cameras) == len(last.cameras) and all(map(operator.is_, cameras, last.cameras)):
             return last

@@ -1,7 +1,5 @@
 """``simharness blame``: what cost a scenario its score, cause by cause."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -74,7 +72,7 @@ def blame(
     print_blame(found, Console())
 
 
-def print_blame(blame: Blame, console: Console) -> None:
+def print_blame(blame: "Blame", console: Console) -> None:
     """Print what cost a scenario its score: a row for each cause, and what to mend first."""
     from simharness.cli.score_tables import ScoreTable
     from simharness.study.causes.blame_text import conclusion, heading, points, surest

@@ -1,7 +1,5 @@
 """``simharness check``: the regression gate."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -25,7 +23,7 @@ _MARKS = {
     "--junit": b'"simharness check"',
     "--summary": b", compared with the baseline",
 }
-_STYLES: dict[Verdict, str] = {"worse": "red", "unexpected": "yellow", "better": "green"}
+_STYLES: "dict[Verdict, str]" = {"worse": "red", "unexpected": "yellow", "better": "green"}
 
 
 def add_to(app: typer.Typer) -> None:
@@ -105,7 +103,7 @@ def check(
         raise typer.Exit(BAD_INPUT)
 
 
-def _write(result: GateResult, reports: Mapping[str, Path]) -> bool:
+def _write(result: "GateResult", reports: Mapping[str, Path]) -> bool:
     """Write the reports independently of each other; return whether one could not be written, after a message."""
     from mvpose.commands.output_files import write_text
     from simharness.gate.gate_reports import junit, markdown
@@ -120,7 +118,7 @@ def _write(result: GateResult, reports: Mapping[str, Path]) -> bool:
     return unwritten
 
 
-def _update(study: Study, path: Path, workers: int) -> None:
+def _update(study: "Study", path: Path, workers: int) -> None:
     """Measure a suite and write its scores as the baseline."""
     from mvpose.commands.progress import reporter
     from simharness.gate.baseline import write_baseline
@@ -144,7 +142,7 @@ def _update(study: Study, path: Path, workers: int) -> None:
     )
 
 
-def _print(check: GateResult, console: Console) -> None:
+def _print(check: "GateResult", console: Console) -> None:
     """Print the result of a check."""
     from rich.text import Text
 
@@ -171,7 +169,7 @@ def _print(check: GateResult, console: Console) -> None:
     write(f"\n{check.worst_description}\n  {check.command}")
 
 
-def _table(check: GateResult, variant: str) -> Table:
+def _table(check: "GateResult", variant: str) -> "Table":
     """Return the scores of a variant over the whole suite."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
@@ -204,7 +202,7 @@ def _table(check: GateResult, variant: str) -> Table:
     return table
 
 
-def _list_failed(failed: Sequence[FailedCase]) -> str:
+def _list_failed(failed: "Sequence[FailedCase]") -> str:
     lines = [f"failed {each.case}, seed {each.seed}: {each.error}" for each in failed[:_LISTED]]
     more = [f"failed and {len(failed) - _LISTED} more"] if len(failed) > _LISTED else []
     return "\n".join([*lines, *more])

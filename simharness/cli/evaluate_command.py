@@ -1,7 +1,5 @@
 """``simharness evaluate``: scores of the method on recordings and on their simulated twins."""
 
-from __future__ import annotations
-
 import enum
 from collections.abc import Iterable
 from pathlib import Path
@@ -220,7 +218,7 @@ def evaluate_seeds(
     print_seed_evaluation(result, Console())
 
 
-def _estimator(name: str, *, lag: float, period: float) -> Estimator:
+def _estimator(name: str, *, lag: float, period: float) -> "Estimator":
     """Return a preset, or a user-defined estimator given as FILE.py:NAME."""
     from mvpose import preset
     from simharness.trial.stages.estimators import user_estimator

@@ -1,7 +1,5 @@
 """``simharness rehearse`` and ``plan``: what a rig will give in a room, and where to hang the cameras of a room."""
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import dataclass, replace
@@ -137,7 +135,7 @@ def rehearse(
     console.print(f"report: {place / 'rehearsal.html'}", soft_wrap=True, highlight=False, markup=False)
 
 
-def _room(given: Surroundings) -> Room | None:
+def _room(given: Surroundings) -> "Room | None":
     from simharness.planning.room_file import read_room
 
     changes = {("people", "count"): given.people, ("detector",): given.detector}
@@ -145,7 +143,7 @@ def _room(given: Surroundings) -> Room | None:
     return None if given.room is None else read_room(given.room, changes=known)
 
 
-def _setup(rig: Rig, room: Room | None, given: Surroundings) -> RehearsalSetup:
+def _setup(rig: "Rig", room: "Room | None", given: Surroundings) -> "RehearsalSetup":
     """Return what the rig is rehearsed for: the room file's, or the defaults, as the options change it."""
     from simharness.planning.floor_coverage import covered_volume
     from simharness.planning.rehearsal_scene import RehearsalSetup
@@ -158,7 +156,7 @@ def _setup(rig: Rig, room: Room | None, given: Surroundings) -> RehearsalSetup:
     return RehearsalSetup(volume, read_profile(given.detector or _DETECTOR), given.people or _PEOPLE)
 
 
-def rectangle_of(text: str) -> Volume:
+def rectangle_of(text: str) -> "Volume":
     """Return the volume over a rectangle around the origin: "4x3", metres.
 
     Raises:
@@ -279,7 +277,7 @@ def plan(
     typer.echo(f"report: {page}")
 
 
-def _show(planned: RigPlan) -> None:
+def _show(planned: "RigPlan") -> None:
     """Print the sentences and the cameras of a plan."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table

@@ -1,7 +1,5 @@
 """``simharness report``: the report of a study."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -129,7 +127,7 @@ def _thresholds(given: list[str]) -> dict[str, float]:
     return thresholds
 
 
-def _write_rerun(results: Results, trial: str | None, path: Path) -> None:
+def _write_rerun(results: "Results", trial: str | None, path: Path) -> None:
     """Write the recording of a trial of a study, which is run again."""
     from simharness.outputs.study.rerun_recording import require_sdk, write_rerun
     from simharness.outputs.study.skeleton_view_3d import replay
@@ -159,7 +157,7 @@ def _write_rerun_of_run(folder: Path, trial: str | None, path: Path | None) -> N
     write_rerun(replay_run(read_run(folder)), path)
 
 
-def _choose_frame(results: Results, trial: str | None) -> WorstFrame:
+def _choose_frame(results: "Results", trial: str | None) -> "WorstFrame":
     """Return the worst frame of a trial, or of all trials."""
     from simharness.outputs.study.worst_frames import worst_frames
 

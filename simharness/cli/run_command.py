@@ -1,7 +1,5 @@
 """``simharness run``, ``render`` and ``export``: one scenario as a report, as pictures or as a benchmark sequence."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -111,7 +109,7 @@ def render(
     typer.echo(f"{len(list(folder.rglob('*.*')))} files in {folder}")
 
 
-def _tables(summary: Mapping[str, Any]) -> list[ScoreTable]:
+def _tables(summary: Mapping[str, Any]) -> "list[ScoreTable]":
     """Return the headline scores of a run, and those of identities, and of feet and hands, where there are any."""
     from simharness.outputs.run.headline import COLUMNS, WHOLE_BODY_COLUMNS, has_whole_body
     from simharness.outputs.run.identity_plots import IDENTITY_COLUMNS, has_identities
@@ -126,7 +124,7 @@ def _tables(summary: Mapping[str, Any]) -> list[ScoreTable]:
     return tables
 
 
-def _table(title: str, columns: Sequence[Column], variants: Mapping[str, Any]) -> ScoreTable:
+def _table(title: str, columns: "Sequence[Column]", variants: Mapping[str, Any]) -> "ScoreTable":
     """Return a table of scores, a row for each variant."""
     from simharness.cli.score_tables import ScoreTable
 

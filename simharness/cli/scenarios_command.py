@@ -1,7 +1,5 @@
 """``simharness scenarios``, ``show``, ``schema`` and ``mjcf``: the shipped scenarios, and what is in their files."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -77,7 +75,7 @@ def show(
     typer.echo(outline(plan, note) + needs, nl=False)
 
 
-def _needs(plan: ScenarioPlan) -> str:
+def _needs(plan: "ScenarioPlan") -> str:
     """Return the needs of the base as comments, with which the scenario can still be read; "" for an impossible rig."""
     from simharness.trial.needs import describe, needs_of
 
@@ -137,7 +135,7 @@ def mjcf(
     typer.echo(f"python -m mujoco.viewer --mjcf={file}")
 
 
-def _table(title: str, rows: Sequence[tuple[str, str, str]], width: int, *, trials: bool = False) -> Table:
+def _table(title: str, rows: Sequence[tuple[str, str, str]], width: int, *, trials: bool = False) -> "Table":
     """Return a table of names, ``width`` columns wide, descriptions and, if requested, numbers of trials."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table

@@ -3,8 +3,6 @@
 A table that is wider than the terminal is divided, and nothing is cut.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -87,7 +85,7 @@ _ONLY_ANNOTATED = (
 _PAPER_ACTORS = (0, 1, 2)  # of Campus and Shelf, by tables 1 and 2
 
 
-def print_evaluation(evaluation: Evaluation, console: Console) -> None:
+def print_evaluation(evaluation: "Evaluation", console: Console) -> None:
     """Print PCP by actor and part beside that of the paper, errors that PCP ignores, and the time per stage."""
     summaries = evaluation.summary()["variants"]
     headline = Text.assemble(
@@ -118,7 +116,7 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
     console.print(Group(*(Padding(block, (0, 0, 1, 0)) for block in blocks)))
 
 
-def print_twin_comparison(comparison: TwinComparison, console: Console) -> None:
+def print_twin_comparison(comparison: "TwinComparison", console: Console) -> None:
     """Print the PCP of every variant in reality and in simulation side by side."""
     from simharness.reality.twin import TOLERANCE
 
@@ -153,7 +151,7 @@ def print_twin_comparison(comparison: TwinComparison, console: Console) -> None:
     )
 
 
-def print_seed_evaluation(result: SeedEvaluation, console: Console) -> None:
+def print_seed_evaluation(result: "SeedEvaluation", console: Console) -> None:
     """Print PCP by variant, of all people and of each person, and the scores of identities of variants with any."""
     first, *others = result.scenario.method.variants
     people = range(result.scenario.people.count)
@@ -174,14 +172,14 @@ def print_seed_evaluation(result: SeedEvaluation, console: Console) -> None:
         console.print(_ONLY_ANNOTATED.strip(), style="dim", highlight=False)
 
 
-def _paper(evaluation: Evaluation) -> Mapping[str, PublishedPcp]:
+def _paper(evaluation: "Evaluation") -> "Mapping[str, PublishedPcp]":
     """Return the published scores by variant; of other recordings none."""
     from simharness.reality.evaluation import ABLATION
 
     return ABLATION.get(evaluation.name, {}) if evaluation.actors == _PAPER_ACTORS else {}
 
 
-def _pcp_table(name: str, evaluation: Evaluation) -> Table:
+def _pcp_table(name: str, evaluation: "Evaluation") -> Table:
     scores, actors = evaluation.variants[name], evaluation.actors
     table = _table(f"PCP, {name}", "actor")
     for group in GROUPS:
@@ -202,7 +200,7 @@ def _pcp_table(name: str, evaluation: Evaluation) -> Table:
     return table
 
 
-def _variants_table(evaluation: Evaluation) -> Table:
+def _variants_table(evaluation: "Evaluation") -> Table:
     """Return the PCP of all actors with a row for each variant, followed by the row of the paper if it has one."""
     table = _table("PCP of the variants", "variant")
     for actor in evaluation.actors:

@@ -1,7 +1,5 @@
 """``simharness study`` and ``merge``: many trials, stored as they finish."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 from collections.abc import Iterator, Sequence
@@ -167,7 +165,7 @@ def _part(shard: str | None) -> tuple[int, int] | None:
     return int(match[1]), int(match[2])
 
 
-def _tables(results: Results) -> list[ScoreTable]:
+def _tables(results: "Results") -> "list[ScoreTable]":
     """Return the answer of a study: what its factors cost, or where it has none the mean scores.
 
     Variants that track people have another table.
@@ -190,7 +188,7 @@ def _tables(results: Results) -> list[ScoreTable]:
     return tables
 
 
-def _losses(results: Results, score: str) -> ScoreTable:
+def _losses(results: "Results", score: str) -> "ScoreTable":
     """Return what every factor costs: the score at its best and worst value, and where five points are lost."""
     from simharness.cli.score_tables import ScoreTable
     from simharness.outputs.study.curves import LOST, factors_by_case, losses
@@ -217,7 +215,7 @@ def _losses(results: Results, score: str) -> ScoreTable:
     return ScoreTable(title, labels, headings, _without_repeats(rows, len(labels) - 1))
 
 
-def _lost_at(loss: Loss, values: Sequence[Any]) -> str:
+def _lost_at(loss: "Loss", values: Sequence[Any]) -> str:
     """Return where points are lost, with its interval."""
     from simharness.outputs.study.curves import short
 
@@ -243,7 +241,7 @@ def _without_repeats(rows: Sequence[Sequence[str]], labels: int) -> list[list[st
     return result
 
 
-def _table(results: Results, title: str, trials: pl.DataFrame, scores: Sequence[str]) -> ScoreTable:
+def _table(results: "Results", title: str, trials: "pl.DataFrame", scores: Sequence[str]) -> "ScoreTable":
     """Return mean scores with intervals over seeds, a row for each variant; with one factor, for each setting."""
     import polars as pl
 
@@ -292,7 +290,7 @@ def _counts(info: dict[str, Any], what: str) -> str:
     return "\n".join(lines)
 
 
-def _report(results: Results, *, blame: int, workers: int) -> None:
+def _report(results: "Results", *, blame: int, workers: int) -> None:
     if not len(results.trials):
         return
     if blame:
@@ -306,7 +304,7 @@ def _report(results: Results, *, blame: int, workers: int) -> None:
     _write(f"report: {page}")
 
 
-def blame_results(results: Results, *, seeds: int, workers: int = 1) -> None:
+def blame_results(results: "Results", *, seeds: int, workers: int = 1) -> None:
     """Find what cost a study its score, write it into its folder, and print it."""
     from mvpose.commands.progress import reporter
     from simharness.cli.blame_command import print_blame

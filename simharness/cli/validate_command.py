@@ -1,7 +1,5 @@
 """``simharness fit-detector`` and ``validate``: what simulation predicts for a recording, beside what was recorded."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -118,7 +116,7 @@ def _check(folder: Path) -> None:
     check_place(folder / "validation.json", option="--out", mark=PROVENANCE)
 
 
-def _print_verdicts(verdicts: Sequence[BoundVerdict], name: str, console: Console) -> None:
+def _print_verdicts(verdicts: "Sequence[BoundVerdict]", name: str, console: Console) -> None:
     """Print a row for each group of verdicts, with the figure that is worst."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table

@@ -13,8 +13,6 @@ trained and that its card states: distances of one person and of two people, by 
 two crops, by the share of hidden joints, and by the parameter ``look_alike``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from collections.abc import Sequence as Many
 from dataclasses import astuple, dataclass
@@ -58,7 +56,7 @@ class DescriptorSettings:
         alike: number of people who are dressed alike; 0: all.
     """
 
-    model: DescriptorModel
+    model: "DescriptorModel"
     look_alike: float
     alike: int = 0
 

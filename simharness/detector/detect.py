@@ -7,8 +7,6 @@ sequence. Every parameter draws from separate random streams before anything is 
 changes no other draw.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass, replace
 
@@ -47,7 +45,7 @@ class Detected:
     peaks: Peaks | None = None
     whole: WholeFrame | None = None
 
-    def at_times(self, time: Floats | None) -> Detected:
+    def at_times(self, time: Floats | None) -> "Detected":
         """Return the detections with the times of their pictures, (V,) seconds; None: with none."""
         whole = self.whole
         if whole is not None:

@@ -1,7 +1,5 @@
 """Truth about detections that a network makes in pictures: whom each shows, and the error of each keypoint."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -7,8 +7,6 @@ poses, or poses made of parts of the real people in that picture.
 An M/M/∞ birth-death process decides when each one appears and how long it lasts.
 """
 
-from __future__ import annotations
-
 import heapq
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -196,7 +194,7 @@ def _single_view(views: Views, rig: Rig, config: PhantomsSection, draws: KeyedDr
     return _block(rig, len(views), rows, keypoints, scores)
 
 
-def _poses(process: BirthDeathProcess, individual: Integers, size: tuple[int, int], plausible: float) -> Floats:
+def _poses(process: "BirthDeathProcess", individual: Integers, size: tuple[int, int], plausible: float) -> Floats:
     """Return separate poses, (n, 17, 2) pixels: upright people, or joints anywhere in their boxes.
 
     At most a quarter of a box's width and height is beyond the border of the image, so part of it is always visible.
@@ -221,7 +219,7 @@ def _poses(process: BirthDeathProcess, individual: Integers, size: tuple[int, in
 
 
 def _poses_of_parts(
-    views: Views, view: int, process: BirthDeathProcess, individual: Integers, frame: Integers, default: Floats
+    views: Views, view: int, process: "BirthDeathProcess", individual: Integers, frame: Integers, default: Floats
 ) -> Floats:
     """Return poses (r, 17, 2) made of parts of the people in the pictures; they move along with these people.
 

@@ -6,8 +6,6 @@ and its own detector, and then combined for any set of cameras (:meth:`FastLayer
 the simulator adds are motion, correlation of errors in time, clutter of any shape, calibration and clocks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -72,7 +70,7 @@ class FastLayer:
         activities: Sequence[str] = ACTIVITIES,
         tracks: Floats | None = None,
         seed: int = 0,
-    ) -> FastLayer:
+    ) -> "FastLayer":
         """Draw the scenes of a volume.
 
         Args:
@@ -124,7 +122,7 @@ class FastLayer:
         deviation = usual * np.where(views.visibility[:, 0] == VISIBLE, 1.0, keypoints.scatter_hidden.by_joint())
         return CameraTerms(camera, self.scenes, seen, block, np.maximum(deviation, _LEAST_DEVIATION))
 
-    def predict(self, terms: Sequence[CameraTerms], *, variant: str = "") -> Prediction:
+    def predict(self, terms: Sequence[CameraTerms], *, variant: str = "") -> "Prediction":
         """Return what a set of cameras makes of the people.
 
         Args:
@@ -139,7 +137,7 @@ class FastLayer:
         """
         return _prediction(self.scenes, terms, reconstruct(terms, variant=variant))
 
-    def reconstruct(self, terms: Sequence[CameraTerms], *, variant: str = "") -> Reconstruction:
+    def reconstruct(self, terms: Sequence[CameraTerms], *, variant: str = "") -> "Reconstruction":
         """Return what the method makes of everyone in every scene; arguments as of :meth:`predict`."""
         return reconstruct(terms, variant=variant)
 
@@ -184,7 +182,7 @@ class Prediction:
         }
 
 
-def _prediction(scenes: StandingScenes, terms: Sequence[CameraTerms], made: Reconstruction) -> Prediction:
+def _prediction(scenes: StandingScenes, terms: Sequence[CameraTerms], made: "Reconstruction") -> Prediction:
     """Return the maps of a reconstruction."""
     truth = scenes.joints
     states = part_states(coco17_to_shelf14(truth), coco17_to_shelf14(made.nearest))

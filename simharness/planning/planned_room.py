@@ -1,7 +1,5 @@
 """Room for a plan: where people are, what hides them, and the mounts on which cameras may hang."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -261,7 +259,7 @@ class Room:
         """Return the distance of the cameras of a mount from its wall, metres; 0 for other mounts."""
         return (self.keys.places.walls or WallPlaces()).clearance if mount.kind == "wall" else 0.0
 
-    def with_lenses(self, names: tuple[str, ...]) -> Room:
+    def with_lenses(self, names: tuple[str, ...]) -> "Room":
         """Return the room with some of its lenses; fixed cameras keep theirs.
 
         Raises:

@@ -5,8 +5,6 @@ The simulator has people around the origin: the smallest rectangle around the vo
 What a rig is rehearsed for is a volume, its people and what hides them; the rig must be able to hang there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -180,7 +178,7 @@ class SceneFrame:
     half: Floats
 
     @classmethod
-    def around(cls, outline: Floats) -> SceneFrame:
+    def around(cls, outline: Floats) -> "SceneFrame":
         """Return the frame of the rectangle of least area around a polygon (n, 2), metres.
 
         One side of that rectangle lies on a side of the convex hull (Freeman and Shapira, Communications of the ACM
@@ -196,7 +194,7 @@ class SceneFrame:
         return min(frames, key=lambda frame: round(float(frame.half.prod()), 9))
 
     @classmethod
-    def _at(cls, points: Floats, bearing: float) -> SceneFrame:
+    def _at(cls, points: Floats, bearing: float) -> "SceneFrame":
         local = points @ _turn(bearing)
         low, high = local.min(axis=0), local.max(axis=0)
         return cls(_turn(bearing) @ ((low + high) / 2), bearing, (high - low) / 2)

@@ -8,8 +8,6 @@ errors at its ends are below half of its length (PCP, alpha = 0.5). Matching is 
 search are judged again by the fast layer with the method itself, and then by the simulator.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -65,7 +63,7 @@ class SightingOdds:
     sightings: int = 0
 
     @classmethod
-    def measure(cls, layer: FastLayer, cameras: Sequence[Camera]) -> SightingOdds:
+    def measure(cls, layer: FastLayer, cameras: Sequence[Camera]) -> "SightingOdds":
         """Return the odds of the layer's detector, counted over its draws in some cameras."""
         shape = (17, len(Visibility), len(_BINS) + 1)
         counts = np.zeros((3, *shape))

@@ -11,8 +11,6 @@ result depends on the seed alone and an interrupted search goes on.
 Sets keep to limits: the number of cameras, the numbers of each kind of mount, the budget, and their distances.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -108,7 +106,7 @@ class CandidateSet:
 def exchange_search(
     values: Value[Terms],
     terms: Sequence[Terms],
-    limits: Limits,
+    limits: "Limits",
     *,
     starts: int,
     seed: int,
@@ -186,7 +184,7 @@ def refine(
 
 
 def _start(
-    values: Value[Terms], terms: Sequence[Terms], limits: Limits, start: int, seed: int, fixed: Sequence[Terms]
+    values: Value[Terms], terms: Sequence[Terms], limits: "Limits", start: int, seed: int, fixed: Sequence[Terms]
 ) -> tuple[list[int], float]:
     rng = stream(seed, "plan", "start", start)
     chosen: list[int] = []
@@ -202,7 +200,7 @@ def _start(
 def _exchanged(
     values: Value[Terms],
     terms: Sequence[Terms],
-    limits: Limits,
+    limits: "Limits",
     chosen: list[int],
     rng: np.random.Generator,
     fixed: Sequence[Terms],
@@ -258,7 +256,7 @@ class Limits:
     spacing: float
 
     @classmethod
-    def of_room(cls, room: Room, candidates: Sequence[Candidate], count: int | None) -> Limits:
+    def of_room(cls, room: Room, candidates: Sequence[Candidate], count: int | None) -> "Limits":
         """Return the limits of a room.
 
         Args:

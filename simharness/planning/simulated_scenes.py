@@ -7,8 +7,6 @@ result depends on its seed alone.
 Their results are scores by condition, means over scenes, and paired losses.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -226,7 +224,7 @@ class _Scored(NamedTuple):
     mixed: Integers
 
     @classmethod
-    def joined(cls, parts: Sequence[_Scored]) -> _Scored:
+    def joined(cls, parts: "Sequence[_Scored]") -> "_Scored":
         """Return the scores of the frames of several parts."""
         return cls(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 

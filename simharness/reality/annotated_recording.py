@@ -1,7 +1,5 @@
 """Recordings with annotated joints, recorded or simulated: the input of evaluation protocols."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -107,7 +105,7 @@ class AnnotatedRecording:
         bounds = [0, *(np.flatnonzero(np.diff(self.frames) > 1) + 1).tolist(), len(self)]
         return [slice(start, stop) for start, stop in itertools.pairwise(bounds) if start < stop]
 
-    def subset(self, views: Sequence[int]) -> AnnotatedRecording:
+    def subset(self, views: Sequence[int]) -> "AnnotatedRecording":
         """Return the recording of some of its cameras, in the given order, with the same truth.
 
         Detections of other cameras are left out, and views are renumbered. The order of the detections is kept.
@@ -129,7 +127,7 @@ class AnnotatedRecording:
             detections=tuple(_seen_by(detections, new) for detections in self.detections),
         )
 
-    def during(self, rows: ArrayLike) -> AnnotatedRecording:
+    def during(self, rows: ArrayLike) -> "AnnotatedRecording":
         """Return the recording of some of its frames.
 
         Args:

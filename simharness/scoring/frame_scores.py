@@ -3,8 +3,6 @@
 Parts (PCP) are always scored on SHELF14; one-to-one pairs and their errors on the skeleton of the truth.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -62,7 +60,7 @@ class FrameScores:
         return self.estimates - self.found.sum(axis=1)
 
     @classmethod
-    def joined(cls, parts: Iterable[FrameScores]) -> FrameScores:
+    def joined(cls, parts: "Iterable[FrameScores]") -> "FrameScores":
         """Return the scores of the frames of several recordings.
 
         Raises:

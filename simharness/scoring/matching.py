@@ -5,8 +5,6 @@ A pair is positive if both detections show the same true person, and matched if 
 twice in one view, and a matching takes one of the two, so lost pairs are counted by person and view, not by detection.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +27,7 @@ class PairCounts:
     wrong: int
     lost: int
 
-    def __add__(self, other: PairCounts) -> PairCounts:
+    def __add__(self, other: "PairCounts") -> "PairCounts":
         return PairCounts(self.correct + other.correct, self.wrong + other.wrong, self.lost + other.lost)
 
     @property

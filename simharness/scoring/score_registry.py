@@ -17,8 +17,6 @@ Tables of studies, thresholds of ``simharness report`` and :func:`simharness.api
 never zero. Keys end in ``_mm``, ``_px`` or ``_ms`` where that is the unit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -80,8 +78,8 @@ class ScoreInput:
         partner: index of that estimate, (T, P); -1 where the person is missed.
     """
 
-    recording: Recording
-    estimates: tuple[Estimate, ...]
+    recording: "Recording"
+    estimates: "tuple[Estimate, ...]"
     truth: Floats
     paired: Floats
     partner: NDArray[np.int64]

@@ -1,7 +1,5 @@
 """Summary of the scores of all frames: the content of ``summary.json`` of a run and of ``--json`` of ``evaluate``."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -38,7 +36,7 @@ class VariantScores:
         object.__setattr__(self, "timings", tuple(self.timings))
 
     @classmethod
-    def pooled(cls, recordings: Sequence[VariantScores]) -> VariantScores:
+    def pooled(cls, recordings: "Sequence[VariantScores]") -> "VariantScores":
         """Return the scores of a variant in all frames of several recordings.
 
         Raises:

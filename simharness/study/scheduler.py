@@ -5,8 +5,6 @@ A trial that fails is tried again, because a worker may die for reasons outside 
 again. Variants that failed together are tried once more one by one, so that the others keep their results.
 """
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import secrets
@@ -71,7 +69,7 @@ class TrialSuccess:
     seconds: float
 
     @property
-    def parts(self) -> tuple[TrialSuccess]:
+    def parts(self) -> "tuple[TrialSuccess]":
         """The result itself, as the only part."""
         return (self,)
 
@@ -95,10 +93,10 @@ class TrialFailure:
     traceback: str
     final: bool = False
     deaths: int = 0
-    alone: tuple[TrialSuccess | TrialFailure, ...] = ()
+    alone: "tuple[TrialSuccess | TrialFailure, ...]" = ()
 
     @property
-    def parts(self) -> tuple[TrialSuccess | TrialFailure, ...]:
+    def parts(self) -> "tuple[TrialSuccess | TrialFailure, ...]":
         """Results of the variants one by one, or this failure of all variants together."""
         return self.alone or (self,)
 
@@ -215,7 +213,7 @@ def _repeats_error(failure: TrialFailure, together: TrialFailure | None) -> bool
 
 
 def _run_on_cluster(
-    units: Iterable[Unit], measure: Measure, client: Client
+    units: Iterable[Unit], measure: Measure, client: "Client"
 ) -> Generator[TrialSuccess | TrialFailure, None, None]:
     """Run units on a cluster, at most one for each thread, because units that wait at a worker are lost if it dies.
 
@@ -278,7 +276,7 @@ def _completed() -> Any:
     return as_completed()
 
 
-def _result(future: Future[Any], unit: Unit) -> TrialSuccess | TrialFailure:
+def _result(future: "Future[Any]", unit: Unit) -> TrialSuccess | TrialFailure:
     """Return the result of a finished future; a failure where its worker died.
 
     Raises:
@@ -300,7 +298,7 @@ def _result(future: Future[Any], unit: Unit) -> TrialSuccess | TrialFailure:
 
 
 @contextlib.contextmanager
-def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
+def _client(workers: int, scheduler: str | None) -> "Iterator[Client]":
     """Give a client of a new cluster of this machine, or of the cluster at an address."""
     import dask
     from distributed import Client, LocalCluster
@@ -333,7 +331,7 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
 
 
 @contextlib.contextmanager
-def _connected(scheduler: str) -> Iterator[Client]:
+def _connected(scheduler: str) -> "Iterator[Client]":
     from distributed import Client
 
     try:

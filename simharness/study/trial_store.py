@@ -15,8 +15,6 @@ Files appear by renaming, and a name always stands for the same estimates, so an
 at once: at worst two of them do the same work.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json
@@ -185,7 +183,7 @@ class Store:
             return None
         return failure if isinstance(failure, dict) else None
 
-    def copy_from(self, other: Store, identity: str) -> bool:
+    def copy_from(self, other: "Store", identity: str) -> bool:
         """Copy an entry of another store; return False where it is damaged.
 
         Raises:

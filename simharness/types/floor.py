@@ -1,7 +1,5 @@
 """Floors: simple polygons at z = 0, and the upright volumes over them. The geometry is that of Shapely."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -96,7 +94,7 @@ class Floor:
         """Return the distance of points (..., 2) from the nearest side, (...), metres."""
         return np.asarray(shapely.distance(self.edge, shapely.points(np.asarray(points, float))))
 
-    def beyond(self, other: Floor) -> Floats | None:
+    def beyond(self, other: "Floor") -> Floats | None:
         """Return the point (2,) of another polygon that is farthest outside of this one, metres; None: all is inside.
 
         Points that are less than a micrometre outside count as inside.

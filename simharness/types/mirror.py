@@ -1,7 +1,5 @@
 """Flat upright mirrors."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,7 +48,7 @@ class Mirror:
             hits = viewpoint + (images - viewpoint) * share[..., None]
         return (viewer_distance > 0) & (point_distance > 0) & self.on_glass(hits)
 
-    def moved(self, place: ArrayLike, yaw: float) -> Mirror:
+    def moved(self, place: ArrayLike, yaw: float) -> "Mirror":
         """Return the mirror rotated by ``yaw`` about the world z axis, then moved by ``place`` (2,) on the floor."""
         c, s = np.cos(yaw), np.sin(yaw)
         (x, y, z), (nx, ny, _), (dx, dy) = self.center, self.normal, np.asarray(place, float)

@@ -1,7 +1,5 @@
 """Recording: detections, ground truth and rig over time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -64,7 +62,7 @@ class Recording:
         """T, the number of frames."""
         return len(self.time)
 
-    def at_times_of(self, estimates: Sequence[Estimate]) -> Recording:
+    def at_times_of(self, estimates: Sequence[Estimate]) -> "Recording":
         """Return the recording with the true joints at the times of estimates, T, that are not those of the frames.
 
         Pictures that come with times of their own (``Detections.time``) give people at other times than the frames',

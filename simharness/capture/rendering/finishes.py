@@ -3,8 +3,6 @@
 They are computed once for a frame and serve all cameras (:mod:`simharness.capture.rendering.finish_kernels`).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -53,7 +51,7 @@ class Finishes:
     around: float = _AROUND
 
     @classmethod
-    def from_meshes(cls, meshes: tuple[Mesh, ...]) -> Finishes | None:
+    def from_meshes(cls, meshes: tuple[Mesh, ...]) -> "Finishes | None":
         """Return the finishes of meshes in the order of their faces and vertices; None if all are matte."""
         if all(mesh.finish is None for mesh in meshes):
             return None
@@ -100,7 +98,7 @@ class PosedFinishes:
     @classmethod
     def in_pose(
         cls, finishes: Finishes, vertices: Floats, before_mirror: Floats, lighting: Lighting, probes: Probes
-    ) -> PosedFinishes:
+    ) -> "PosedFinishes":
         """Return the finishes at vertices (v, 3); in a mirror their light is that of the vertices before it."""
         lights = figure_light(before_mirror, finishes.spans, probes.air)
         if lighting.mirror is not None:

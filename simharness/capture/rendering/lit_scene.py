@@ -5,8 +5,6 @@ around them, less what bodies keep from each other and themselves; a map of the 
 it, say what they keep from the still surfaces, which are darkened by it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -58,7 +56,7 @@ class MovingSamples:
     ranges: NDArray[np.int64]
 
     @classmethod
-    def from_meshes(cls, meshes: tuple[Mesh, ...]) -> MovingSamples:
+    def from_meshes(cls, meshes: tuple[Mesh, ...]) -> "MovingSamples":
         """Return the samples of meshes in the order of their faces and vertices."""
         of_vertex, of_face, corner_samples, group = _lists(4)
         spans, ranges = [], []
@@ -114,7 +112,7 @@ class ShadowGrid:
     shape: tuple[int, int]
 
     @classmethod
-    def around_probes(cls, room: RoomLight) -> ShadowGrid:
+    def around_probes(cls, room: RoomLight) -> "ShadowGrid":
         """Return the grid of a room."""
         probes = room.probes
         counts = np.array(probes.every.shape[:2])
@@ -149,7 +147,7 @@ class LitScene:
     finishes: Finishes | None
 
     @classmethod
-    def in_light(cls, geometry: SceneGeometry, lighting: Lighting, last: LitScene | None = None) -> LitScene | None:
+    def in_light(cls, geometry: SceneGeometry, lighting: Lighting, last: "LitScene | None" = None) -> "LitScene | None":
         """Return the light of a scene; None where the closed form lights it.
 
         Args:

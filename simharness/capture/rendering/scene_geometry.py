@@ -6,8 +6,6 @@ depends on the vertices of meshes that stay where they are is in :class:`StillGe
 :class:`SceneGeometry`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -98,7 +96,7 @@ class SceneGeometry:
     _shadows: Shadows | None = field(default=None, init=False, repr=False)
 
     @classmethod
-    def from_meshes(cls, meshes: Sequence[Mesh], last: SceneGeometry | None = None) -> SceneGeometry:
+    def from_meshes(cls, meshes: Sequence[Mesh], last: "SceneGeometry | None" = None) -> "SceneGeometry":
         """Return the geometry of a scene; reuses the ``last`` one as far as it is unchanged."""
         order = sorted(range(len(meshes)), key=lambda k: not meshes[k].still)
         ordered = tuple(meshes[k] for k in order)

@@ -3,8 +3,6 @@
 The kernels take the light from pixels that the maps show to be in shadow.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -39,7 +37,7 @@ class LightView:
     radius: float
 
     @classmethod
-    def on_box(cls, direction: tuple[float, float, float], low: Floats, high: Floats) -> LightView:
+    def on_box(cls, direction: tuple[float, float, float], low: Floats, high: Floats) -> "LightView":
         """Return the view on the box from ``low`` to ``high``, (3,) each; any view where the box is empty."""
         if not np.isfinite(low).all():
             low = high = np.zeros(3, np.float32)

@@ -1,7 +1,5 @@
 """Rendered pictures or films of all cameras of a scenario, and a mosaic of them, as files."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -207,7 +205,7 @@ class _VideoWriter:
         self._rate = rate
         self._writers: dict[str, FilmFile] = {}
 
-    def __enter__(self) -> _VideoWriter:
+    def __enter__(self) -> "_VideoWriter":
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -3,8 +3,6 @@
 Columns of the report's tables for variants with identities are here as well.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -52,7 +50,7 @@ class Identities:
     colors: tuple[Color, ...]
 
     @property
-    def ghosts(self) -> list[tuple[int, Labels]]:
+    def ghosts(self) -> "list[tuple[int, Labels]]":
         """Index of each identity that has estimates without a person, and the frames of these, ascending by time."""
         found: dict[int, list[int]] = {}
         for frame, (tracks, paired) in enumerate(zip(self.frames.tracks, self.pairs.track, strict=True)):

@@ -1,7 +1,5 @@
 """Measurement of a detector on a sample: every parameter with its 95 % interval."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -64,7 +62,7 @@ class MeasuredValue:
         """Whether it could be measured."""
         return bool(np.isfinite(self.value))
 
-    def agrees(self, other: MeasuredValue) -> bool:
+    def agrees(self, other: "MeasuredValue") -> bool:
         """Return whether two measured values differ by no more than the interval of their difference.
 
         That interval is the root of the squared half-widths, each on the side that faces the other value, because the
@@ -93,7 +91,7 @@ class MeasuredDetector:
     kind: DetectorKind
     values: Mapping[str, MeasuredValue]
 
-    def with_values(self, values: Mapping[str, float]) -> MeasuredDetector:
+    def with_values(self, values: Mapping[str, float]) -> "MeasuredDetector":
         """Return the measurement with calibrated values; intervals keep their distances from them as ratios."""
 
         def moved(measured: MeasuredValue, value: float) -> MeasuredValue:

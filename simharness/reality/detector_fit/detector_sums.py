@@ -3,8 +3,6 @@
 The first axis of every array, written ..., is that of the T frames, or of R resamples of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -156,11 +154,11 @@ class FrameSums(NamedTuple):
     border: Trials
     outside: Trials
 
-    def total(self) -> FrameSums:
+    def total(self) -> "FrameSums":
         """Return the sums over all frames, as one resample."""
         return _mapped(self, lambda each: each.sum(axis=0, keepdims=True))
 
-    def resampled(self, weights: Floats) -> FrameSums:
+    def resampled(self, weights: Floats) -> "FrameSums":
         """Return the sums over R resamples of the frames, from their weights (R, T)."""
         return _mapped(self, lambda each: resampled(each, weights))
 

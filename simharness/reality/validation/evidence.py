@@ -1,7 +1,5 @@
 """Figures of a recording beside those of its twins, with intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -91,7 +89,7 @@ class Evidence:
         recording: AnnotatedRecording,
         real: Mapping[RecordingChange, Tallies],
         twins: Sequence[Mapping[RecordingChange, Tallies]],
-    ) -> Evidence:
+    ) -> "Evidence":
         """Return the evidence from tallies of frames.
 
         Args:

@@ -6,8 +6,6 @@ which processes share.
 Sums of their scores over frames give the figures of a recording, and of its bootstrap resamples.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Protocol
@@ -51,7 +49,7 @@ class ScoreSums:
     frames: Floats
 
     @classmethod
-    def of_scores(cls, scores: ByRule, actors: Sequence[int]) -> ScoreSums:
+    def of_scores(cls, scores: ByRule, actors: Sequence[int]) -> "ScoreSums":
         """Return the sums of each frame alone.
 
         Args:
@@ -72,11 +70,11 @@ class ScoreSums:
             frames=np.ones(len(first)),
         )
 
-    def total(self) -> ScoreSums:
+    def total(self) -> "ScoreSums":
         """Return the sums over the first axis."""
         return ScoreSums(*(getattr(self, field.name).sum(axis=0) for field in fields(self)))
 
-    def resampled(self, weights: Floats) -> ScoreSums:
+    def resampled(self, weights: Floats) -> "ScoreSums":
         """Return the sums of R resamples of F frames, from :func:`~simharness.statistics.resampling.block_weights`."""
         return ScoreSums(*(resampled(getattr(self, field.name), weights) for field in fields(self)))
 

@@ -8,8 +8,6 @@ Distances are in units of OKS sigma x sqrt(area), the area 0.53 of the box (Ronc
 1.14, jitter up to 2.35, miss beyond.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
@@ -116,7 +114,7 @@ class BiasSection(ByJoint[Offset]):
 
     default = (0.0, 0.0, 0.0)
 
-    def of_face(self) -> BiasSection:
+    def of_face(self) -> "BiasSection":
         """Return the bias of nose, eyes and ears alone."""
         return BiasSection(nose=self.nose, eyes=self.eyes, ears=self.ears)
 
@@ -375,7 +373,7 @@ class DetectorSection(Section):
         return " and ".join(re.split(r"[/\\]", each)[-1] for each in self.networks.values()) or self.name
 
     @model_validator(mode="after")
-    def _network_reads_the_body(self) -> DetectorSection:
+    def _network_reads_the_body(self) -> "DetectorSection":
         if self.networks and self.skeleton != "coco17":
             raise ValueError(
                 f'skeleton = "coco17" with a network, which reads these 17 joints, got "{self.skeleton}": leave '

@@ -1,7 +1,5 @@
 """[people]: the people in the room and their activities."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field, model_validator
@@ -147,7 +145,7 @@ class PeopleSection(Section):
     motion: MocapSection = MocapSection()
 
     @model_validator(mode="after")
-    def _file_and_activity_agree(self) -> PeopleSection:
+    def _file_and_activity_agree(self) -> "PeopleSection":
         if self.motion.file and "activities" not in self.model_fields_set:
             object.__setattr__(self, "activities", ("mocap",))  # a named file is meant to be played
         if ("mocap" in self.activities) != bool(self.motion.file):

@@ -14,8 +14,6 @@ Shapley values of n causes need 2^n scores. With up to :data:`EXACT` causes they
 at every seed from :data:`ORDERS` random orders and are as exact as their intervals tell, which hold both spreads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -148,7 +146,7 @@ class Blame:
         }
 
     @classmethod
-    def of_json(cls, data: Mapping[str, Any]) -> Blame:
+    def of_json(cls, data: Mapping[str, Any]) -> "Blame":
         """Return the result that :meth:`json` wrote.
 
         Raises:

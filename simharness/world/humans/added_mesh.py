@@ -1,7 +1,5 @@
 """Meshes that are added to the mesh of a body, and the outlines that they are fitted to."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -107,7 +105,7 @@ class FacePoints:
     scalp: Floats
 
     @classmethod
-    def of_body(cls, body: Body) -> FacePoints:
+    def of_body(cls, body: Body) -> "FacePoints":
         """Find the places on a dressed or bare body."""
         at = {name: body.keypoints[LANDMARKS.index(name), :, :3].sum(axis=0) for name in _NAMES}
         crown = float(at["head_top"][2])

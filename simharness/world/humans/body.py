@@ -5,8 +5,6 @@ body stands in an A pose on z = 0 with the pelvis over the origin, facing +x, it
 bone (3, 4) maps points of the rest body to the world.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -100,7 +98,7 @@ class BodyModel:
     palms: Integers
 
     @classmethod
-    def load(cls, path: Path = DATA) -> BodyModel:
+    def load(cls, path: Path = DATA) -> "BodyModel":
         """Read a file written by ``tools.body.bake``.
 
         Raises:

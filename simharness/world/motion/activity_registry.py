@@ -22,8 +22,6 @@ A gesture of a standing person is shorter still: one function in ``activities/ge
 curves, with the decorator that is defined there, and its name as in step 2.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -44,7 +42,7 @@ from simharness.world.motion.routes import Route
 _PACKAGES = ("simharness.world.motion.activities", "simharness.world.motion.interactions")
 _STROLL = (0.28, 0.39)  # Froude numbers: people stroll in a room; 0.42 is comfortable outdoors
 _ON_THE_WAY = frozenset({"cross", "swap", "hide", "visit"})
-_registered: dict[str, Activity] = {}
+_registered: "dict[str, Activity]" = {}
 
 Perform = TypeVar("Perform", bound=Callable[..., Performance])
 Move = TypeVar("Move", bound=Callable[..., Motion])
@@ -78,7 +76,7 @@ class Activity:
     perform: Callable[..., Performance]
     froude: tuple[float, float] = _STROLL
     fewest: int = 0
-    configured: Callable[[Activity, PeopleSection], Activity] = lambda each, people: each
+    configured: "Callable[[Activity, PeopleSection], Activity]" = lambda each, people: each
 
 
 def activity(

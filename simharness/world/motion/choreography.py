@@ -1,7 +1,5 @@
 """Choreography: motions and props of all people of a scenario."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -307,7 +305,7 @@ class _Stage:
             duration=self._scenario.duration,
         )
 
-    def _collides(self, performance: Performance, bodies: Sequence[_Present]) -> bool:
+    def _collides(self, performance: Performance, bodies: "Sequence[_Present]") -> bool:
         """Return whether a performance comes too near to those of other groups."""
         others = [presence for _, others in self._placed.values() for presence in others]
         for one in bodies:

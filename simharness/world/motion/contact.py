@@ -1,7 +1,5 @@
 """Interpenetration of people, measured by MuJoCo with the contact geometry of their bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -33,7 +31,7 @@ class SampledBody:
     low: Floats
     high: Floats
 
-    def near(self, other: SampledBody) -> NDArray[np.intp]:
+    def near(self, other: "SampledBody") -> NDArray[np.intp]:
         """Return the indices of the times at which the bounding rectangles of two people overlap."""
         meet = (self.low < other.high) & (other.low < self.high)
         return np.flatnonzero(meet.all(axis=1))
@@ -69,7 +67,7 @@ class ContactModel:
             depth[near] = self._pair(one.person, other.person).depths(one.motion, other.motion, near)
         return depth
 
-    def _pair(self, one: int, other: int) -> _Pair:
+    def _pair(self, one: int, other: int) -> "_Pair":
         if (one, other) not in self._pairs:
             self._pairs[one, other] = _Pair(self._cast[one], self._cast[other])
         return self._pairs[one, other]

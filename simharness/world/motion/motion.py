@@ -3,8 +3,6 @@
 Trajectories of rigid objects, such as props, are sampled poses and their smooth interpolation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -211,7 +209,7 @@ class Motion:
     def __len__(self) -> int:
         return len(self.root)
 
-    def at(self, time: ArrayLike) -> Motion:
+    def at(self, time: ArrayLike) -> "Motion":
         """Return the motion resampled at times (n,), ascending; constant before the first and after the last time."""
         return Motion(np.asarray(time, float), *self.read(time))
 

@@ -1,7 +1,5 @@
 """Routes: tracks of straight legs with stops and turns on the spot, along which people walk, wait and turn back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -105,12 +103,12 @@ class Itinerary:
         self.place = np.asarray(self.place, float)
         self._start = (self.place, self.bearing)
 
-    def stand(self, seconds: float) -> Itinerary:
+    def stand(self, seconds: float) -> "Itinerary":
         """Wait."""
         self.time += max(seconds, 0.0)
         return self
 
-    def turn(self, bearing: float, *, sense: float = 0.0) -> Itinerary:
+    def turn(self, bearing: float, *, sense: float = 0.0) -> "Itinerary":
         """Turn on the spot to a bearing, the shorter way; for half a turn that of ``sense`` (1 left, -1 right)."""
         angle = float(np.angle(np.exp(1j * (bearing - self.bearing))))
         if sense and np.pi - abs(angle) < 1e-3:
@@ -122,7 +120,7 @@ class Itinerary:
             self.bearing += angle
         return self
 
-    def walk(self, length: float, *, slow: tuple[float, float, float] | None = None) -> Itinerary:
+    def walk(self, length: float, *, slow: tuple[float, float, float] | None = None) -> "Itinerary":
         """Walk straight ahead and stop.
 
         Args:
@@ -153,7 +151,7 @@ class Itinerary:
         self.place = self.place + length * ahead
         return self
 
-    def walk_to(self, place: ArrayLike) -> Itinerary:
+    def walk_to(self, place: ArrayLike) -> "Itinerary":
         """Turn to a place and walk there."""
         way = np.asarray(place, float) - self.place
         length = float(np.hypot(*way))
@@ -162,7 +160,7 @@ class Itinerary:
         return self.turn(float(np.arctan2(way[1], way[0]))).walk(length)
 
     def attempt(
-        self, step: Callable[[Itinerary], Itinerary], allowed: Callable[[Itinerary, float, float], bool]
+        self, step: "Callable[[Itinerary], Itinerary]", allowed: "Callable[[Itinerary, float, float], bool]"
     ) -> bool:
         """Append a step if it is allowed, given the itinerary with it and the step's start and end in seconds."""
         before = self.place, self.bearing, self.time, len(self._ramps), len(self._turns)

@@ -1,7 +1,5 @@
 """Track planning: tracks that stay in the area and keep people apart at all times, found one group at a time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -166,7 +164,14 @@ def plan_tracks(
 
 
 def _place(
-    rng: np.random.Generator, index: int, request: TrackRequest, board: _Board, *, plan: int, half: float, admit: Admit
+    rng: np.random.Generator,
+    index: int,
+    request: TrackRequest,
+    board: "_Board",
+    *,
+    plan: int,
+    half: float,
+    admit: Admit,
 ) -> int:
     """Add a track that keeps its distance and is admitted, if one is drawn; return the number of rejected tracks."""
     alone = _TRIES * max(0.0, _ALONE[0] + plan * _ALONE[1])

@@ -1,7 +1,5 @@
 """Exposure schedule of a sequence: time and true camera of every picture."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -82,7 +80,7 @@ class ExposureSchedule:
             object.__setattr__(self, name, array)
 
     @classmethod
-    def ideal(cls, rig: Rig, time: ArrayLike) -> ExposureSchedule:
+    def ideal(cls, rig: Rig, time: ArrayLike) -> "ExposureSchedule":
         """Return the schedule of a rig without faults: every camera as believed, all pictures at ``time`` (T,), s."""
         time = as_array(time, ("T",), "time")
         shape = (len(time), len(rig))

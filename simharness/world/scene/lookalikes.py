@@ -1,7 +1,5 @@
 """Lookalikes: objects with a human figure (``Solid.figure``), and mirror images of people."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +36,7 @@ class Lookalikes:
     mirrors: tuple[Mirror, ...]
 
     @classmethod
-    def from_scene(cls, scene: Scene) -> Lookalikes:
+    def from_scene(cls, scene: Scene) -> "Lookalikes":
         """Return the lookalikes of a scene."""
         people = len(scene.bodies)
         with_figure = [(people + k, s.name, s.figure) for k, s in enumerate(scene.solids) if s.figure is not None]

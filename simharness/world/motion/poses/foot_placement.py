@@ -1,7 +1,5 @@
 """Foot placement: footprints on a spot and along a path, steps between them, and the hip position over a bent leg."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -37,7 +35,7 @@ class Footprint:
     floor: float = 0.0
     pitch: float = 0.0
 
-    def moved(self, ahead: float = 0.0, left: float = 0.0, *, floor: float | None = None) -> Footprint:
+    def moved(self, ahead: float = 0.0, left: float = 0.0, *, floor: float | None = None) -> "Footprint":
         """Return the footprint shifted by ``ahead`` and ``left`` in metres, on another floor height if given."""
         x, y = self.place
         return replace(self, place=(x + ahead, y + left), floor=self.floor if floor is None else floor)
@@ -186,7 +184,7 @@ class Footprints:
     bearing: Floats
 
     @staticmethod
-    def beside(place: Floats, heading: Floats, *, left: float, toes_left: float) -> Footprints:
+    def beside(place: Floats, heading: Floats, *, left: float, toes_left: float) -> "Footprints":
         """Return the footprints beside a path.
 
         Args:
@@ -197,7 +195,7 @@ class Footprints:
         """
         return Footprints(place + left * leftward(heading), heading + toes_left)
 
-    def to(self, following: Footprints, *, progress: Floats, pitch: Floats, lift: Floats, rolling: FootRoll) -> Foot:
+    def to(self, following: "Footprints", *, progress: Floats, pitch: Floats, lift: Floats, rolling: FootRoll) -> Foot:
         """Return the motion of the foot on its way from these footprints to the following ones.
 
         Args:

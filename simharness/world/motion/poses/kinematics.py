@@ -1,7 +1,5 @@
 """Forward kinematics of one body, computed with the MuJoCo model of the person, and the roll of its soles."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -110,7 +108,7 @@ class Kinematics:
         return -float(self.neutral_skin[:, 2].min())
 
     @cached_property
-    def rolling(self) -> FootRoll:
+    def rolling(self) -> "FootRoll":
         """Foot roll of the left foot; the sole of the right foot is its mirror image."""
         return roll_sole(self.soles["left"])
 

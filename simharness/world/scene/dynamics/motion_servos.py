@@ -6,8 +6,6 @@ a stronger collision or push has consequences. Servos and assistance act at 480 
 the rate of the plans.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -234,12 +232,12 @@ class MotionServos:
                 if (k + 1) % self._substeps == 0:
                     yield self.data.qpos.copy()
 
-    def _begin(self, plan: _Plan, placements: list[Floats]) -> None:
+    def _begin(self, plan: "_Plan", placements: list[Floats]) -> None:
         self.data.qpos[:], self.data.qvel[:] = self._configuration(plan, 0)
         self._place(placements, 0)
         mujoco.mj_forward(self.model, self.data)
 
-    def _configuration(self, plan: _Plan, k: int) -> tuple[Floats, Floats]:
+    def _configuration(self, plan: "_Plan", k: int) -> tuple[Floats, Floats]:
         """Return the planned ``qpos`` and ``qvel`` of all people at index ``k`` of the plan."""
         qpos, qvel = np.empty(self.model.nq), np.empty(self.model.nv)
         for i, person in enumerate(self.people):
@@ -248,7 +246,7 @@ class MotionServos:
             qvel[person.hinge_dofs] = plan.speeds[k, i]
         return qpos, qvel
 
-    def _feedforward(self, frames: Floats, plan: _Plan, placements: list[Floats]) -> Floats:
+    def _feedforward(self, frames: Floats, plan: "_Plan", placements: list[Floats]) -> Floats:
         """Return hinge torques of the plan, (n, P D); computed at the times ``frames``, interpolated in between."""
         count, every = len(plan.angles), self._substeps
         states = [self._configuration(plan, k) for k in range(0, count, every)]
@@ -273,7 +271,7 @@ class MotionServos:
         """Return the mocap index and pose (7,) of each moving solid."""
         return [(mocap, pose[k]) for mocap, pose in zip(self._mocap, placements, strict=True)]
 
-    def _step(self, plan: _Plan, placements: list[Floats], feedforward: Floats, k: int, time: float) -> None:
+    def _step(self, plan: "_Plan", placements: list[Floats], feedforward: Floats, k: int, time: float) -> None:
         """Advance by one step to index ``k`` of the plan."""
         data = self.data
         self._place(placements, k)
@@ -293,13 +291,13 @@ class MotionServos:
                 data.xfrc_applied[bone, :3] += share * np.array(push.force)
         mujoco.mj_step(self.model, data)
 
-    def _adherence(self, plan: _Plan, k: int) -> Floats:
+    def _adherence(self, plan: "_Plan", k: int) -> Floats:
         """Return the weight of the plan of each person, (P,): 1 near the planned pelvis, 0 out of reach of it."""
         off = np.linalg.norm(plan.roots[k, :, :3] - self.data.qpos[self._roots[:, :3]], axis=1)
         near, far = _REACH
         return np.clip((far - off) / (far - near), 0.0, 1.0)
 
-    def _assistance(self, plan: _Plan, adherence: Floats, k: int) -> Floats:
+    def _assistance(self, plan: "_Plan", adherence: Floats, k: int) -> Floats:
         """Return bounded forces and torques (P, 6) that pull the pelvises towards their planned poses."""
         root, speed = self.data.qpos[self._roots], self.data.qvel[self._root_dofs]  # (P, 7), (P, 6)
         force = self._masses * _pull(plan.roots[k, :, :3] - root[:, :3], plan.velocities[k] - speed[:, :3])

@@ -1,7 +1,5 @@
 """Assembly of textured fittings and lamps: parts of materials and prints from one sheet, joined to one mesh."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Self
@@ -122,7 +120,7 @@ class Furnishing:
         self._meshes.append(replace(mesh, vertices=vertices.astype(np.float32)))
         return self
 
-    def group(self, other: Furnishing, place: Sequence[float] = (0.0, 0.0, 0.0), yaw: float = 0.0) -> Self:
+    def group(self, other: "Furnishing", place: Sequence[float] = (0.0, 0.0, 0.0), yaw: float = 0.0) -> Self:
         """Add all parts of another furnishing, turned by ``yaw`` and moved to ``place``."""
         for mesh, uv in zip(other._meshes, other._uv, strict=True):
             vertices = carried(mesh.vertices, place[:2], yaw) + [0.0, 0.0, place[2]]

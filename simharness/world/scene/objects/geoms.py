@@ -1,7 +1,5 @@
 """Geoms of objects for rays and contacts: boxes, cylinders and surfaces, each added to MuJoCo as one geom."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -62,7 +60,7 @@ class Box:
         return Floor(self.corners[[0, 4, 6, 2], :2])
 
     @classmethod
-    def around(cls, points: ArrayLike) -> Box:
+    def around(cls, points: ArrayLike) -> "Box":
         """Return the axis-aligned bounding box of points (n, 3)."""
         points = np.asarray(points, float)
         low, high = points.min(axis=0), points.max(axis=0)
@@ -80,7 +78,7 @@ class Box:
         local = (np.asarray(points, float) - self.center) @ self.axes
         return np.maximum(np.abs(local) - self.half, 0.0)
 
-    def gap_on_floor(self, other: Box) -> float:
+    def gap_on_floor(self, other: "Box") -> float:
         """Return the horizontal distance between the footprints of two boxes, metres; 0 if they overlap.
 
         It is computed by separating axes: a lower bound, exact except from corner to corner.
@@ -96,11 +94,11 @@ class Box:
             best = max(best, along, across)
         return best
 
-    def moved(self, place: ArrayLike, yaw: float) -> Box:
+    def moved(self, place: ArrayLike, yaw: float) -> "Box":
         """See :class:`Geom`."""
         return Box(_carried(self.center, place, yaw), self.half, self.yaw + yaw)
 
-    def raised(self, height: float) -> Box:
+    def raised(self, height: float) -> "Box":
         """Return the box raised by ``height`` metres."""
         x, y, z = self.center
         return Box((x, y, float(z + height)), self.half, self.yaw)
@@ -128,7 +126,7 @@ class Cylinder:
     half: float
     axis: Point = (0.0, 0.0, 1.0)
 
-    def moved(self, place: ArrayLike, yaw: float) -> Cylinder:
+    def moved(self, place: ArrayLike, yaw: float) -> "Cylinder":
         """See :class:`Geom`."""
         axis = _carried(self.axis, (0.0, 0.0), yaw)
         return Cylinder(_carried(self.center, place, yaw), self.radius, self.half, axis)
@@ -155,7 +153,7 @@ class Surface:
     vertices: Floats
     faces: NDArray[np.int32]
 
-    def moved(self, place: ArrayLike, yaw: float) -> Surface:
+    def moved(self, place: ArrayLike, yaw: float) -> "Surface":
         """See :class:`Geom`."""
         return Surface(carried(self.vertices, place, yaw), self.faces)
 

@@ -7,8 +7,6 @@ bring their colours with them.
 Prints are pictures on screens, posters, papers, boards and packages; each is drawn by its own random generator.
 """
 
-from __future__ import annotations
-
 import colorsys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -92,7 +90,7 @@ class Sheet:
         return self.uv(material, place + start)
 
     @classmethod
-    def pack(cls, pictures: Mapping[str, Floats]) -> Sheet:
+    def pack(cls, pictures: Mapping[str, Floats]) -> "Sheet":
         """Return the sheet of pictures (h, w, 3) with values from 0 to 1.
 
         They are packed on shelves, the highest ones first, each with a border that repeats its edge.

@@ -6,8 +6,6 @@ their colours, materials and textures. The same geoms stop rays and people. A si
 floor and its bounding box is centred on the origin; lengths are metres, z is up and the front is +x.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -122,7 +120,7 @@ class AttachedGeoms:
     place: tuple[float, float, float]
     yaw: float = 0.0
 
-    def moved(self, place: ArrayLike, yaw: float) -> AttachedGeoms:
+    def moved(self, place: ArrayLike, yaw: float) -> "AttachedGeoms":
         """See :class:`~simharness.world.scene.objects.geoms.Geom`."""
         x, y, z = carried(self.place, place, yaw).tolist()
         return AttachedGeoms(self.spec, (x, y, z), self.yaw + yaw)

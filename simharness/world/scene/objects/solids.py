@@ -1,7 +1,5 @@
 """Objects and solids of a scene, each with a mesh for pictures and geoms for rays and contacts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -44,7 +42,7 @@ class ObjectModel:
         """Return the bounding box of the object at ``place`` (2,), rotated by ``yaw``."""
         return self.extent.moved(place, yaw)
 
-    def at(self, place: ArrayLike, yaw: float, *, kind: Kind, name: str) -> Solid:
+    def at(self, place: ArrayLike, yaw: float, *, kind: Kind, name: str) -> "Solid":
         """Return the solid at ``place`` (2,), rotated by ``yaw``."""
         return Solid(
             kind,
@@ -56,7 +54,7 @@ class ObjectModel:
             mirror=None if self.mirror is None else self.mirror.moved(place, yaw),
         )
 
-    def along(self, trajectory: Trajectory, *, kind: Kind, name: str) -> Solid:
+    def along(self, trajectory: Trajectory, *, kind: Kind, name: str) -> "Solid":
         """Return the solid that moves along a trajectory."""
         corners = np.concatenate([transform_points(self.extent.corners, pose) for pose in trajectory.pose])
         return Solid(kind, name, self.mesh, self.geoms, Box.around(corners), trajectory=trajectory)

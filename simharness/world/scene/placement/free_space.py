@@ -3,8 +3,6 @@
 Cameras have to be clear of floor, walls and objects as well.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -126,7 +124,7 @@ class Site:
         for solid in space.taken:
             self.add(solid)
 
-    def copy(self) -> Site:
+    def copy(self) -> "Site":
         """Return a copy for trial placements."""
         other = Site(replace(self.space, taken=()))
         other.space, other.solids, other._boxes = self.space, list(self.solids), list(self._boxes)
