@@ -117,14 +117,14 @@ class Furnishing:
         self._uv.append(self.sheet.projected(mesh, material, len(self._meshes)))
         x, y, z = (float(v) for v in center)
         vertices = carried(mesh.vertices.astype(float), (x, y), yaw) + [0.0, 0.0, z]
-        self._meshes.append(replace(mesh, vertices=vertices.astype(np.float32)))
+        self._meshes.append(mesh.moved(vertices.astype(np.float32)))
         return self
 
     def group(self, other: "Furnishing", place: Sequence[float] = (0.0, 0.0, 0.0), yaw: float = 0.0) -> Self:
         """Add all parts of another furnishing, turned by ``yaw`` and moved to ``place``."""
         for mesh, uv in zip(other._meshes, other._uv, strict=True):
             vertices = carried(mesh.vertices, place[:2], yaw) + [0.0, 0.0, place[2]]
-            self._meshes.append(replace(mesh, vertices=vertices.astype(np.float32)))
+            self._meshes.append(mesh.moved(vertices.astype(np.float32)))
             self._uv.append(uv)
         return self
 

@@ -6,6 +6,7 @@ room, which is the outside of a wall as a solid. The ceiling is in :mod:`~simhar
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -33,6 +34,7 @@ _ANY = 4  # finishes from which "any" is drawn: the first of each list
 _CELL = 1.0  # metres: approximate cell size of the grids of floor and walls
 _THICK = 0.1  # metres: thickness of floor and walls as solids, outside the room
 _LAWN = 0.3  # metres: approximate cell size of the ground around a floor outdoors
+_KEPT = 8  # finishes, at most 7 MB each: studies and suites have few seeds
 _RIM = 0.25  # metres: approximate cell size of that ground, which fades into the background
 # Opposite walls share a tone, so that corners are visible and pictures show the direction of view.
 _TONES = {"x": (0.93, 0.97, 1.0), "y": (1.0, 0.98, 0.93)}
@@ -71,15 +73,14 @@ def make_room(room: RoomSection, seed: int, openings: Sequence[Opening] = ()) ->
     """
     room = settled(room, seed)
     x, y = room.size[0] / 2, room.size[1] / 2
-    rng = stream(seed, "room", "floor")
-    texture = _chosen(FLOORS, room.floor, rng)(rng)
+    texture = _floor_finish(room.floor, seed)
     slab = Box((0.0, 0.0, -_THICK / 2), (x, y, _THICK / 2))
     floor = Solid("room", "floor", _floor(x, y, texture), (slab,), slab)
     if room.kind == "outdoors":
         return floor, _open_ground(x, y, texture)
     if not room.walls:
         return floor, _ground(room, seed, texture)
-    paper = _paper(room, seed)
+    paper = _wall_finish(room.wall, seed, room.size[2])
     return floor, *(
         _wall(wall, paper, [opening for opening in openings if (opening.wall, opening.kind) == (wall, "window")])
         for wall in room_walls(room)
@@ -89,16 +90,21 @@ def make_room(room: RoomSection, seed: int, openings: Sequence[Opening] = ()) ->
 def wall_color(room: RoomSection, seed: int) -> Color:
     """Return the mean colour of the walls of a room, or of its floor where it has none, sRGB albedo from 0 to 1."""
     room = settled(room, seed)
-    rng = stream(seed, "room", "floor")
-    finish = _paper(room, seed) if room.walls else _chosen(FLOORS, room.floor, rng)(rng)
+    finish = _wall_finish(room.wall, seed, room.size[2]) if room.walls else _floor_finish(room.floor, seed)
     red, green, blue = (finish.texture.reshape(-1, 3).mean(axis=0) / 255).tolist()
     return red, green, blue
 
 
-def _paper(room: RoomSection, seed: int) -> TiledTexture:
-    """Return the finish of the walls of a room whose kind is drawn."""
+@lru_cache(maxsize=_KEPT)
+def _floor_finish(name: str, seed: int) -> TiledTexture:
+    rng = stream(seed, "room", "floor")
+    return _chosen(FLOORS, name, rng)(rng)
+
+
+@lru_cache(maxsize=_KEPT)
+def _wall_finish(name: str, seed: int, height: float) -> TiledTexture:
     rng = stream(seed, "room", "wall")
-    return _chosen(WALLS, room.wall, rng)(rng, room.size[2])
+    return _chosen(WALLS, name, rng)(rng, height)
 
 
 def _chosen(finishes: Mapping[str, Choice], name: str, rng: np.random.Generator) -> Choice:

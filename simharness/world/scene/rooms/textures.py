@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
+from mvpose.checks import seal
 
 _FLOOR_RESOLUTION = 192  # pixels per metre
 _WALL_RESOLUTION = 160
@@ -329,6 +330,7 @@ def _skirted(picture: Floats, tint: Floats | None = None) -> TiledTexture:
 def _tiled_texture(picture: Floats, resolution: int) -> TiledTexture:
     """Return the texture of a picture (h, w, 3) with values from 0 to 1."""
     texture = np.round(255 * np.clip(picture, 0, 1)).astype(np.uint8)
+    seal(texture)  # the walls of a room share it
     return TiledTexture(texture, (texture.shape[1] / resolution, texture.shape[0] / resolution))
 
 
