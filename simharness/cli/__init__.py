@@ -8,6 +8,7 @@ from simharness.cli import (
     blame_command,
     check_command,
     evaluate_command,
+    profile_command,
     rehearse_command,
     report_command,
     run_command,
@@ -28,6 +29,7 @@ report_command.add_to(app)
 study_command.add_to(app)
 app.add_typer(evaluate_command.app, name="evaluate")
 validate_command.add_to(app)
+profile_command.add_to(app)
 rehearse_command.add_to(app)
 
 

@@ -75,6 +75,8 @@ IN_PARTS = {
 }
 READ_BY_A_NETWORK = {
     "simharness run pixels": "--set duration=0.4 --set rate=5 --set cameras.count=3",
+    "simharness profile-network movenet --check": "--scenes pixels --other-scenes pixels --set duration=0.4 "
+    "--set rate=5 --set people.count=2 --set cameras.count=3 --set cameras.size=[320,240]",
     "simharness study sensor": "--set duration=0.2 --set rate=5 --set cameras.count=2 "
     "--set sweep.sensor.read_noise=[0.0] --set sweep.sensor.shutter=[0.0] --set sweep.sensor.softness=[0.0] "
     "--set sweep.sensor.exposure=[0.0] --set sweep.cameras.radius=[3.7] --set sweep.cameras.size=[[320,240]] "

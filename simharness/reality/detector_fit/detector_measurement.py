@@ -150,11 +150,22 @@ def measure_detector(
             f"{sample.name}: no detection is near any of the known people; expected detections of the same frames and "
             "cameras as the truth. Check that calibration, truth and detections belong together"
         )
+    weights = block_weights(sample.time, resamples=resamples, seed=seed)
+    return measure_labels(labels, name=sample.name, weights=weights, independent=blocks(sample.time))
+
+
+def measure_labels(labels: LabelledJoints, *, name: str, weights: Floats, independent: int) -> MeasuredDetector:
+    """Measure a detector from labelled joints.
+
+    Args:
+        labels: labels of T frames.
+        name: name of the sample.
+        weights: how many times each of R resamples contains each frame, (R, T).
+        independent: number of independent parts of the sample.
+    """
     sums = frame_sums(labels)
     whole = estimate_parameters(sums.total(), step=labels.step, kind=labels.kind)
-    weights = block_weights(sample.time, resamples=resamples, seed=seed)
     drawn = estimate_parameters(sums.resampled(weights), step=labels.step, kind=labels.kind)
-    independent = blocks(sample.time)
     result = {}
     design = 1 + 2 * np.nan_to_num(whole["correlation.life"][0]) / labels.step
     for key, value in whole.items():
@@ -164,12 +175,17 @@ def measure_detector(
             high = np.fmax(high, min(1.0, _RULE_OF_THREE * design / max(n, 1)))
         # A percentile interval need not contain the value itself near a bound such as zero.
         result[key] = MeasuredValue(float(value[0]), float(np.fmin(low, value[0])), float(np.fmax(high, value[0])), n)
-    return MeasuredDetector(sample.name, len(sample), float(sample.known.sum() / len(sample)), sample.kind, result)
+    frames = len(labels.time)
+    return MeasuredDetector(name, frames, float(labels.known.sum() / frames), labels.kind, result)
 
 
 def point_estimates(sample: Sample) -> dict[str, float]:
     """Return the measured values of a sample without their intervals, by key; NaN where unknown."""
-    labels = label_joints(sample)
+    return label_estimates(label_joints(sample))
+
+
+def label_estimates(labels: LabelledJoints) -> dict[str, float]:
+    """Return the measured values of labelled joints without their intervals, by key; NaN where unknown."""
     values = estimate_parameters(frame_sums(labels).total(), step=labels.step, kind=labels.kind)
     return {key: float(value[0]) for key, value in values.items()}
 

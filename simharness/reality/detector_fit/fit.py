@@ -31,7 +31,7 @@ from simharness.reality.detector_fit.detector_measurement import (
 )
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.profile import as_toml, settings
-from simharness.reality.detector_fit.sample import Sample, sample_of
+from simharness.reality.detector_fit.sample import sample_of
 from simharness.reality.filmed_recording import FilmedRecording, film
 from simharness.reality.people_tracks import LIMB_JOINTS, track_people
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
@@ -113,10 +113,10 @@ def fit(
     bias = annotation.bias.copy()
     bias[:3] = face_bias(people.joints, filmed.joints)
 
-    def simulate(values: Mapping[str, float]) -> list[Sample]:
+    def simulate(values: Mapping[str, float]) -> list[dict[str, float]]:
         profile = DetectorSection.model_validate(settings(real.with_values(values), name=name, bias=bias))
         twins = (replace(recording, detections=tuple(filmed.detected(profile, seed=1 + k))) for k in range(_TWINS))
-        return [sample_of(twin, people, filmed) for twin in twins]
+        return [point_estimates(sample_of(twin, people, filmed)) for twin in twins]
 
     counted = {key: each.value for key, each in real.values.items() if each.count >= _FEWEST}
     rare = {key: each.value for key, each in real.values.items() if key not in counted}
@@ -139,29 +139,41 @@ def write_profile(fitted: DetectorFit, path: str | Path) -> None:
 
 
 def calibrate(
-    real: Mapping[str, float], simulate: Callable[[Mapping[str, float]], Sequence[Sample]], *, rounds: int = ROUNDS
+    real: Mapping[str, float],
+    simulate: Callable[[Mapping[str, float]], Sequence[Mapping[str, float]]],
+    *,
+    rounds: int = ROUNDS,
+    shares: tuple[str, ...] = SHARES,
+    factors: tuple[str, ...] = FACTORS,
+    farthest: float = _FARTHEST,
+    damped: bool = False,
 ) -> dict[str, float]:
-    """Return the parameters at which simulated samples measure as the real one.
+    """Return the parameters at which simulated detections measure as the real ones.
 
     Args:
-        real: measured values by key; those that are no parameters of SHARES and FACTORS, or are NaN, stay.
-        simulate: function from parameters to samples of twins.
+        real: measured values by key; those that are neither shares nor factors, or are NaN, stay.
+        simulate: function from parameters to the measured values of simulated detections, one for each draw.
         rounds: number of rounds.
+        shares: calibrated shares, by the beginning of their keys.
+        factors: calibrated amounts, likewise.
+        farthest: largest change of a logit or a logarithm in all.
+        damped: steps of later rounds are smaller (Robbins & Monro 1951), so that the noise of the draws averages out.
     """
     moved = {
         key: 0.0
         for key, value in real.items()
-        if (key.startswith(SHARES) and value > _LEAST) or (key.startswith(FACTORS) and value > 0)
+        if (key.startswith(shares) and value > _LEAST) or (key.startswith(factors) and value > 0)
     }
-    for _ in range(rounds):
-        measured = [point_estimates(sample) for sample in simulate(_at(real, moved))]
+    for number in range(rounds):
+        gain = 2 / (number + 2) if damped else 1.0
+        measured = simulate(_at(real, moved, shares))
         for key, before in moved.items():
             twins = np.array([each.get(key, np.nan) for each in measured])
             if np.isfinite(twins).any():
-                scale = _logit if key.startswith(SHARES) else _log
+                scale = _logit if key.startswith(shares) else _log
                 step = np.clip(scale(real[key]) - scale(float(np.nanmean(twins))), -_STEP, _STEP)
-                moved[key] = float(np.clip(before + step, -_FARTHEST, _FARTHEST))
-    return _at(real, moved)
+                moved[key] = float(np.clip(before + gain * step, -farthest, farthest))
+    return _at(real, moved, shares)
 
 
 def face_bias(tracked: Floats, staged: Floats) -> Floats:
@@ -184,11 +196,11 @@ def face_bias(tracked: Floats, staged: Floats) -> Floats:
         return np.nan_to_num(np.stack([np.nanmean(of_person[:, kinds == kind], axis=(0, 1)) for kind in range(3)]))
 
 
-def _at(real: Mapping[str, float], moved: Mapping[str, float]) -> dict[str, float]:
+def _at(real: Mapping[str, float], moved: Mapping[str, float], shares: tuple[str, ...]) -> dict[str, float]:
     """Return the values, moved on the scale of each: logit for shares, logarithm for amounts."""
     result = dict(real)
     for key, change in moved.items():
-        share = key.startswith(SHARES)
+        share = key.startswith(shares)
         result[key] = float(1 / (1 + np.exp(-_logit(real[key]) - change)) if share else real[key] * np.exp(change))
     return result
 

@@ -6,6 +6,7 @@ hides what comes from the bodies that re-enact the people, as it will in a twin,
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,11 +112,71 @@ def label_joints(sample: Sample) -> LabelledJoints:
         inside = in_picture(sample.reference, rig)
     else:
         inside = occlusion != OUTSIDE
-    expected = sample.known[:, None] & (inside[..., LIMB_JOINTS].sum(axis=-1) >= _HALF)
     found = association.detected[..., None] & sample.known[:, None, :, None] & inside & (occlusion != OUTSIDE)
-    reported = found & (association.scores > 0)
+    classes = error_classes(
+        error, keypoints, target, neighbour, unit, found=found, scores=association.scores, kind=sample.kind
+    )
+    return LabelledJoints(
+        time=sample.time,
+        step=sample.step,
+        kind=sample.kind,
+        known=sample.known,
+        association=association,
+        consensus=consensus,
+        boxes=boxes,
+        unit=unit,
+        target=target,
+        occlusion=np.where(occlusion == OUTSIDE, np.int8(VISIBLE), occlusion),
+        bearing=bearing_bins(staged, rig),
+        inside=inside,
+        beyond=beyond_border(staged, unit, rig),
+        expected=expected_people(sample.known, inside),
+        error=error,
+        risk=classes.risk,
+        taken=classes.taken,
+        chance=classes.chance,
+        residual=np.where(classes.labelled[..., None], residual, np.nan),
+        axes=image_axes(sample.reference[:, :, LIMB_JOINTS].mean(axis=2), rig),
+    )
+
+
+class ErrorClasses(NamedTuple):
+    """Joints whose error is known, (T, V, P, 17), and those that each class could have taken, took, and may have taken
+    by chance, by class.
+    """
+
+    labelled: Bools
+    risk: Mapping[str, Bools]
+    taken: Mapping[str, Bools]
+    chance: Mapping[str, Bools]
+
+
+def error_classes(
+    error: NDArray[np.int8],
+    keypoints: Floats,
+    target: Floats,
+    neighbour: Floats,
+    unit: Floats,
+    *,
+    found: Bools,
+    scores: Floats,
+    kind: DetectorKind,
+) -> ErrorClasses:
+    """Return which joints each of CLASSES could have taken and took, as the attributes of :class:`LabelledJoints`.
+
+    Args:
+        error: :class:`KeypointError`, (T, V, P, 17).
+        keypoints: places of the keypoints, (T, V, P, 17, 2) pixels.
+        target: true places, (T, V, P, 17, 2) pixels.
+        neighbour: the same joints of the person whose box overlaps most, (T, V, P, 17, 2); NaN where there is none.
+        unit: OKS sigma x sqrt(area), (T, V, P, 17) pixels.
+        found: joints in the picture of people who are detected, (T, V, P, 17).
+        scores: scores of the keypoints, (T, V, P, 17); 0 where not reported.
+        kind: kind of the detector.
+    """
+    reported = found & (scores > 0)
     droppable = found.copy()
-    if sample.kind == "bottom-up":
+    if kind == "bottom-up":
         for joint in np.flatnonzero(PARENT >= 0):
             droppable[..., joint] &= reported[..., PARENT[joint]]
     mirrored = target[..., MIRROR, :]
@@ -134,28 +195,17 @@ def label_joints(sample: Sample) -> LabelledJoints:
         "swap": miss & opposite_hits(keypoints, target, neighbour, unit),
         "inversion": miss & opposite_hits(keypoints, target, mirrored, unit),
     }
-    return LabelledJoints(
-        time=sample.time,
-        step=sample.step,
-        kind=sample.kind,
-        known=sample.known,
-        association=association,
-        consensus=consensus,
-        boxes=boxes,
-        unit=unit,
-        target=target,
-        occlusion=np.where(occlusion == OUTSIDE, np.int8(VISIBLE), occlusion),
-        bearing=_bearing_bins(staged, rig),
-        inside=inside,
-        beyond=_beyond(staged, unit, rig),
-        expected=expected,
-        error=error,
-        risk=risk,
-        taken={key: each & risk[key] for key, each in taken.items()},
-        chance={key: each & risk[key] for key, each in chance.items()},
-        residual=np.where(labelled[..., None], residual, np.nan),
-        axes=image_axes(sample.reference[:, :, LIMB_JOINTS].mean(axis=2), rig),
+    return ErrorClasses(
+        labelled,
+        risk,
+        {key: each & risk[key] for key, each in taken.items()},
+        {key: each & risk[key] for key, each in chance.items()},
     )
+
+
+def expected_people(known: Bools, inside: Bools) -> Bools:
+    """Return which known people (T, P) have half of their limb joints (T, V, P, 17) inside the picture, (T, V, P)."""
+    return known[:, None] & (inside[..., LIMB_JOINTS].sum(axis=-1) >= _HALF)
 
 
 def _without_noise(residual: Floats, unit: Floats, consensus: Consensus) -> Floats:
@@ -175,7 +225,7 @@ def _without_noise(residual: Floats, unit: Floats, consensus: Consensus) -> Floa
     return np.where(usual[..., None], residual / np.sqrt(factor)[..., None], residual)
 
 
-def _beyond(joints: Floats, unit: Floats, rig: Rig) -> Floats:
+def beyond_border(joints: Floats, unit: Floats, rig: Rig) -> Floats:
     """Return the distance of joints (T, P, 17, 3) from the image in units, (T, V, P, 17); 0 inside."""
     far = []
     for camera in rig:
@@ -186,7 +236,7 @@ def _beyond(joints: Floats, unit: Floats, rig: Rig) -> Floats:
         return np.nan_to_num(np.stack(far, axis=1) / unit, nan=np.inf)
 
 
-def _bearing_bins(joints: Floats, rig: Rig) -> NDArray[np.int64]:
+def bearing_bins(joints: Floats, rig: Rig) -> NDArray[np.int64]:
     """Return the bins of the bearings of the cameras from the heads of people (T, P, 17, 3), (T, V, P)."""
     turn = np.nan_to_num(head_bearings(joints, rig)) / (2 * np.pi) * len(BEARINGS)
     return np.round(turn).astype(np.int64) % len(BEARINGS)

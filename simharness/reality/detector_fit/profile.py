@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.reality.detector_fit.detector_measurement import MeasuredDetector, MeasuredValue
+from simharness.reality.detector_fit.detector_measurement import MeasuredDetector
 from simharness.scenario.sections.detector_section import KINDS, LARGEST_MULTIPLE, DetectorSection
 
 _FACE_DROPS = ("keypoints.drop.visible", "keypoints.drop.self_occluded")
@@ -79,29 +79,49 @@ def settings(measurement: MeasuredDetector, *, name: str, bias: Floats | None = 
     return DetectorSection.model_validate(result).model_dump(mode="json", exclude_unset=True)
 
 
-def as_toml(measurement: MeasuredDetector, *, name: str, bias: Floats | None = None, command: str = "") -> str:
-    """Return the profile as a file: every value with its interval and count, and notes on what was not measured."""
+def as_toml(
+    measurement: MeasuredDetector,
+    *,
+    name: str,
+    bias: Floats | None = None,
+    command: str = "",
+    notes: Mapping[str, str] = _NOTES,
+    of: str = "annotated people",
+) -> str:
+    """Return the profile as a file: every value with its interval and count, and notes on what was not measured.
+
+    Args:
+        measurement: the measured, or calibrated, parameters.
+        name: name of the profile.
+        bias: as of :func:`settings`.
+        command: command that made it.
+        notes: notes by section.
+        of: who the people are.
+    """
     tree = settings(measurement, name=name, bias=bias)
     joints = sum(measured.count for key, measured in measurement.values.items() if key.startswith("share.drop."))
     head = (
         f"Errors of a detector on {measurement.name}: measured on {measurement.frames} frames, {joints} joints of "
-        f"{measurement.people:.2f} annotated people a frame. Behind each value: its 95 % interval (block bootstrap "
-        f"over time) and the number n of joints, people or detections."
+        f"{measurement.people:.2f} {of} a frame. Behind each value: its 95 % interval (bootstrap of blocks of time or "
+        f"of scenes) and the number n of joints, people or detections."
     )
     lines = [*_wrapped(head)]
     if command:
         lines.append(f"# Made by: {command}")
     lines += [f'name = "{tree["name"]}"', f'kind = "{tree["kind"]}"']
-    for section in ("keypoints", "bias", "correlation", "scores", "boxes", "phantoms"):
-        lines += _section(section, tree.get(section, {}), measurement)
+    for section in ("keypoints", "bias", "correlation", "scores", "boxes", "phantoms", "decoys"):
+        if section in tree or section != "decoys":
+            lines += _section(section, tree.get(section, {}), measurement, notes)
     return "\n".join(lines) + "\n"
 
 
-def _section(path: str, values: Mapping[str, Any], measurement: MeasuredDetector) -> Iterator[str]:
+def _section(
+    path: str, values: Mapping[str, Any], measurement: MeasuredDetector, notes: Mapping[str, str]
+) -> Iterator[str]:
     """Yield the lines of a section and of the sections in it."""
     yield ""
-    if path in _NOTES:
-        yield from _wrapped(_NOTES[path])
+    if path in notes:
+        yield from _wrapped(notes[path])
     yield f"[{path}]"
     for key, value in values.items():
         if not isinstance(value, dict):
@@ -109,7 +129,7 @@ def _section(path: str, values: Mapping[str, Any], measurement: MeasuredDetector
             yield (f"{key} = {value}".ljust(40) + comment).rstrip()
     for key, value in values.items():
         if isinstance(value, dict):
-            yield from _section(f"{path}.{key}", value, measurement)
+            yield from _section(f"{path}.{key}", value, measurement, notes)
 
 
 def _comment(key: str, measurement: MeasuredDetector) -> str:
@@ -117,12 +137,8 @@ def _comment(key: str, measurement: MeasuredDetector) -> str:
     measured = measurement.values.get(key)
     if measured is None or not measured.known:
         return "# not measured"
-    return f"# {_span(measured)}; n = {measured.count}"
-
-
-def _span(measured: MeasuredValue) -> str:
-    """Return the interval of a value as text."""
-    return f"{measured.low:.3g} to {measured.high:.3g}"
+    span = f"{measured.low:.3g} to {measured.high:.3g}; " if np.isfinite(measured.low) else ""
+    return f"# {span}n = {measured.count}"
 
 
 def _put(tree: dict[str, Any], key: str, value: Any) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simharness.reality.detector_fit.detector_measurement import measure_detector
+from simharness.reality.detector_fit.detector_measurement import measure_detector, point_estimates
 from simharness.reality.detector_fit.fit import FACTORS, SHARES, calibrate
 from simharness.reality.detector_fit.profile import settings
 from simharness.scenario.sections.detector_section import KINDS
@@ -22,7 +22,7 @@ def test_calibrated_parameters_are_nearer_to_the_true_ones(filmed):
     measured = measure_detector(filmed.sample(kind="bottom-up", keypoints=errors), resamples=10)
 
     def simulate(values):
-        return [filmed.sample(seed=5, **settings(measured.with_values(values), name="fitted"))]
+        return [point_estimates(filmed.sample(seed=5, **settings(measured.with_values(values), name="fitted")))]
 
     real = {key: each.value for key, each in measured.values.items()}
     calibrated = calibrate(real, simulate)
@@ -47,7 +47,7 @@ def test_calibrated_parameters_of_hidden_joints_are_nearer_to_the_true_ones(film
 
     def simulate(values):
         fitted = settings(measured.with_values(values), name="fitted")
-        return [filmed.sample(seed=seed, staged=True, **fitted) for seed in (5, 6)]
+        return [point_estimates(filmed.sample(seed=seed, staged=True, **fitted)) for seed in (5, 6)]
 
     real = {key: each.value for key, each in measured.values.items()}
     calibrated = calibrate(real, simulate)
@@ -62,6 +62,6 @@ def test_calibrated_parameters_of_hidden_joints_are_nearer_to_the_true_ones(film
 def test_a_simulation_that_measures_alike_changes_nothing(filmed):
     sample = filmed.sample(keypoints={"scatter": 0.3, "jitter": 0.05})
     real = {key: each.value for key, each in measure_detector(sample, resamples=10).values.items()}
-    calibrated = calibrate(real, lambda values: [sample], rounds=1)
+    calibrated = calibrate(real, lambda values: [point_estimates(sample)], rounds=1)
     for key, value in real.items():
         assert calibrated[key] == pytest.approx(value, rel=1e-6, nan_ok=True), key

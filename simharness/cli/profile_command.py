@@ -1,0 +1,173 @@
+"""``simharness profile-network``: how a network errs, and a profile with which simulation errs alike."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from mvpose.commands.errors import failing
+from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
+from simharness.cli.program import PROGRAM, Overrides, Workers
+
+if TYPE_CHECKING:
+    from simharness.reality.network_profile.profile_check import ProfileCheck
+    from simharness.scenario.load import Study
+
+_DESIGNED, _OTHER = "profile", "profile_check"
+_RIVALS = ("typical", "topdown", "posefix")
+_TOML = b"# Made by: simharness profile-network"
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("profile-network")(profile_network)
+
+
+def profile_network(
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="A network that finds people: a name of [cyan]mvpose networks list[/], or an ONNX file.",
+            metavar="NETWORK",
+        ),
+    ],
+    head: Annotated[
+        str | None,
+        typer.Option(metavar="NETWORK", help="Pose head that reads the joints in the boxes of NETWORK."),
+    ] = None,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="Also compare the profile with the network on 80 other scenes, 2,000 pictures."),
+    ] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A quarter of the pictures, and two scenes of each kind, for a first look.")
+    ] = False,
+    scenes: Annotated[Path, typer.Option(metavar="SCENARIO", help="Scenes to which the profile is fitted.")] = Path(
+        _DESIGNED
+    ),
+    other_scenes: Annotated[Path, typer.Option(metavar="SCENARIO", help="Scenes of [cyan]--check[/].")] = Path(_OTHER),
+    overrides: Overrides = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder of NAME.toml, profile.html and profile.json. [dim]\\[default: results/profiles/NAME][/]",
+            file_okay=False,
+        ),
+    ] = None,
+    store: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder of what the network found, which is not read again. [dim]\\[default: store, in --out][/]",
+            file_okay=False,
+        ),
+    ] = None,
+    workers: Workers = 1,
+) -> None:
+    """Measure how a network errs in rendered pictures, and write a detector profile that errs alike.
+
+    The designed scenes show people near and far, hidden, cut, in the dark, in
+    crowds; their truth is exact. Use the profile in any scenario, without
+    pictures: detector.profile = "NAME.toml".
+    """
+    with PROGRAM.exit_on_error():
+        start = perf_counter()
+        stem = Path(name).stem
+        place = out or Path("results/profiles") / stem
+        check_place(place / "profile.html", option="--out", mark=HTML)
+        check_place(place / "profile.json", option="--out", mark=PROVENANCE)
+        check_place(place / f"{stem}.toml", option="--out", mark=_TOML)
+        from mvpose.commands.progress import reporter
+        from simharness.outputs.network_profile.page import render_profile
+        from simharness.reality.network_profile.profile_check import check_profile
+        from simharness.reality.network_profile.profile_fit import ROUNDS, fit_network
+        from simharness.reality.network_profile.profiled_scenes import read_scenes
+        from simharness.scenario.load import load
+        from simharness.trial.identity import provenance
+        from simharness.trial.stages.networks import people_finder
+
+        designed = _study(scenes, name, head, overrides, seeds=1 if quick else None)
+        other = _study(other_scenes, name, head, overrides, seeds=2 if quick else None) if check else None
+        people_finder(designed.base)  # a wrong name is told before any scene is built
+        kept = store or place / "store"
+        where: dict[str, Any] = {"store": kept, "workers": workers}
+        with reporter() as bars:
+            with bars.stage("read pictures", designed.trials) as advance:
+                read = read_scenes(designed, **where, progress=advance)
+            with failing(), bars.stage("fit", ROUNDS) as advance:
+                profile = fit_network(read, name=stem, command=PROGRAM.command_line() or "", progress=advance)
+            write_text(profile.text, place / f"{stem}.toml")
+            checked = None
+            if other is not None:
+                with bars.stage("read other pictures", other.trials) as advance:
+                    fresh = read_scenes(other, **where, progress=advance)
+                rivals = {
+                    rival: load("quickstart", overrides=[f'detector.profile="{rival}"']).detector for rival in _RIVALS
+                }
+                with failing(), bars.stage("check", len(fresh)) as advance:
+                    checked = check_profile(
+                        fresh,
+                        {stem: profile.detector, **rivals},
+                        kind=profile.kind,
+                        bias=profile.bias,
+                        workers=workers,
+                        progress=advance,
+                    )
+        seeds = [*designed.seeds, *(other.seeds if other is not None else ())]
+        variants = other.variants if other is not None else ()
+        made = provenance(
+            command=PROGRAM.command_line(), seeds=seeds, variants=variants, seconds=perf_counter() - start
+        )
+        measured = {"measured": profile.measured.summary(), "bias": profile.bias.tolist()}
+        write_json(
+            {**made, **measured, "check": None if checked is None else checked.summary()}, place / "profile.json"
+        )
+        write_text(render_profile(profile, checked, provenance=made), place / "profile.html")
+    console = Console()
+    if checked is not None:
+        _print_check(checked, console)
+    for file in (f"{stem}.toml", "profile.html"):
+        console.print(
+            f"{'profile' if file.endswith('toml') else 'report'}: {place / file}",
+            soft_wrap=True,
+            highlight=False,
+            markup=False,
+        )
+
+
+def _study(scenes: Path, name: str, head: str | None, overrides: list[str] | None, *, seeds: int | None) -> Study:
+    """Return a study whose pictures are read by the network."""
+    from simharness.scenario.load import load_study
+
+    def network(given: str) -> str:
+        return str(Path(given).resolve()).replace("\\", "/") if given.endswith(".onnx") else given
+
+    keys = [f'detector.network="{network(name)}"', *([f'detector.onnx="{network(head)}"'] if head else [])]
+    return load_study(scenes, overrides=[*keys, *(overrides or ())], seeds=seeds)
+
+
+def _print_check(check: ProfileCheck, console: Console) -> None:
+    """Print PCP of each variant with the network, and the differences of the simulated detectors from it."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(
+        title=f"PCP on {len(check.scenes)} other scenes", title_justify="left", box=SIMPLE_HEAD, pad_edge=False
+    )
+    for column in ("variant", "network", *check.detectors):
+        table.add_column(column, justify="left" if column == "variant" else "right")
+    for variant in check.variants:
+        figures = [check.score(name, variant, "pcp") for name in check.detectors]
+        ends = [
+            f"{each.difference.mean:+.1f} [{each.difference.low:+.1f}, {each.difference.high:+.1f}]" for each in figures
+        ]
+        table.add_row(variant, f"{figures[0].network:.1f}", *ends)
+    console.print(table, highlight=False, markup=False)
+    for group, verdicts in check.verdicts.items():
+        counts = ", ".join(f"{verdicts.count(each)} {each}" for each in ("holds", "cannot tell", "fails"))
+        console.print(f"{group}: {counts}", highlight=False)

@@ -1,0 +1,142 @@
+"""Page of the profile of a network as one self-contained HTML file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from mvpose.report.documents import fill_template
+from simharness.outputs import TEMPLATES
+from simharness.outputs.network_profile.plots import compared_curves
+from simharness.reality.network_profile.error_curves import condition_curves, error_curves
+from simharness.reality.network_profile.profile_check import CheckedFigure, ProfileCheck
+from simharness.reality.network_profile.profile_fit import NetworkProfile
+from simharness.scenario.sections.detector_section import KINDS
+from simharness.scoring.catalogue import SCORES as CATALOGUE
+from simharness.scoring.pcp import GROUPS
+from simharness.trial.identity import provenance_sentence
+
+_SHOWN = ("pcp", "recall", "ghosts", "mpjpe_mm")
+
+
+def render_profile(profile: NetworkProfile, check: ProfileCheck | None, *, provenance: Mapping[str, Any]) -> str:
+    """Return the page of a profile.
+
+    Args:
+        profile: the fitted profile.
+        check: its comparison with the network on other scenes; None: not made.
+        provenance: keys of :func:`simharness.trial.identity.provenance`.
+    """
+    labels = profile.labels
+    pictures = labels.boxes.shape[0] * labels.boxes.shape[1]
+    return fill_template(
+        "network_profile.html",
+        folder=TEMPLATES,
+        program="simharness",
+        name=profile.name,
+        code=provenance["code"],
+        facts=[
+            ("pictures", f"{pictures:,}"),
+            ("scenes", f"{len(profile.scenes)}"),
+            ("conditions", f"{len({scene.case for scene in profile.scenes})}"),
+            ("joints", f"{int(labels.risk['drop'].sum()):,}"),
+            ("kind", profile.kind),
+        ],
+        conditions=list(_plots(profile, conditions=True)),
+        curves=list(_plots(profile, conditions=False)),
+        check=None if check is None else _check(check),
+        profile_text=profile.text,
+        command=provenance.get("command") or "",
+        provenance=provenance_sentence(provenance),
+    )
+
+
+def _plots(profile: NetworkProfile, *, conditions: bool) -> Iterator[tuple[str, Markup]]:
+    """Yield title and plot of each curve."""
+    both = [
+        condition_curves(profile.scenes, labels) if conditions else error_curves(labels)
+        for labels in (profile.labels, profile.simulated)
+    ]
+    for index, (network, simulated) in enumerate(zip(*(each.values() for each in both), strict=True)):
+        svg = compared_curves(network, simulated, name=f"{'condition' if conditions else 'curve'}-{index}")
+        yield network.title, Markup(svg)
+
+
+def _check(check: ProfileCheck) -> dict[str, Any]:
+    """Return the tables of a check: the network, and differences of the simulated detectors from it."""
+    first, cases = check.detectors[0], list(dict.fromkeys(scene.case for scene in check.scenes))
+    return {
+        "scenes": len(check.scenes),
+        "detectors": check.detectors,
+        "verdicts": [
+            (group, [of.count(each) for each in ("holds", "cannot tell", "fails")])
+            for group, of in check.verdicts.items()
+        ],
+        "scores": [
+            (
+                CATALOGUE[key].title,
+                variant,
+                _row([check.score(name, variant, key) for name in check.detectors], 2 if key == "ghosts" else 1),
+            )
+            for key in _SHOWN
+            for variant in check.variants
+        ],
+        "contrasts": [
+            (f"{one} − {other}", _row([check.contrast(name, one, other) for name in check.detectors], 1))
+            for one, other in combinations(check.variants, 2)
+        ],
+        "cases": [
+            (case, [_cell(check.score(first, variant, "pcp", case=case), 1) for variant in check.variants])
+            for case in cases
+        ],
+        "variants": check.variants,
+        "parts": [
+            (
+                group.replace("_", " "),
+                [_cell(check.score(first, variant, f"pcp_{group}"), 1) for variant in check.variants],
+            )
+            for group in GROUPS
+        ],
+        "subsets": [
+            (
+                " ".join(str(camera + 1) for camera in cameras),
+                [_cell(check.subset(first, variant, cameras), 1) for variant in check.scenes[0].subsets[first]],
+            )
+            for cameras in next(iter(check.scenes[0].subsets[first].values()), {})
+        ],
+        "subset_variants": list(check.scenes[0].subsets[first]),
+        "errors": [
+            (kind, [_ratio(check.error(first, error, index)) for error in ("inversion", "miss", "gross")])
+            for index, kind in enumerate(KINDS)
+        ],
+    }
+
+
+def _row(figures: list[CheckedFigure], digits: int) -> list[tuple[str, str, str]]:
+    """Return the network's figure and the difference of each detector: text, interval, verdict."""
+    return [(_number(figures[0].network, digits), "", ""), *(_cell(each, digits)[1:] for each in figures)]
+
+
+def _cell(figure: CheckedFigure, digits: int) -> tuple[str, str, str, str]:
+    """Return the network's figure, the difference, its interval and its verdict."""
+    each = figure.difference
+    ends = f"{each.low:+.{digits}f} to {each.high:+.{digits}f}" if np.isfinite(each.low) else ""
+    return _number(figure.network, digits), _number(each.mean, digits, sign=True), ends, figure.verdict
+
+
+def _ratio(figure: CheckedFigure) -> tuple[str, str, str, str]:
+    """Return the network's rate, the ratio of both rates, its interval and its verdict."""
+    each = figure.difference
+    ends = f"{1 + each.low:.2f} to {1 + each.high:.2f}" if np.isfinite(each.low) else ""
+    rate = f"{100 * figure.network:.1f} %" if np.isfinite(figure.network) else "–"
+    return rate, f"× {1 + each.mean:.2f}" if np.isfinite(each.mean) else "too few", ends, figure.verdict
+
+
+def _number(value: float, digits: int, *, sign: bool = False) -> str:
+    if not np.isfinite(value):
+        return "–"
+    return f"{value:+.{digits}f}" if sign else f"{value:.{digits}f}"

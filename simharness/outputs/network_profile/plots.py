@@ -1,0 +1,47 @@
+"""Plots of the errors of a network beside those of the simulated detector with its profile, as SVG."""
+
+import numpy as np
+
+from mvpose.report.svg_plots import legend_above, svg_plot
+from simharness.outputs.validation.plots import REAL_COLOR, TWIN_COLOR
+from simharness.reality.network_profile.error_curves import ErrorCurve
+
+_SIZE = (3.6, 2.6)
+_FEWEST = 10  # trials behind a point that is drawn
+_TURNED = 24  # letters of all labels together from which they are turned
+
+
+def compared_curves(network: ErrorCurve, simulated: ErrorCurve, *, name: str) -> str:
+    """Plot shares of both by bin, percent: the network as bars with 95 % intervals, the simulated detector as a line.
+
+    The intervals are Wilson's (Journal of the American Statistical Association 1927), of independent trials.
+
+    Args:
+        network: of the network.
+        simulated: of the simulated detector, with the same bins.
+        name: different from the name of every other plot on the page.
+    """
+    at = np.arange(len(network.labels))
+    enough = network.counts.n >= _FEWEST
+    with svg_plot(name, size=_SIZE) as (axes, written):
+        share = np.where(enough, 100 * network.share, np.nan)
+        low, high = (100 * each for each in _wilson(network.counts.n, np.minimum(network.counts.k, network.counts.n)))
+        axes.bar(at, share, color=REAL_COLOR, width=0.72, alpha=0.5, label="network")
+        if (network.counts.k <= network.counts.n).all():
+            axes.vlines(at[enough], low[enough], high[enough], color=REAL_COLOR, lw=1.6)
+        told = np.where(simulated.counts.n >= _FEWEST, 100 * simulated.share, np.nan)
+        axes.plot(at, told, "o--", color=TWIN_COLOR, ms=4, lw=1.2, label="profile")
+        turned = sum(map(len, network.labels)) > _TURNED
+        axes.set_xticks(at, network.labels, rotation=55 if turned else 0, ha="right" if turned else "center")
+        axes.set(xlabel=network.axis, ylabel="%")
+        axes.set_ylim(0, None)
+        axes.grid(axis="y")
+        legend_above(axes)
+    return written[0]
+
+
+def _wilson(n: np.ndarray, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ends of the interval of each share, 0 to 1."""
+    z, n = 1.96, np.maximum(n, 1.0)
+    middle, half = (k + z**2 / 2) / (n + z**2), z * np.sqrt(k * (n - k) / n + z**2 / 4) / (n + z**2)
+    return middle - half, middle + half

@@ -1,0 +1,286 @@
+"""Fit of a detector profile to a network on rendered scenes: measured against exact truth, calibrated by simulation.
+
+The sums and the parameters are those of a fit to a recording. Their values are where a simulated detector in the same
+scenes is measured as the network is (indirect inference, see :mod:`simharness.reality.detector_fit.fit`): a share of
+errors among hidden joints, for example, follows from guesses, whose errors depend on the pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from simharness.detector.viewing_conditions import BOX_SHARE, VISIBLE, Conditions
+from simharness.reality.annotated_recording import DetectorKind
+from simharness.reality.detector_fit.detector_measurement import (
+    MeasuredDetector,
+    MeasuredValue,
+    label_estimates,
+    measure_labels,
+)
+from simharness.reality.detector_fit.fit import FACTORS, SHARES, calibrate
+from simharness.reality.detector_fit.joint_labels import LabelledJoints
+from simharness.reality.detector_fit.profile import as_toml, settings
+from simharness.reality.network_profile.exact_labels import (
+    Results,
+    decoy_hits,
+    kind_of,
+    label_scenes,
+    measure_bias,
+    shared_scatter,
+)
+from simharness.reality.network_profile.profiled_scenes import ProfiledScene
+from simharness.reality.people_tracks import LIMB_JOINTS
+from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
+from simharness.types.random_streams import stream
+from simharness.types.truth import MISS_FROM
+
+ROUNDS = 8
+DRAWS = 2
+"""Rounds of the calibration, and simulated detections of all scenes in each of them."""
+
+_FEWEST = 60  # joints or people behind a value that is calibrated
+_FARTHEST = 2.0  # of a logit or a logarithm: guesses are right where misses are counted
+_RESAMPLES = 200
+_SMALL = 64.0  # pixels, sqrt(area) of a person, as in the error model
+_SHARES = (
+    *SHARES,
+    *("keypoints.swap", "keypoints.inversion", "keypoints.drop", "keypoints.stray"),
+    *("correlation.views", "correlation.gross_views", "correlation.limb", "correlation.scatter_views"),
+    *("boxes.missed", "boxes.duplicates", "boxes.score", "decoys.share", "decoys.consistent"),
+    *("scores.good", "scores.jitter", "scores.miss", "scores.inversion", "scores.swap", "scores.guess"),
+)
+_FACTORS = (
+    *FACTORS,
+    *("correlation.life", "boxes.life", "boxes.jitter", "phantoms.rate", "phantoms.life"),
+    *("keypoints.truncated", "keypoints.small", "keypoints.guess.scatter"),
+)
+_NOTES: Mapping[str, str] = {
+    "keypoints": (
+        "Shares of the joints that the classes before left, against exact truth; at these values a simulated detector "
+        "in the same scenes is measured as the network is. miss_some, miss_few and swap_crowded: as without them."
+    ),
+    "bias": "Metres forward, outward and up in the body's frame: the network's joints from the anatomical ones.",
+    "boxes": "Of people with at least half of their limb joints in the picture.",
+    "phantoms": "Detections that show neither a person nor a decoy. views: 0 by this definition.",
+}
+
+
+@dataclass(frozen=True)
+class NetworkProfile:
+    """Fitted profile of a network.
+
+    Attributes:
+        name: name of the profile.
+        scenes: the scenes that it is fitted to.
+        bias: offset of the network's joints by kind, (9, 3) metres.
+        measured: measurement of the network.
+        labels: labels of the network.
+        simulated: labels of a simulated detector with the profile, in the same scenes.
+        detector: the profile.
+        text: the profile as a file.
+    """
+
+    name: str
+    scenes: tuple[ProfiledScene, ...]
+    bias: Floats
+    measured: MeasuredDetector
+    labels: LabelledJoints
+    simulated: LabelledJoints
+    detector: DetectorSection
+    text: str
+
+    @property
+    def kind(self) -> DetectorKind:
+        """Kind of the network."""
+        return self.measured.kind
+
+
+def fit_network(
+    scenes: Sequence[ProfiledScene],
+    *,
+    name: str,
+    command: str = "",
+    rounds: int = ROUNDS,
+    progress: Callable[[int], None] = lambda rounds: None,
+) -> NetworkProfile:
+    """Fit a profile to what a network finds in scenes.
+
+    Args:
+        scenes: the scenes.
+        name: name of the profile.
+        command: command that made the profile, to be written into its file.
+        rounds: rounds of the calibration.
+        progress: called with the number of finished rounds.
+
+    Raises:
+        ValueError: the network finds nobody, or the scenes have different numbers of cameras.
+    """
+    found = [scene.found for scene in scenes]
+    kind = kind_of(scenes)
+    bias = measure_bias(scenes, found)
+    labels = label_scenes(scenes, found, kind=kind, bias=bias)
+    if not labels.association.detected.any():
+        raise ValueError(f"{name}: finds nobody in {labels.boxes[..., 0, 0].size} pictures; is it a network of poses?")
+    weights = _resampled_scenes(labels.time, [len(each) for each in found])
+    measured = measure_labels(labels, name=name, weights=weights, independent=len(scenes))
+    more = {
+        key: MeasuredValue(*each[:1], np.nan, np.nan, each[1]) for key, each in _more(scenes, found, labels).items()
+    }
+    measured = replace(measured, values={**measured.values, **more})
+
+    def measure(values: Mapping[str, float]) -> list[dict[str, float]]:
+        detector = DetectorSection.model_validate(settings(measured.with_values(values), name=name, bias=bias))
+        results = [_simulated_values(scenes, detector, draw, kind=kind, bias=bias) for draw in range(DRAWS)]
+        progress(1)
+        return results
+
+    known = {key: each.value for key, each in measured.values.items() if each.count >= _FEWEST}
+    rare = {key: each.value for key, each in measured.values.items() if key not in known}
+    fitted = calibrate(
+        known,
+        lambda values: measure({**values, **rare}),
+        rounds=rounds,
+        shares=_SHARES,
+        factors=_FACTORS,
+        farthest=_FARTHEST,
+        damped=True,
+    )
+    calibrated = measured.with_values({**fitted, **rare})
+    detector = DetectorSection.model_validate(settings(calibrated, name=name, bias=bias))
+    text = as_toml(calibrated, name=name, bias=bias, command=command, notes=_NOTES, of="people whose truth is exact")
+    simulated = label_scenes(scenes, [scene.simulated(detector) for scene in scenes], kind=kind, bias=bias)
+    return NetworkProfile(name, tuple(scenes), bias, measured, labels, simulated, detector, text)
+
+
+def _simulated_values(
+    scenes: Sequence[ProfiledScene], detector: DetectorSection, draw: int, *, kind: DetectorKind, bias: Floats
+) -> dict[str, float]:
+    """Return the measured values of a simulated detector in the scenes."""
+    results = [scene.simulated(detector, draw=draw) for scene in scenes]
+    labels = label_scenes(scenes, results, kind=kind, bias=bias)
+    return {**label_estimates(labels), **{key: each[0] for key, each in _more(scenes, results, labels).items()}}
+
+
+def _resampled_scenes(time: Floats, frames: Sequence[int]) -> Floats:
+    """Return how many times each resample of whole scenes contains each frame, (R, T)."""
+    chosen = stream(0, "profile scenes").integers(len(frames), size=(_RESAMPLES, len(frames)))
+    counts = np.stack([np.bincount(row, minlength=len(frames)) for row in chosen])
+    weights = np.repeat(counts, frames, axis=1).astype(float)
+    assert weights.shape[1] == len(time)
+    return weights
+
+
+def _more(scenes: Sequence[ProfiledScene], results: Results, labels: LabelledJoints) -> dict[str, tuple[float, int]]:
+    """Return values beside those of a recording, and the number of joints, people or decoys behind each."""
+    return {
+        "correlation.scatter_views": (shared_scatter(labels), int(labels.risk["jitter"].sum())),
+        **_guess_scatter(labels),
+        **_size_and_border(scenes, labels),
+        **_boxes(scenes, results),
+        **_decoys(scenes, results),
+    }
+
+
+def _guess_scatter(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
+    """Return by how much hidden joints that are misses are beyond 2.35 units, the median of each kind.
+
+    Kinds of which few are hidden have that of all. With the share of misses it tells how many hidden joints are guessed
+    from how far off guesses are.
+    """
+    hidden = labels.taken["miss"] & (labels.occlusion != VISIBLE)
+    beyond = np.linalg.norm(labels.residual, axis=-1) - MISS_FROM
+    kinds = np.broadcast_to(np.array(KIND_OF_JOINT), hidden.shape)
+    pooled = float(np.median(beyond[hidden])) if hidden.any() else np.nan
+    result = {}
+    for index, kind in enumerate(KINDS):
+        of_kind = beyond[hidden & (kinds == index)]
+        value = float(np.median(of_kind)) if len(of_kind) >= _FEWEST else pooled
+        result[f"keypoints.guess.scatter.{kind}"] = value, max(len(of_kind), min(int(hidden.sum()), _FEWEST))
+    return result
+
+
+def _size_and_border(scenes: Sequence[ProfiledScene], labels: LabelledJoints) -> dict[str, tuple[float, int]]:
+    """Return by how much wrong joints are more frequent where the border cuts a person, and where people are small."""
+    seen = labels.risk["miss"] & (labels.occlusion == VISIBLE)
+    seen[..., : LIMB_JOINTS[0]] = False
+    wrong = seen & (labels.taken["miss"] | labels.taken["jitter"])
+    size = np.sqrt(np.maximum(BOX_SHARE * labels.boxes[..., 2] * labels.boxes[..., 3], 1.0))
+    cut = np.zeros(size.shape, bool)
+    start = 0
+    for scene in scenes:
+        here = Conditions.of_views(scene.views).cut
+        cut[start : start + len(here), :, : here.shape[2]] = here
+        start += len(here)
+    small = size < _SMALL
+
+    def share(where: Any) -> tuple[float, int]:
+        n = int(seen[where].sum())
+        return (float(wrong[where].sum() / n) if n else np.nan), n
+
+    whole, of_cut = share(~cut & ~small), share(cut & ~small)
+    of_small = share(~cut & small)
+    exponent = np.log(of_small[0] / whole[0]) / np.mean(np.log(_SMALL / size[small & ~cut])) if of_small[1] else np.nan
+    return {
+        "keypoints.truncated": (of_cut[0] / whole[0], of_cut[1]),
+        "keypoints.small": (float(np.clip(exponent, 0.0, 5.0)), of_small[1]),
+    }
+
+
+def _boxes(scenes: Sequence[ProfiledScene], results: Results) -> dict[str, tuple[float, int]]:
+    """Return the noise and the scores of the boxes of wholly visible people."""
+    sides, scores = [np.zeros((0, 4))], [np.zeros(0)]
+    for _, frames in zip(scenes, results, strict=True):
+        for each in frames:
+            truth, found = each.truth, each.detections
+            shown = np.flatnonzero(truth.person >= 0)
+            view, person = found.view[shown], truth.person[shown]
+            rows = (truth.visibility[view, person] <= 1).all(axis=-1)
+            shown, box = shown[rows], truth.boxes[view[rows], person[rows]]
+            low, size = found.boxes[shown, :2], found.boxes[shown, 2:]
+            away = np.concatenate([low - box[:, :2], low + size - box[:, :2] - box[:, 2:]], axis=1)
+            sides.append(away / np.tile(np.maximum(box[:, 2:], 1.0), 2))
+            scores.append(found.box_scores[shown])
+    side, score = np.concatenate(sides), np.clip(np.concatenate(scores), 1e-3, 1 - 1e-3)
+    if not len(score):
+        return {}
+    logit = np.log(score / (1 - score))
+    return {
+        "boxes.jitter": (float(np.clip(np.median(np.abs(side)) / 0.6745, 0.0, 0.4)), len(score)),
+        "boxes.score": (float(1 / (1 + np.exp(-np.median(logit)))), len(score)),
+        "boxes.deviation": (float(np.subtract(*np.quantile(logit, [0.75, 0.25])) / 1.349), len(score)),
+    }
+
+
+def _decoys(scenes: Sequence[ProfiledScene], results: Results) -> dict[str, tuple[float, int]]:
+    """Return the share of decoys that are detected, how long that lasts, and the scores of their keypoints."""
+    n = k = again = steps = 0
+    scores = [np.zeros(0)]
+    step = np.inf
+    for scene, frames in zip(scenes, results, strict=True):
+        if not scene.views.lookalikes.names:
+            continue
+        possible, hits, shows = decoy_hits(scene, frames)
+        n, k = n + int(possible.sum()), k + int(hits.sum())
+        for one, other in pairwise(range(len(hits))):
+            both = hits[one] & possible[other]
+            again, steps = again + int((both & hits[other]).sum()), steps + int(both.sum())
+        scores += [each.detections.scores[on].ravel() for each, on in zip(frames, shows, strict=True)]
+        step = float(np.diff(scene.sequence.time).min(initial=np.inf))
+    score = np.concatenate(scores)
+    score = np.clip(score[score > 0], 1e-3, 1 - 1e-3)
+    if not n or not k:
+        return {"decoys.share": (0.0, n)} if n else {}
+    logit, share = np.log(score / (1 - score)), k / n
+    kept = np.clip((again / max(steps, 1) - share) / max(1 - share, 1e-9), 0.01, 0.99)
+    return {
+        "decoys.share": (share, n),
+        "decoys.life": (float(-step / np.log(kept)), steps),
+        "decoys.score": (float(1 / (1 + np.exp(-np.median(logit)))), k),
+        "decoys.deviation": (float(np.subtract(*np.quantile(logit, [0.75, 0.25])) / 1.349), k),
+    }
