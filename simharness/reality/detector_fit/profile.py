@@ -17,6 +17,12 @@ _MOST = {
     "keypoints.miss": 1.0,
     "keypoints.self_occluded": LARGEST_MULTIPLE,
     "keypoints.occluded": LARGEST_MULTIPLE,
+    "keypoints.scatter": 100.0,
+    "keypoints.guess.scatter": 100.0,
+    "keypoints.truncated": 100.0,
+    "keypoints.small": 10.0,
+    "boxes.jitter": 0.5,
+    "phantoms.rate": 20.0,
 }
 """Largest value that a profile may hold, by the beginning of the keys."""
 

@@ -126,7 +126,9 @@ def condition_curves(scenes: Sequence[ProfiledScene], labels: LabelledJoints) ->
     missed = labels.expected & ~labels.association.detected
 
     def by_case(n: NDArray, k: NDArray) -> Trials:
-        return Trials(*(np.bincount(case, each.reshape(len(case), -1).sum(axis=1), len(cases)) for each in (n, k)))
+        return Trials(
+            *(np.bincount(case, each.reshape(len(case), -1).sum(axis=1), len(cases)) + 0.0 for each in (n, k))
+        )
 
     false = labels.association.false
     return {

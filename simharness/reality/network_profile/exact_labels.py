@@ -249,8 +249,8 @@ def _associated(scene: ProfiledScene, frames: Sequence[Detected]) -> Association
         false_scores.append([found.scores[wrong & (found.view == view)] for view in range(shape[1])])
     most = int(false.max(initial=0))
     padded = np.zeros((*shape[:2], most, _JOINTS))
-    for t, row in enumerate(false_scores):
-        for view, values in enumerate(row):
+    for t, by_view in enumerate(false_scores):
+        for view, values in enumerate(by_view):
             padded[t, view, : len(values)] = values
     nobody = np.zeros((shape[0], 0, _JOINTS, 3))
     return Association(
@@ -294,6 +294,6 @@ def _joined(parts: Sequence[Any]) -> Any:
         )
     if isinstance(first, Mapping):
         return {key: _joined([each[key] for each in parts]) for key in first}
-    if is_dataclass(first):
+    if is_dataclass(first) and not isinstance(first, type):
         return replace(first, **{f.name: _joined([getattr(each, f.name) for each in parts]) for f in fields(first)})
     return first
