@@ -157,14 +157,19 @@ def _print_check(check: ProfileCheck, console: Console) -> None:
     from rich.table import Table
 
     table = Table(
-        title=f"PCP on {len(check.scenes)} other scenes", title_justify="left", box=SIMPLE_HEAD, pad_edge=False
+        title=f"PCP on {len(check.scenes)} other scenes, and differences of simulated detectors from it",
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
     )
     for column in ("variant", "network", *check.detectors):
         table.add_column(column, justify="left" if column == "variant" else "right")
     for variant in check.variants:
         figures = [check.score(name, variant, "pcp") for name in check.detectors]
+        differences = [each.difference for each in figures]
         ends = [
-            f"{each.difference.mean:+.1f} [{each.difference.low:+.1f}, {each.difference.high:+.1f}]" for each in figures
+            f"{each.mean:+.1f}" + (f"\n{each.low:+.1f} to {each.high:+.1f}" if each.n > 1 else "")
+            for each in differences
         ]
         table.add_row(variant, f"{figures[0].network:.1f}", *ends)
     console.print(table, highlight=False, markup=False)
