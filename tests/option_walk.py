@@ -7,6 +7,7 @@ same to the bit, without a word about it, is ignored.
 from __future__ import annotations
 
 import hashlib
+import re
 import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -68,10 +69,12 @@ class Walk:
         app: the program.
         out: folder into which commands write; it is removed before each run.
         places: what ``{name}`` stands for in words.
+        timed: pattern of printed durations, which are no results.
     """
 
-    def __init__(self, app: typer.Typer, out: Path, places: dict[str, object]) -> None:
+    def __init__(self, app: typer.Typer, out: Path, places: dict[str, object], *, timed: str = "^$") -> None:
         self.app, self.out, self.places = app, out, places | {"out": out}
+        self.timed = re.compile(timed)
         self.runs: dict[str, Outcome] = {}
 
     def run(self, words: str) -> Outcome:
@@ -84,7 +87,7 @@ class Walk:
             digests = {
                 str(each.relative_to(self.out.parent)): _digest(each) for each in files if each.name not in RECORDS
             }
-            self.runs[words] = Outcome(result.exit_code, result.stdout, result.stderr, digests)
+            self.runs[words] = Outcome(result.exit_code, self.timed.sub("", result.stdout), result.stderr, digests)
         return self.runs[words]
 
     def effect(self, base: str, option: str) -> str:

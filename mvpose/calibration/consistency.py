@@ -75,7 +75,8 @@ class Consistency:
     def ideal(self, reading: Reading) -> Floats:
         """Return what ``self(reading)`` would be if rays of the same people met as well as the errors allow, (V, V, W).
 
-        All that is seen in both views at a time counts, whether it is of the same people or not.
+        All that is seen in both views at a time counts, whether it is of the same people or not: first the people who
+        are matched, each with whom they are matched, then the others.
         """
         return self._of_pairs(reading, lambda *pair: best_evidence(*self._views(*pair), True))
 
@@ -214,7 +215,7 @@ def normalised(keypoints, sigma, camera, pixels):
 
 @njit(cache=True)
 def best_evidence(first, second, spreads, cameras, ideal):
-    """Return the evidence of the best pairs of pieces of two views in each window, (W,).
+    """Return the evidence of the best pairs of pieces of two views in each window, (W,); their most if ``ideal``.
 
     Args:
         first: first detection of each window (W + 1,), number of pieces in each (W,), and of each detection its frame
@@ -228,8 +229,23 @@ def best_evidence(first, second, spreads, cameras, ideal):
     result = np.zeros(windows)
     for w in range(windows):
         if first[1][w] and second[1][w]:
-            result[w] = _assign(window_sums(first, second, spreads, cameras, w, ideal))
+            sums = window_sums(first, second, spreads, cameras, w, False)
+            result[w] = _ideal(sums, window_sums(first, second, spreads, cameras, w, True)) if ideal else _assign(sums)
     return result
+
+
+@njit(cache=True)
+def _ideal(sums, most):
+    """Return the most evidence of the best pairs, and of the best of the pieces that are left.
+
+    Of two people in one view and one in the other, another than the one who is matched may have more keypoints.
+    """
+    total, left = 0.0, most.copy()
+    for pair in assigned(sums):
+        total += most[pair[0], pair[1]]
+        left[pair[0], :] = 0.0
+        left[:, pair[1]] = 0.0
+    return total + _assign(left)
 
 
 @njit(cache=True)

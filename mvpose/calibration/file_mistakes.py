@@ -53,7 +53,7 @@ _UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # a world 
 
 SWAPPED = Mistake("cameras-swapped", 2.0, "the calibrations of {who} are exchanged", "exchanged")
 CROPPED = Mistake(
-    "image-cropped", 0.01, "the pictures of {who} are cropped, the calibration is of the uncropped ones", "crop"
+    "image-cropped", 0.01, "the pictures of {who} are cropped, but the calibration is for whole pictures", "crop"
 )
 TURNED = Mistake("moved-camera", 0.05, "{who} is turned against its calibration", "")
 

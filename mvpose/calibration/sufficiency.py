@@ -60,8 +60,10 @@ class PairAgreement:
     @classmethod
     def measured(cls, consistency: Consistency, *readings: Reading) -> Self:
         """Return the agreement of all pairs of views, at each time under the best of some readings."""
-        evidence = np.max([consistency(each) for each in readings], axis=0).sum(axis=2)
-        ideal = consistency.ideal(readings[0]).sum(axis=2)
+        of_readings = np.stack([consistency(each) for each in readings])
+        best = of_readings.argmax(axis=0)[None]
+        ideals = np.stack([consistency.ideal(each) for each in readings])
+        evidence, ideal = (np.take_along_axis(each, best, axis=0)[0].sum(axis=2) for each in (of_readings, ideals))
         evidence, ideal = evidence + evidence.T, ideal + ideal.T
         with np.errstate(invalid="ignore", divide="ignore"):
             return cls(np.where(ideal > 0, evidence / ideal, np.nan))

@@ -34,7 +34,7 @@ _UNUSUAL = 1.25  # a note
 
 _TILTED = float(np.radians(35.0))  # between people and the vertical: people who exercise lean, but not all and always
 _NEAR_AXIS = float(np.radians(15.0))  # an axis of the world this near to the people is the vertical
-_ALIGNED = 0.7  # length of the mean direction of trunks; less is of people who lie, bend or are matched wrongly
+_ALIGNED = 0.7  # length of the mean of unit vectors from hips to shoulders: 1 for parallel trunks, 0 for random ones
 _FEWEST_TRUNKS = 20
 _ANKLES = ("left_ankle", "right_ankle")
 _SHOULDERS, _HIPS = ("left_shoulder", "right_shoulder"), ("left_hip", "right_hip")

@@ -42,10 +42,24 @@ RecordingFolder = Annotated[
         help="Folder with the files of the recording. [dim]\\[default: that of the description][/]", metavar="FOLDER"
     ),
 ]
+
+
+def _refuse_repeated(overrides: list[str] | None) -> list[str] | None:
+    """Refuse two overrides of one key, of which only the last would count."""
+    keys = [each.partition("=")[0].strip() for each in overrides or ()]
+    with PROGRAM.exit_on_error():
+        if repeated := [each for each in overrides or () if keys.count(each.partition("=")[0].strip()) > 1]:
+            raise ValueError(f"--set {', --set '.join(repeated)}: of one key; give one of them")
+    return overrides
+
+
 Overrides = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="Change a key of the scenario: [cyan]people.count=6[/]. Repeatable."
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a key of the scenario: [cyan]people.count=6[/]. Repeatable, for other keys.",
+        callback=_refuse_repeated,
     ),
 ]
 Seed = Annotated[

@@ -12,6 +12,7 @@ from rich.console import Console
 
 from mvpose.commands.option_groups import given, grouped, option
 from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
+from mvpose.commands.programs import note
 from simharness.cli.program import PROGRAM, AllWorkers, Workers
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 _MOST_PEOPLE = 40
 _PEOPLE = 4
 _DETECTOR = "typical"
+_SMALL = 3  # cameras: each set of two and more is the rig, or the rig without one
 _CROWD = 6  # scenes of other numbers of people
 
 
@@ -116,6 +118,8 @@ def rehearse(
         place = out or Path("results/rehearsal") / name
         check_place(place / "rehearsal.html", option="--out", mark=HTML)
         check_place(place / "rehearsal.json", option="--out", mark=PROVENANCE)
+        if subsets and len(rig) <= _SMALL:
+            note(f"--subsets has no effect: all sets of {len(rig)} cameras are scored anyway")
         effort = RehearsalEffort(
             scenes=scenes, crowd_scenes=min(_CROWD, scenes), workers=workers or os.cpu_count() or 1
         )
@@ -251,7 +255,7 @@ def plan(
         check_writable(folder, _PLAN)
         open_manifest(folder, _PLAN)
         if preview:
-            for name in ("cameras", "lens", "scenes", "seed", "workers"):
+            for name in ("cameras", "lens", "budget", "scenes", "seed", "workers"):
                 if given(name):
                     raise ValueError(f"--{name}: is about the plan, which --preview does not make; give one of them")
             from simharness.outputs.planning.plan_page import write_preview
@@ -260,6 +264,9 @@ def plan(
             typer.echo(f"preview: {page}")
             return
         from simharness.outputs.planning.plan_page import write_plan
+
+        if given("workers") and not scenes:
+            note("--workers has no effect: --scenes 0 simulates nothing")
         from simharness.planning.plan_rig import PlanEffort, plan_rig
 
         try:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mvpose.commands.errors import failing
+from mvpose.commands.programs import note
 from simharness.cli.program import PROGRAM, BlameSeeds
 
 if TYPE_CHECKING:
@@ -93,10 +94,13 @@ def report(
             typer.echo(f"recording: {rerun}")
             return
         from mvpose.commands.progress import reporter
+        from simharness.outputs.study.curves import factors_by_case
         from simharness.outputs.study.page import THRESHOLDS, check_thresholds, write_report
         from simharness.outputs.study.worst_frames import SHOWN
 
         check_thresholds(thresholds)
+        if thresholds and not any(each.numeric for swept in factors_by_case(results).values() for each in swept):
+            note("--threshold has no effect: the study sweeps no numbers")
         if digest is not None:
             from simharness.outputs.study.digest import write_digest
 

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from mvpose.commands.errors import failing
 from mvpose.commands.option_groups import given, grouped, option
-from mvpose.commands.programs import FAILED
+from mvpose.commands.programs import FAILED, note
 from simharness.cli.program import PROGRAM, BlameSeeds, Overrides, ScenarioFile, Workers
 
 if TYPE_CHECKING:
@@ -89,6 +89,8 @@ def study(
 
         limits = None if yes else LIMIT
         loaded = load_study(file, overrides=overrides or (), seeds=seeds, variants=variant or None, limit=limits)
+        if yes and loaded.trials <= LIMIT:
+            note(f"--yes has no effect: the study has no more than {LIMIT:,} trials")
         part = _part(running.shard)
         if part is not None and blame:
             raise ValueError("--blame: is made of all parts: give it without --shard, when their stores are merged")

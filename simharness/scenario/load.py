@@ -44,7 +44,7 @@ from simharness.runtime.version import code_version
 from simharness.scenario.checks import Checker, refuse
 from simharness.scenario.document import Document, read_document
 from simharness.scenario.file_model import MOST_TRIALS
-from simharness.scenario.layers import Origins, merge, set_origin
+from simharness.scenario.layers import Key, Origins, merge, set_origin
 from simharness.scenario.presets import Presets
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.scenario.sections.method_section import wrong_variants
@@ -281,11 +281,13 @@ def read_plan(
     data, origins = dict(document.data), document.origins
     for key, value in (("seed", seed), ("seeds", seeds)):
         if value is not None:
+            _refuse_second(origins, (key,), f"--{key}")
             data[key] = list(value) if isinstance(value, Sequence) else value
             set_origin(origins, (key,), f"--{key}")
     if variants is not None:
+        _refuse_second(origins, ("method", "variants"), "--variant")
         data = merge(data, {"method": {"variants": list(variants)}})
-        set_origin(origins, ("method", "variants"), "--variants")
+        set_origin(origins, ("method", "variants"), "--variant")
 
     mistakes: list[str] = []
     reader = SweepReader(origins, str(document.path), mistakes)
@@ -310,6 +312,12 @@ def read_plan(
     refuse(mistakes)
     assert base is not None
     return ScenarioPlan(document, base, all_seeds, sweep, tuple(cases), gate)
+
+
+def _refuse_second(origins: Origins, key: Key, option: str) -> None:
+    """Refuse an option of a key that an override sets, too."""
+    if (override := origins.get(key, "")).startswith("--set"):
+        raise ScenarioError(f"{option}: {override} sets the same key; give one of them")
 
 
 class _Settings:

@@ -164,6 +164,15 @@ def test_a_view_of_another_time_sees_other_people(recording):
     assert found == [("other-people", 1)]
 
 
+def test_a_view_that_sees_a_shared_person_in_part_and_a_bystander_whole_sees_no_other_people():
+    rig = rig_of(4)
+    frames, people = film(rig, walk(2, frames=_FRAMES, period=_PERIOD), only=[{0, 1}, {0, 1}, {0}, {0}])
+    for k, (frame, person) in enumerate(zip(frames, people, strict=True)):
+        hidden = ((frame.view == 1) & (person == 0))[:, None] & (np.arange(17) >= 7)
+        frames[k] = Detections.from_keypoints(frame.view, frame.keypoints, np.where(hidden, 0.0, frame.scores))
+    assert "other-people" not in {each.kind for each in diagnose(rig, frames, period=_PERIOD).findings}
+
+
 def _with_view(frame, other, view):
     rest, taken = frame.select(frame.view != view), other.select(other.view == view)
     columns = [np.concatenate([getattr(rest, key), getattr(taken, key)]) for key in ("view", "keypoints", "scores")]

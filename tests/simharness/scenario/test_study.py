@@ -287,7 +287,7 @@ class TestSeedsAndVariants:
         assert refusal(path).startswith(
             f"{path}: variants: unknown variant 'ful'; did you mean full? expected one of full, "
         )
-        assert refusal(path, variants=["best"]).startswith("--variants: variants: unknown variant 'best'")
+        assert refusal(path, variants=["best"]).startswith("--variant: variants: unknown variant 'best'")
         assert "a variant is listed twice" in refusal(path, variants=["full", "full"])
         assert "needs descriptors" in refusal(path, variants=["appearance"])
         drawn = load_study(path, variants=["appearance"], overrides=["appearance.source=drawn"])

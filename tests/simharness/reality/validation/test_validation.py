@@ -5,11 +5,10 @@ import re
 
 import numpy as np
 import pytest
+from described_recording import describe
 from turning_people import walkers
 from typer.testing import CliRunner
 
-from mvpose import COCO17, SHELF14
-from mvpose.formats.calibration.voxelpose import write_calibration
 from simharness.cli import app
 from simharness.outputs.validation.page import render_validation
 from simharness.outputs.validation.tables import group_rows
@@ -18,7 +17,6 @@ from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.validation import ValidationPlan, halves, validate
 from simharness.reality.validation.validation_summary import summarize_validation
 from simharness.reality.validation.verdicts import VerdictState
-from simharness.scenario.toml_files import dumps_keys
 from simharness.trial.identity import provenance
 
 PLAN = ValidationPlan(twin_every=1, draws=2, detection_draws=1, variants=("full", "fast"))
@@ -105,27 +103,7 @@ def test_halves_share_no_frame(recorded):
 class TestCommand:
     @pytest.fixture
     def described(self, tmp_path, recorded):
-        """The files of the recording, with COCO results as detections."""
-        write_calibration(tmp_path / "cameras.json", recorded.rig)
-        (tmp_path / "detections").mkdir()
-        for view, camera in enumerate(recorded.rig):
-            results = [
-                {"image_id": int(frame), "category_id": 1, "score": 0.9, "keypoints": points.ravel().tolist()}
-                for frame, found in zip(recorded.frames, recorded.detections, strict=True)
-                for points in np.dstack([found.keypoints, found.scores])[found.view == view]
-            ]
-            (tmp_path / "detections" / f"{camera.name}.json").write_text(json.dumps(results))
-        np.savez(tmp_path / "truth.npz", joints=recorded.truth, names=np.array(SHELF14.joints), frames=recorded.frames)
-        keys = {
-            "name": "hall",
-            "rate": 25.0,
-            "frames": [[0, len(recorded) - 1]],
-            "calibration": {"file": "cameras.json", "size": [1032, 776]},
-            "detections": {"format": "coco", "path": "detections", "skeleton": COCO17.name, "kind": "bottom-up"},
-            "truth": {"format": "npz", "file": "truth.npz"},
-        }
-        (tmp_path / "hall.toml").write_text(dumps_keys(keys))
-        return tmp_path / "hall.toml"
+        return describe(recorded, tmp_path, name="hall")
 
     @pytest.mark.parametrize(("noise", "code"), [(3.0, 0), (60.0, 1)])
     def test_the_exit_code_is_the_verdict(self, described, tmp_path, monkeypatch, noise, code):
