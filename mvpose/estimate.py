@@ -106,10 +106,11 @@ class Estimate(Sealed):
         scores: ArrayLike | None = None,
         labels: ArrayLike | None = None,
         covariance: ArrayLike | None = None,
+        ids: ArrayLike | None = None,
         timings: Mapping[str, float] | None = None,
         skeleton: Skeleton = COCO17,
     ) -> Self:
-        """Create an estimate from joints, with scores, labels and covariance optional, for user-defined estimators.
+        """Create an estimate from joints, all else optional, for user-defined estimators.
 
         Args:
             joints: positions in metres, (n, J, 3), in the order of the skeleton; NaN or None for a joint that could
@@ -119,6 +120,7 @@ class Estimate(Sealed):
             labels: person of each given detection, 0 to n - 1, or -1 for none, (m,); leave it out if the method does
                 not report it.
             covariance: covariance of each joint, (n, J, 3, 3), square metres.
+            ids: identity of each person, (n,), whole numbers, the same in all frames of a tracker.
             timings: time in seconds by stage.
             skeleton: the J joints.
 
@@ -145,6 +147,7 @@ class Estimate(Sealed):
             Matching(labels),
             None if covariance is None else as_array(covariance, (*joints.shape, 3), "covariance"),
             dict(timings or {}),
+            ids=ids,  # type: ignore[arg-type]  # made an array by the constructor
         )
 
     def ellipsoids(self, share: float) -> NDArray[np.float64] | None:

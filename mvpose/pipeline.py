@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,7 +110,18 @@ def _restored(matching: Matching, chosen: NDArray[np.int64], detections: int) ->
     return Matching(labels, P, matching.iterations, matching.residuals, matching.objective, matching.converged)
 
 
+def _without_empty(poses: Poses, matching: Matching) -> tuple[Poses, Matching]:
+    """Leave out people without a joint: looks alone may match detections that have no joint in common."""
+    placed = ~np.isnan(poses.joints[..., 0]).all(axis=1)
+    if placed.all():
+        return poses, matching
+    number = np.append(np.where(placed, np.cumsum(placed) - 1, -1), -1)
+    kept = Poses(*(each[placed] for each in poses))
+    return kept, replace(matching, labels=number[matching.labels])
+
+
 def _estimate(poses: Poses, matching: Matching, start: float, compared: float, matched: float) -> Estimate:
+    poses, matching = _without_empty(poses, matching)
     seal(*poses)
     end = time.perf_counter()
     timings = {

@@ -14,6 +14,7 @@ from typing import Any
 from mvpose.files.input_files import parse_toml
 from mvpose.files.message_text import one_line, shown
 from simharness.scenario.layers import PRESET_KINDS, Key, Origins, leaves, merge_with_presets, set_origin
+from simharness.scenario.sections.method_section import module_file
 from simharness.scenario.sections.scenario import FILE_KEYS, NETWORK_KEYS
 from simharness.scenario.shipped import shipped_folder, shipped_names
 from simharness.scenario.toml_files import ScenarioError, read_toml, toml_place
@@ -238,6 +239,8 @@ def _section(settings: Any, names: Sequence[str]) -> dict[str, Any] | None:
 def _located(key: Key, value: Any, folder: Path) -> Any:
     if isinstance(value, list):  # of files, or of a sweep
         return [_located(key, each, folder) for each in value]
+    if key[:-1] == _ESTIMATORS and isinstance(value, str) and (file := module_file(value, folder)) is not None:
+        return f"{file}:{value.rpartition(':')[2]}"
     return str(folder / value) if _is_file(key, value) else value
 
 

@@ -50,22 +50,23 @@ def run_stored_trial(scenario: Scenario, variants: Sequence[str], stored: Stored
         RunError: any error after that; the error is its cause.
     """
     stored = stored or StoredTrial()
-    known = Known()
     if stored.archive.detected:
-        detected = unpack_detected(stored.archive.detected, scenario)
-        estimates = {
-            variant: unpack_estimates(content, detected)
-            for variant, content in stored.archive.estimates.items()
-            if variant in variants
-        }
-        failures = {variant: table for variant, table in stored.failures.items() if variant in estimates}
-        known = Known(detected, estimates, failures)
-    result = run_trial(scenario, variants=variants, known=known)
+        packed, detected = b"", unpack_detected(stored.archive.detected, scenario)
+    else:  # packed before any method runs, so that none can change what is stored
+        detected = run_trial(scenario, variants=variants, until="detect").detected
+        packed = pack_detected(detected)
+    estimates = {
+        variant: unpack_estimates(content, detected)
+        for variant, content in stored.archive.estimates.items()
+        if variant in variants
+    }
+    failures = {variant: table for variant, table in stored.failures.items() if variant in estimates}
+    result = run_trial(scenario, variants=variants, known=Known(detected, estimates, failures))
     archive = TrialArchive(
-        b"" if known.detected is not None else pack_detected(result.detected),
+        packed,
         {
-            variant: stored.archive.estimates[variant] if variant in known.estimates else pack_estimates(estimates)
-            for variant, estimates in result.estimates.items()
+            variant: stored.archive.estimates[variant] if variant in estimates else pack_estimates(found)
+            for variant, found in result.estimates.items()
         },
     )
     return TrialOutput(result.results, archive)

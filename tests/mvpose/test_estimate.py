@@ -44,10 +44,11 @@ def test_scores_of_people_are_those_of_their_joints():
 
 def test_optional_fields_are_kept():
     covariance = np.broadcast_to(np.eye(3), (2, 17, 3, 3))
-    estimate = Estimate.of_joints(PEOPLE, labels=[1, 0, -1], covariance=covariance, timings={"total": 0.5})
+    estimate = Estimate.of_joints(PEOPLE, labels=[1, 0, -1], covariance=covariance, ids=[7, 3], timings={"total": 0.5})
     assert estimate.matching.labels_of(3).tolist() == [1, 0, -1]
     np.testing.assert_array_equal(estimate.covariance, covariance)
     assert estimate.timings == {"total": 0.5}
+    assert estimate.ids.tolist() == [7, 3]
 
 
 @pytest.mark.parametrize(

@@ -210,3 +210,21 @@ def test_the_method_stands_alone():
     strangers = ("simharness", "mujoco", "pyrender", "cv2", "polars")
     code = f"import sys, mvpose; print(*(m for m in {strangers} if m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split() == []
+
+
+def test_people_without_a_joint_are_left_out():
+    """Two detections of equal looks without a common joint, and a person: the person alone has a place."""
+    rig = ring(3)
+    seen, _ = detect(rig, crowd(1))
+    keypoints, scores = np.full((2, 17, 2), 400.0), np.zeros((2, 17))
+    scores[0, 0] = scores[1, 5] = 0.9
+    both = Detections.from_keypoints(
+        np.append(seen.view, [0, 1]),
+        np.append(seen.keypoints, keypoints, axis=0),
+        np.append(seen.scores, scores, axis=0),
+    )
+    looks = np.repeat(np.eye(2), [len(seen), 2], axis=0)
+    estimate = mvpose.preset("appearance").estimate(rig, replace(both, descriptors=looks))
+    assert estimate.matching.labels.tolist() == [0] * len(seen) + [-1, -1]
+    assert np.isfinite(estimate.joints).all()
+    assert len(estimate) == 1

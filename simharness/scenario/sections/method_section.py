@@ -69,6 +69,12 @@ class MethodSection(Section):
     )
 
 
+def module_file(place: str, folder: Path) -> Path | None:
+    """Return the file in a folder of the module "PACKAGE.MODULE" or "PACKAGE.MODULE:ATTRIBUTE"; None without one."""
+    module = folder.joinpath(*place.partition(":")[0].split("."))
+    return next((file for file in (module.with_suffix(".py"), module / "__init__.py") if file.is_file()), None)
+
+
 def wrong_variants(method: MethodSection) -> Iterator[tuple[str, str]]:
     """Yield the faulty keys of section [method], each with a message."""
     from mvpose.presets import PRESETS, without_repair  # only where a method is checked: it imports the whole method

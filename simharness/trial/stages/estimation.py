@@ -17,11 +17,14 @@ from mvpose.presets import PRESETS, READ_HEATMAPS, without_repair
 from simharness.detector.detect import Detected
 from simharness.runtime.frame_pool import chunks_of, map_jobs
 from simharness.trial.stages.detected_sequence import DetectedSequence
+from simharness.trial.stages.method_inputs import input_digest
 
 
 @dataclass(frozen=True)
 class EstimateFrames:
     """Frame function that runs variants on frames. Heat maps are drawn frame by frame, for variants that read them.
+
+    All variants share the cameras and the detections, so that a change of either is an error.
 
     Attributes:
         rig: the believed cameras.
@@ -39,8 +42,12 @@ class EstimateFrames:
         Args:
             frames: the frames; all of them for variants with memory, because their past begins with the first.
             variants: names; all by default.
+
+        Raises:
+            RunError: a variant failed, or has changed what it was given.
         """
         names = tuple(self.pipelines) if variants is None else tuple(variants)
+        given = {frame: self._digest(frame) for frame in frames}
         self._warm_up(names)
         estimates: dict[str, list[Estimate]] = {name: [] for name in names}
         alone = []
@@ -48,13 +55,27 @@ class EstimateFrames:
             estimator = self.pipelines[name]
             if isinstance(estimator, SequenceEstimator):
                 estimates[name] = track_frames(estimator, self.rig, self._sequence(name, frames))
+                self._check_unchanged(name, given)
             else:
                 alone.append(name)
         for frame in frames if alone else ():
             for name, detections in self._inputs(frame, alone):
                 with naming_frame(frame):
                     estimates[name].append(self.pipelines[name].estimate(self.rig, detections))
+                self._check_unchanged(name, {frame: given[frame]})
         return estimates
+
+    def _digest(self, frame: int) -> bytes:
+        return input_digest(self.rig, self.detected[frame].detections)
+
+    def _check_unchanged(self, name: str, given: Mapping[int, bytes]) -> None:
+        """Refuse a variant that has changed the cameras, or detections of frames whose digests are given."""
+        changed = [frame for frame, digest in given.items() if self._digest(frame) != digest]
+        if changed:
+            raise RunError(
+                f"frame {changed[0]}: {name} has changed the cameras or the detections that it was given, which all "
+                "variants share: nothing after it can be trusted. Let it work on copies"
+            )
 
     def input_of(self, frame: int, variant: str) -> Detections:
         """Return the detections of a frame as a variant gets them, with or without heat maps."""

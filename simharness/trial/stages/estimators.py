@@ -10,17 +10,20 @@ A user-defined estimator is any object with ``estimate(rig, detections) -> mvpos
     lifted = "package.module:method"  # a name in a module that can be imported
 
 The name refers to such an object, or to a class or function that returns one when it is called without arguments. The
-object may be a :class:`mvpose.Pipeline` with custom stages. A file is loaded alone, not as part of a package, and each
-process that estimates loads it once. Frames come in any order, so an estimator must not depend on earlier frames.
+object may be a :class:`mvpose.Pipeline` with custom stages. A module is looked for beside the scenario file, in the
+working directory, then among what is installed; a file in a package is loaded as a part of it. Each process that
+estimates loads it once. Frames come in any order, so an estimator must not depend on earlier frames.
 
 An estimator with memory, such as a tracker, has ``track(rig, frames)`` (:class:`mvpose.estimators.SequenceEstimator`)
 instead or as well: it yields one estimate for each frame, and gets all frames of a trial in order in one process.
 """
 
+import copy
 import difflib
 import functools
 import hashlib
 import importlib.util
+import math
 import sys
 import time
 import traceback
@@ -36,16 +39,20 @@ import numpy as np
 
 from mvpose import Detections, Estimate, Rig, preset
 from mvpose.affinity import AppearanceAffinity
+from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from mvpose.commands.errors import RunError
+from mvpose.detections import MOST_DETECTIONS
 from mvpose.estimators import Estimator
 from mvpose.files.message_text import prefixed
 from mvpose.skeleton import Skeleton
-from simharness.scenario.sections.method_section import MethodSection, wrong_variants
+from simharness.scenario.sections.method_section import MethodSection, module_file, wrong_variants
 from simharness.trial.stages.estimation import track_frames
+from simharness.trial.stages.method_inputs import own_rig
 
 _PROTOCOL = "estimate(rig, detections) -> mvpose.Estimate"
 _METHODS = ("estimate", "track")
+_ROUNDING = 1e-9  # of the largest entry of a covariance
 
 
 def estimators_of(
@@ -76,8 +83,9 @@ def estimators_of(
 class UserEstimator:
     """User-defined estimator. Only its place is sent to other processes; each process loads the object once.
 
-    Its estimates are checked, and their total time is measured here, because an estimator that wraps a pipeline returns
-    the timings of the pipeline without its added time.
+    It gets copies of cameras and detections, so that it cannot change those of other variants. Its estimates are
+    checked, and their total time is measured here, because an estimator that wraps a pipeline returns the timings of
+    the pipeline without its added time.
 
     Attributes:
         name: name of the variant.
@@ -103,6 +111,7 @@ class UserEstimator:
             RunError: the estimator raised an error, or returned no valid estimate of these detections.
         """
         estimator = self.loaded
+        rig, detections = own_rig(self.name, rig), copy.deepcopy(detections)
         start = time.perf_counter()
         try:
             estimate = estimator.estimate(rig, detections)
@@ -146,11 +155,11 @@ class UserTracker(UserEstimator):
             for detections in frames:
                 waiting.append((len(detections), detections.skeleton))
                 taken += 1
-                yield detections
+                yield copy.deepcopy(detections)
 
         given = feed()
         try:
-            for estimate in estimator.track(rig, given):
+            for estimate in estimator.track(own_rig(self.name, rig), given):
                 try:
                     if not waiting:
                         raise ValueError(f"track yielded {passed + 1} estimates after it took {taken} frames")
@@ -186,7 +195,8 @@ def load_estimator(place: str) -> Estimator:
     """Return the estimator at a place; each process loads it once.
 
     Args:
-        place: "FILE.py:ATTRIBUTE", the file relative to the working directory, or "PACKAGE.MODULE:ATTRIBUTE".
+        place: "FILE.py:ATTRIBUTE", the file relative to the working directory, or "PACKAGE.MODULE:ATTRIBUTE", the
+            module in the working directory or installed.
 
     Raises:
         ValueError: the file, module or attribute does not exist, raises an error, or is no estimator.
@@ -200,8 +210,8 @@ def load_estimator(place: str) -> Estimator:
 def sources_of(place: str) -> Mapping[str, bytes]:
     """Return the Python source files of a user-defined estimator by name, as they are at the first call in a process.
 
-    For a file these are all Python files of its folder, because an estimator may run or read them; for a module all
-    files of its top-level package. Other files that an estimator runs or reads are not known.
+    For a file these are all Python files of its folder, because an estimator may run or read them; for a module, or a
+    file in a package, all files of the top-level package. Other files that an estimator runs or reads are not known.
     """
     return _sources(_absolute(place.rpartition(":")[0]))
 
@@ -214,7 +224,9 @@ def _user_estimator(name: str, place: str) -> UserEstimator:
 @functools.cache
 def _sources(source: str) -> Mapping[str, bytes]:
     if source.endswith(".py"):
-        files = [(file.name, file) for file in Path(source).parent.glob("*.py")]
+        package = _package(Path(source))
+        root = package[0] / package[1].partition(".")[0] if package else Path(source).parent
+        files = [(str(file.relative_to(root)), file) for file in (root.rglob if package else root.glob)("*.py")]
     else:
         spec = importlib.util.find_spec(source.partition(".")[0])
         folders = list((spec and spec.submodule_search_locations) or ())
@@ -225,7 +237,18 @@ def _sources(source: str) -> Mapping[str, bytes]:
 
 
 def _absolute(source: str) -> str:
-    return str(Path(source).resolve()) if source.endswith(".py") else source
+    """Return the path of a source file, or of a module in the working directory; the name of any other module."""
+    file = Path(source) if source.endswith(".py") else module_file(source, Path())
+    return source if file is None else str(file.resolve())
+
+
+def _package(file: Path) -> tuple[Path, str] | None:
+    """Return the folder that holds the outermost package of a file, and the name of its module; None without one."""
+    folder, names = file.parent, [] if file.stem == "__init__" else [file.stem]
+    while (folder / "__init__.py").is_file():
+        names.insert(0, folder.name)
+        folder = folder.parent
+    return None if folder == file.parent else (folder, ".".join(names))
 
 
 @functools.cache
@@ -265,6 +288,14 @@ def _module(source: str) -> ModuleType:
             f"{source}: no such file; a path in a scenario file is relative to that file, a path in --set to the "
             "working directory"
         )
+    if package := _package(Path(source)):
+        folder, module_name = package
+        if str(folder) not in sys.path:
+            sys.path.insert(0, str(folder))
+        try:
+            return import_module(module_name)
+        except (Exception, SystemExit) as error:
+            raise ValueError(f"{source} cannot be loaded: {_describe_error(error, None)}") from error
     # A unique name in sys.modules, because dataclasses look up their module there.
     name = f"_estimator_{Path(source).stem}_{hashlib.blake2b(source.encode(), digest_size=4).hexdigest()}"
     spec = importlib.util.spec_from_file_location(name, source)
@@ -296,17 +327,47 @@ def _check(estimate: object, detections: int, skeleton: Skeleton, *, method: str
         raise ValueError(
             f"{method} {verb} {type(estimate).__name__}, expected mvpose.Estimate: Estimate.of_joints(joints) makes one"
         )
+    if len(estimate) > MOST_DETECTIONS:
+        raise ValueError(f"an estimate has at most {MOST_DETECTIONS} people, got {len(estimate)}")
     joints = as_array(estimate.joints, ("n", len(skeleton), 3), f"joints ({skeleton.name})")
-    if np.isinf(joints).any():
-        raise ValueError("joints must be finite, or NaN for a joint that could not be placed, got infinite values")
-    if not np.isfinite(estimate.scores).all():
+    missing = np.isnan(joints).all(axis=2)
+    if not (missing | np.isfinite(joints).all(axis=2)).all():
         raise ValueError(
-            "scores must be finite, and 0 for a joint that could not be placed, got NaN or infinite values"
+            "joints must be finite, or NaN in all three coordinates for a joint that could not be placed; got a joint "
+            "with infinite or single missing coordinates"
         )
+    if missing.all(axis=1).any():
+        raise ValueError(f"person {int(missing.all(axis=1).argmax())} has no joint: leave out people without joints")
+    if not ((estimate.scores >= 0) & (estimate.scores <= 1)).all():
+        raise ValueError(
+            "scores must lie in 0..1, and be 0 for a joint that could not be placed, got "
+            f"{estimate.scores.min():.6g} to {estimate.scores.max():.6g}"
+        )
+    if estimate.covariance is not None:
+        _check_covariance(estimate.covariance[~missing])
+    if estimate.ids is not None and len(np.unique(estimate.ids)) < len(estimate.ids):
+        raise ValueError(f"ids must be different for all people of a frame, got {estimate.ids.tolist()}")
+    if wrong := [stage for stage, seconds in estimate.timings.items() if not 0 <= seconds < math.inf]:
+        raise ValueError(f"timings must be seconds from 0, got {estimate.timings[wrong[0]]} for {wrong[0]!r}")
     labels = estimate.matching.labels_of(detections)
     if len(labels) and not -1 <= labels.min() <= labels.max() < len(joints):
         raise ValueError(
             f"labels must be -1, or 0 to n - 1 of n = {len(joints)} people, got {labels.min()} to {labels.max()}"
+        )
+
+
+def _check_covariance(covariance: Floats) -> None:
+    """Check the covariances (k, 3, 3) of placed joints; a joint may have none, which is NaN throughout."""
+    known = covariance[~np.isnan(covariance).all(axis=(1, 2))]
+    if not np.isfinite(known).all():
+        raise ValueError("covariances must be finite, or NaN throughout where a joint has none")
+    size = np.abs(known).max(axis=(1, 2), initial=0.0)[:, None, None]
+    if not (np.abs(known - known.swapaxes(1, 2)) <= _ROUNDING * size).all():
+        raise ValueError("covariances must be symmetric")
+    least = np.linalg.eigvalsh(known)[:, 0]
+    if not (least >= -_ROUNDING * size[:, 0, 0]).all():
+        raise ValueError(
+            f"covariances must be positive semi-definite, got one with the eigenvalue {least.min():.3g} square metres"
         )
 
 

@@ -1,5 +1,6 @@
 """User-defined estimators: loading, checks of their estimates, messages, and runs."""
 
+import copy
 import html
 import importlib
 import pickle
@@ -32,11 +33,12 @@ from simharness.trial.run_folder import read_run
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.estimation import EstimateFrames
 from simharness.trial.stages.estimators import UserEstimator, estimators_of, load_estimator, sources_of
+from simharness.trial.stages.method_inputs import input_digest, own_rig
 
 WRAPPED = Path(__file__).parent / "foreign" / "wrapped.py"
 CUSTOM = """
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -89,6 +91,48 @@ class Infinite(Answers):
 
 class Unsure(Answers):
     answer = Estimate(np.zeros((1, 17, 3)), np.full((1, 17), np.nan), Estimate.of_joints([]).matching)
+
+
+class HalfPlaced(Answers):
+    answer = Estimate(np.zeros((1, 17, 3)), np.ones((1, 17)), Estimate.of_joints([]).matching)
+    answer = replace(answer, joints=np.where(np.arange(3) == 2, np.nan, answer.joints))
+
+
+class Nobody(Answers):
+    answer = Estimate(np.full((1, 17, 3), np.nan), np.zeros((1, 17)), Estimate.of_joints([]).matching)
+
+
+class Everybody(Answers):
+    answer = Estimate.of_joints(np.zeros((2001, 17, 3)))
+
+
+class TooSure(Answers):
+    answer = Estimate(np.zeros((1, 17, 3)), np.full((1, 17), 1.5), Estimate.of_joints([]).matching)
+
+
+class Indefinite(Answers):
+    answer = Estimate.of_joints(np.zeros((1, 17, 3)), covariance=np.tile(np.diag([1e-3, 1e-3, -1e-6]), (1, 17, 1, 1)))
+
+
+class Skewed(Answers):
+    answer = Estimate.of_joints(np.zeros((1, 17, 3)), covariance=np.tile(np.eye(3) + np.eye(3, k=1), (1, 17, 1, 1)))
+
+
+class Early(Answers):
+    answer = Estimate.of_joints(np.zeros((1, 17, 3)), timings={"matching": -1.0})
+
+
+class Twins(Answers):
+    answer = Estimate.of_joints(np.zeros((2, 17, 3)), ids=[4, 4])
+
+
+class Vandal:  # writes through the read-only flag, as C code does, and into the cameras
+    def estimate(self, rig, detections):
+        for array in (detections.keypoints, detections.scores, rig.packed, rig[0].t):
+            array.base is None or array.base.setflags(write=True)
+            array.setflags(write=True)
+            array += 3.0
+        return Estimate.of_joints([])
 
 
 class OfOthers(Answers):
@@ -167,6 +211,25 @@ class TestLoading:
         with pytest.raises(ValueError, match=re.escape("there is no module custom_package.methods: install it")):
             load_estimator("custom_package.methods:Custom")
 
+    @pytest.mark.parametrize("inside", ["", "custom_parts"])
+    def test_a_module_beside_the_scenario_or_in_the_working_directory(self, file, tmp_path, monkeypatch, inside):
+        """The module imports its neighbour relatively, where it is in a package."""
+        folder = tmp_path / "methods" / inside
+        folder.mkdir(parents=True)
+        name = f"{inside}.chosen" if inside else "chosen"
+        if inside:
+            (folder / "__init__.py").touch()
+            (folder / "own.py").write_text(CUSTOM)
+            (folder / "chosen.py").write_text("from .own import Custom\n")
+        else:
+            (folder / "chosen.py").write_text(CUSTOM)
+        path = tmp_path / "methods" / "chosen.toml"
+        path.write_text(f'{SCENE}variants = ["mine"]\n[method.estimators]\nmine = "{name}:Custom"')
+        assert estimators_of(load(path).method)["mine"].loaded.preset == "fast"
+        monkeypatch.chdir(tmp_path / "methods")
+        assert load_estimator(f"{name}:Custom") is estimators_of(load(path).method)["mine"].loaded
+        assert {"own.py", "chosen.py"} & set(sources_of(f"{name}:Custom"))
+
     def test_files_of_the_same_name_are_different_modules(self, file, tmp_path, monkeypatch):
         (tmp_path / "other").mkdir()
         (tmp_path / "other" / "custom.py").write_text(CUSTOM.replace('"fast"', '"full"'))
@@ -241,7 +304,15 @@ class TestAnswers:
             ("Dictionary", "returned dict, expected mvpose.Estimate"),
             ("Shelf", r"joints \(coco17\) must be \(n, 17, 3\), got \(1, 14, 3\)"),
             ("Infinite", "joints must be finite"),
-            ("Unsure", "scores must be finite"),
+            ("HalfPlaced", "joints must be finite, or NaN in all three coordinates"),
+            ("Nobody", "person 0 has no joint"),
+            ("Everybody", "an estimate has at most 2000 people, got 2001"),
+            ("Unsure", "scores must lie in 0..1"),
+            ("TooSure", r"scores must lie in 0..1, .* got 1.5 to 1.5"),
+            ("Indefinite", "covariances must be positive semi-definite, got one with the eigenvalue -1e-06"),
+            ("Skewed", "covariances must be symmetric"),
+            ("Early", "timings must be seconds from 0, got -1.0 for 'matching'"),
+            ("Twins", "ids must be different"),
             ("OfOthers", rf"labels must be \({len(SEEN)},\), got \(1,\)"),
             ("OfNobody", "labels must be -1, or 0 to n - 1 of n = 1 people, got 1 to 1"),
         ],
@@ -249,6 +320,34 @@ class TestAnswers:
     def test_invalid_estimates_are_reported(self, file, name, message):
         with pytest.raises(RunError, match=rf"^custom \(.*custom\.py:{name}\): .*{message}"):
             UserEstimator("custom", f"{file}:{name}").estimate(RIG, SEEN)
+
+    def test_a_method_cannot_change_what_others_get(self, file):
+        before = input_digest(RIG, SEEN)
+        expected = mvpose.preset("fast").estimate(RIG, SEEN).joints
+        UserEstimator("custom", f"{file}:Vandal").estimate(RIG, SEEN)
+        assert input_digest(RIG, SEEN) == before
+        np.testing.assert_array_equal(mvpose.preset("fast").estimate(RIG, SEEN).joints, expected)
+
+    def test_the_cameras_of_a_method_stay_one_object(self):
+        assert own_rig("one", RIG) is own_rig("one", RIG)
+        assert own_rig("one", RIG) is not own_rig("two", RIG)
+        np.testing.assert_array_equal(own_rig("one", RIG).packed, own_rig("two", ring(4)).packed)
+
+    @pytest.mark.parametrize("array", ["view", "keypoints", "scores", "boxes", "box_scores", "packed", "centers", "t"])
+    def test_a_change_of_shared_inputs_is_an_error_that_names_the_method(self, array, scenario):
+        trial = build_trial(load(scenario("", "fast")))
+        rig, detected = copy.deepcopy(trial.exposures.believed_rig), tuple(simulated(trial.scenario)[1])
+
+        class Writes:
+            def estimate(self, rig, detections):
+                owner = {"packed": rig, "centers": rig, "t": rig[1]}.get(array, detections)
+                values = getattr(owner, array)
+                values.setflags(write=True)
+                values[...] += 1
+                return mvpose.Estimate.of_joints([])
+
+        with pytest.raises(RunError, match=r"^frame \d: writes has changed the cameras or the detections"):
+            EstimateFrames(rig, copy.deepcopy(detected), {"writes": Writes()})(range(2))
 
     def test_only_the_place_is_pickled(self, file):
         custom = UserEstimator("custom", f"{file}:make")
