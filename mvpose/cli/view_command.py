@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from mvpose.cli.program import PROGRAM
+from mvpose.commands.option_groups import grouped, option
 
 _PAGES = ("recording.html", "doctor.html")
 
@@ -15,11 +16,12 @@ def add_to(app: typer.Typer) -> None:
     app.command()(view)
 
 
+@grouped()
 def view(
     folder: Annotated[
         Path, typer.Argument(help="Folder that [cyan]mvpose[/] wrote: of estimate, run or doctor.", metavar="FOLDER")
     ],
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
+    browser: bool = option(True, "Open the page in a browser.", "--browser/--no-browser"),
 ) -> None:
     """Open the page of a result in a browser, and print its path."""
     with PROGRAM.exit_on_error():

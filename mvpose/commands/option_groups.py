@@ -18,7 +18,7 @@ _OPTION = "option"  # in the metadata of a field
 
 
 def option(default: T, text: str, *flags: str, **settings: Any) -> T:
-    """Return a field of a dataclass of options.
+    """Return a field of a dataclass of options, or the default of a parameter of a command that is :func:`grouped`.
 
     Args:
         default: value of an option that is not given.
@@ -33,8 +33,8 @@ def option(default: T, text: str, *flags: str, **settings: Any) -> T:
 def grouped(*, without: Collection[str] = ()) -> Callable[[Command], Command]:
     """Return a decorator that gives a command the fields of its dataclass parameters as options.
 
-    The fields are annotated as parameters of a typer command, or made by :func:`option`. The command itself is called
-    with the dataclasses.
+    The fields, and the other parameters, are annotated as those of a typer command, or made by :func:`option`. The
+    command itself is called with the dataclasses.
 
     Args:
         without: fields that are no options of this command; they keep their defaults.
@@ -50,9 +50,7 @@ def grouped(*, without: Collection[str] = ()) -> Callable[[Command], Command]:
                 groups[parameter.name] = kind
                 parameters += [each for each in _options(kind) if each.name not in without]
             else:
-                parameters.append(
-                    parameter.replace(annotation=kind, kind=inspect.Parameter.KEYWORD_ONLY)  # typer passes names
-                )
+                parameters.append(_parameter(parameter.name, kind, parameter.default))
 
         parameters.append(inspect.Parameter(_CONTEXT, inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context))
 
@@ -80,15 +78,12 @@ def given(name: str) -> bool:
 def _options(kind: type[Any]) -> list[inspect.Parameter]:
     """Return the fields of a dataclass as parameters."""
     hints = typing.get_type_hints(kind, include_extras=True)
-    for field in dataclasses.fields(kind):
-        if _OPTION in field.metadata:
-            hints[field.name] = Annotated[hints[field.name], field.metadata[_OPTION]]
-    return [
-        inspect.Parameter(
-            field.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default,
-            annotation=hints[field.name],
-        )
-        for field in dataclasses.fields(kind)
-    ]
+    return [_parameter(field.name, hints[field.name], field) for field in dataclasses.fields(kind)]
+
+
+def _parameter(name: str, hint: Any, default: Any) -> inspect.Parameter:
+    """Return a parameter, whose default may be a field; keyword-only, since typer passes names."""
+    if isinstance(default, dataclasses.Field):
+        hint = Annotated[hint, default.metadata[_OPTION]] if _OPTION in default.metadata else hint
+        default = inspect.Parameter.empty if default.default is dataclasses.MISSING else default.default
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)

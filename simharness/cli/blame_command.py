@@ -1,10 +1,11 @@
 """``simharness blame``: what cost a scenario its score, cause by cause."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
 
+from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.output_files import check_place, write_json
 from simharness.cli.program import PROGRAM, JsonFile, Overrides, ScenarioFile, Seed, Workers
 
@@ -17,27 +18,19 @@ def add_to(app: typer.Typer) -> None:
     app.command()(blame)
 
 
+@grouped()
 def blame(
     scenario: ScenarioFile,
     overrides: Overrides = None,
     seed: Seed = None,
-    seeds: Annotated[int, typer.Option(metavar="N", min=1, help="Number of seeds.")] = 10,
-    variant: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VARIANT", help="A preset such as [cyan]fast[/], instead of the scenario's first variant."
-        ),
-    ] = None,
-    score: Annotated[
-        str, typer.Option(metavar="SCORE", help="Score to explain: [cyan]pcp[/], [cyan]recall[/], [cyan]mpjpe_mm[/].")
-    ] = "pcp",
-    cause: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="CAUSE",
-            help="Only this cause: [cyan]swaps[/], [cyan]noise[/]. Repeatable. [dim]\\[default: all][/]",
-        ),
-    ] = None,
+    seeds: int = option(10, "Number of seeds.", metavar="N", min=1),
+    variant: str | None = option(
+        None, "A preset such as [cyan]fast[/], instead of the scenario's first variant.", metavar="VARIANT"
+    ),
+    score: str = option("pcp", "Score to explain: [cyan]pcp[/], [cyan]recall[/], [cyan]mpjpe_mm[/].", metavar="SCORE"),
+    cause: list[str] | None = option(
+        None, "Only this cause: [cyan]swaps[/], [cyan]noise[/]. Repeatable. [dim]\\[default: all][/]", metavar="CAUSE"
+    ),
     workers: Workers = 1,
     json_file: JsonFile = None,
 ) -> None:

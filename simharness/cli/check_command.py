@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 
 from mvpose.commands.errors import failing
+from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.programs import BAD_INPUT, FOUND
 from simharness.cli.program import PROGRAM, Workers
 
@@ -31,6 +32,7 @@ def add_to(app: typer.Typer) -> None:
     app.command()(check)
 
 
+@grouped()
 def check(
     suite: Annotated[
         Path,
@@ -44,22 +46,12 @@ def check(
             dir_okay=False,
         ),
     ],
-    junit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a JUnit report (XML) to this file.", dir_okay=False)
-    ] = None,
-    summary: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a summary (Markdown) to this file.", dir_okay=False)
-    ] = None,
-    update: Annotated[
-        bool,
-        typer.Option(
-            "--update-baseline",
-            help="Measure the suite and write the file of --baseline, instead of comparing with it.",
-        ),
-    ] = False,
-    accept_better: Annotated[
-        bool, typer.Option("--accept-better", help="Let improvements beyond their bounds pass in this run.")
-    ] = False,
+    junit: Path | None = option(None, "Write a JUnit report (XML) to this file.", metavar="FILE", dir_okay=False),
+    summary: Path | None = option(None, "Write a summary (Markdown) to this file.", metavar="FILE", dir_okay=False),
+    update: bool = option(
+        False, "Measure the suite and write the file of --baseline, instead of comparing with it.", "--update-baseline"
+    ),
+    accept_better: bool = option(False, "Let improvements beyond their bounds pass in this run.", "--accept-better"),
     workers: Workers = 1,
 ) -> None:
     r"""Gate for CI: run a suite, compare it with a baseline, and exit with code 1 where it got worse.
@@ -109,9 +101,9 @@ def _write(result: "GateResult", reports: Mapping[str, Path]) -> bool:
     from simharness.gate.gate_reports import junit, markdown
 
     unwritten = False
-    for option, path in reports.items():
+    for flag, path in reports.items():
         try:
-            write_text({"--junit": junit, "--summary": markdown}[option](result), path, option=option)
+            write_text({"--junit": junit, "--summary": markdown}[flag](result), path, option=flag)
         except ValueError as error:
             unwritten = True
             Console(stderr=True).print(f"error: {error}", soft_wrap=True, highlight=False, markup=False)

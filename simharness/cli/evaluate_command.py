@@ -11,6 +11,7 @@ from rich.console import Console
 from typer.core import TyperGroup
 
 from mvpose.commands.errors import failing
+from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.output_files import PROVENANCE, check_place, write_json
 from simharness.cli.program import PROGRAM, JsonFile, Overrides, RecordingFile, RecordingFolder, ScenarioFile
 
@@ -62,28 +63,24 @@ SummaryFile = Annotated[
 
 
 @app.command("recording")
+@grouped()
 def evaluate_recording(
     recording: RecordingFile,
     folder: RecordingFolder = None,
     json_file: SummaryFile = None,
     head: Head = HeadMapping.VOXELPOSE,
-    method: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="VARIANT",
-            help="A preset such as [cyan]track[/], or your own method as FILE.py:NAME. Repeatable. "
-            "[dim]\\[default: full][/]",
-        ),
-    ] = None,
-    lag: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S",
-            min=0.0,
-            help="Seconds of later frames that an estimate of track and track-fast waits for: 0 for none, inf for all. "
-            "[dim]\\[default: 0.2][/]",
-        ),
-    ] = None,
+    method: list[str] | None = option(
+        None,
+        "A preset such as [cyan]track[/], or your own method as FILE.py:NAME. Repeatable. [dim]\\[default: full][/]",
+        metavar="VARIANT",
+    ),
+    lag: float | None = option(
+        None,
+        "Seconds of later frames that an estimate of track and track-fast waits for: 0 for none, inf for all. "
+        "[dim]\\[default: 0.2][/]",
+        metavar="S",
+        min=0.0,
+    ),
 ) -> None:
     """Score methods on a recording; the word [cyan]recording[/] may be left out."""
     with PROGRAM.exit_on_error():
@@ -122,6 +119,7 @@ def evaluate_recording(
 
 
 @app.command("poses")
+@grouped()
 def evaluate_poses(
     recording: RecordingFile,
     poses: Annotated[
@@ -135,14 +133,11 @@ def evaluate_poses(
     folder: RecordingFolder = None,
     json_file: SummaryFile = None,
     head: Head = HeadMapping.VOXELPOSE,
-    first: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            help="Number of the first frame of POSES in the recording. "
-            "[dim]\\[default: that of its first detections][/]",
-        ),
-    ] = None,
+    first: int | None = option(
+        None,
+        "Number of the first frame of POSES in the recording. [dim]\\[default: that of its first detections][/]",
+        metavar="N",
+    ),
 ) -> None:
     """Score the results of [cyan]mvpose estimate[/] or [cyan]mvpose run[/] against the truth of a recording."""
     with PROGRAM.exit_on_error():
@@ -166,12 +161,11 @@ def evaluate_poses(
 
 
 @app.command()
+@grouped()
 def twin(
     recording: RecordingFile,
     folder: RecordingFolder = None,
-    twins: Annotated[
-        int, typer.Option(metavar="N", min=2, max=10_000, help="Number of twins, of different seeds.")
-    ] = 10,
+    twins: int = option(10, "Number of twins, of different seeds.", metavar="N", min=2, max=10_000),
     json_file: JsonFile = None,
 ) -> None:
     """Compare a recording with simulated copies of it (twins): PCP of four variants, with intervals."""
@@ -195,10 +189,11 @@ def twin(
 
 
 @app.command("seeds")
+@grouped()
 def evaluate_seeds(
     scenario: ScenarioFile,
     overrides: Overrides = None,
-    seeds: Annotated[int, typer.Option(metavar="N", min=2, max=10_000, help="Number of seeds.")] = 10,
+    seeds: int = option(10, "Number of seeds.", metavar="N", min=2, max=10_000),
     json_file: JsonFile = None,
 ) -> None:
     """Score a scenario at many seeds by the protocol of the data sets: PCP of all people and of each person."""

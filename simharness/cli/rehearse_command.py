@@ -74,21 +74,18 @@ def rehearse(
         ),
     ],
     surroundings: Surroundings,
-    size: Annotated[
-        str | None,
-        typer.Option(metavar="WxH", help="Size of the pictures, pixels, where the calibration does not state it."),
-    ] = None,
-    subsets: Annotated[bool, typer.Option("--subsets", help="Also score every set of two cameras and more.")] = False,
-    scenes: Annotated[int, typer.Option(metavar="N", min=2, max=1000, help="Number of simulated scenes.")] = 16,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of all draws.")] = 0,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Folder of rehearsal.html and rehearsal.json. [dim]\\[default: results/rehearsal/NAME][/]",
-            file_okay=False,
-        ),
-    ] = None,
+    size: str | None = option(
+        None, "Size of the pictures, pixels, where the calibration does not state it.", metavar="WxH"
+    ),
+    subsets: bool = option(False, "Also score every set of two cameras and more.", "--subsets"),
+    scenes: int = option(16, "Number of simulated scenes.", metavar="N", min=2, max=1000),
+    seed: int = option(0, "Seed of all draws.", metavar="N", min=0),
+    out: Path | None = option(
+        None,
+        "Folder of rehearsal.html and rehearsal.json. [dim]\\[default: results/rehearsal/NAME][/]",
+        metavar="FOLDER",
+        file_okay=False,
+    ),
     workers: AllWorkers = None,
 ) -> None:
     """Predict what a rig will give before its cameras hang: maps of the floor, the worth of each camera, one more.
@@ -222,20 +219,16 @@ def plan(
         typer.Argument(help="A room file (TOML), or the name of a shipped room: [cyan]lab[/].", metavar="ROOM"),
     ],
     options: RoomOptions,
-    scenes: Annotated[
-        int, typer.Option(metavar="N", min=0, max=1000, help="Simulated scenes that confirm the plan; 0: none.")
-    ] = 8,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of all draws.")] = 0,
+    scenes: int = option(8, "Simulated scenes that confirm the plan; 0: none.", metavar="N", min=0, max=1000),
+    seed: int = option(0, "Seed of all draws.", metavar="N", min=0),
     workers: Workers = 1,
-    preview: Annotated[
-        bool, typer.Option("--preview", help="Only draw the room and the places for cameras: preview.html.")
-    ] = False,
-    out: Annotated[
-        Path,
-        typer.Option(
-            metavar="FOLDER", help="Folder in which the plan gets a folder with the name of the room.", file_okay=False
-        ),
-    ] = Path("results/plans"),
+    preview: bool = option(False, "Only draw the room and the places for cameras: preview.html.", "--preview"),
+    out: Path = option(
+        Path("results/plans"),
+        "Folder in which the plan gets a folder with the name of the room.",
+        metavar="FOLDER",
+        file_okay=False,
+    ),
 ) -> None:
     """Find the best places for the cameras of a room.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mvpose.commands.errors import failing
+from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.programs import note
 from simharness.cli.program import PROGRAM, BlameSeeds
 
@@ -20,45 +21,34 @@ def add_to(app: typer.Typer) -> None:
     app.command()(report)
 
 
+@grouped()
 def report(
     study: Annotated[
         Path, typer.Argument(help="Result folder of a study; with --rerun also of a run.", metavar="FOLDER")
     ],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="File of the report. [dim]\\[default: FOLDER/report.html][/]", dir_okay=False
-        ),
-    ] = None,
-    threshold: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="SCORE=VALUE",
-            help="Report where a score passes this value. Repeatable. [dim]\\[default: pcp=90, precision=90][/]",
-        ),
-    ] = None,
-    rerun: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Instead of the report, write the worst trial for the viewer rerun: an .rrd file.",
-            dir_okay=False,
-        ),
-    ] = None,
-    digest: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Instead of the report, write a digest to keep with the code: numbers, a table, the curves.",
-            file_okay=False,
-        ),
-    ] = None,
-    trial: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ID", help="With --rerun: this trial (column trial of trials.parquet; first digits are enough)."
-        ),
-    ] = None,
+    out: Path | None = option(
+        None, "File of the report. [dim]\\[default: FOLDER/report.html][/]", metavar="FILE", dir_okay=False
+    ),
+    threshold: list[str] | None = option(
+        None,
+        "Report where a score passes this value. Repeatable. [dim]\\[default: pcp=90, precision=90][/]",
+        metavar="SCORE=VALUE",
+    ),
+    rerun: Path | None = option(
+        None,
+        "Instead of the report, write the worst trial for the viewer rerun: an .rrd file.",
+        metavar="FILE",
+        dir_okay=False,
+    ),
+    digest: Path | None = option(
+        None,
+        "Instead of the report, write a digest to keep with the code: numbers, a table, the curves.",
+        metavar="FOLDER",
+        file_okay=False,
+    ),
+    trial: str | None = option(
+        None, "With --rerun: this trial (column trial of trials.parquet; first digits are enough).", metavar="ID"
+    ),
     blame: BlameSeeds = 0,
 ) -> None:
     """Write the report of a finished study again: scores, curves, failures, the worst frames.

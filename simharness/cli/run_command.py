@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
+from mvpose.commands.option_groups import grouped, option
 from simharness.cli.program import PROGRAM, BlameSeeds, Overrides, ScenarioFile, Seed, Workers
 
 if TYPE_CHECKING:
@@ -22,15 +23,15 @@ def add_to(app: typer.Typer) -> None:
     app.command()(export)
 
 
+@grouped()
 def run(
     scenario: ScenarioFile,
     overrides: Overrides = None,
     seed: Seed = None,
     workers: Workers = 1,
-    out: Annotated[
-        Path,
-        typer.Option(metavar="FOLDER", help="Folder in which the result folder NAME-HASH appears.", file_okay=False),
-    ] = Path("results/runs"),
+    out: Path = option(
+        Path("results/runs"), "Folder in which the result folder NAME-HASH appears.", metavar="FOLDER", file_okay=False
+    ),
     blame: BlameSeeds = 0,
 ) -> None:
     """Run a scenario: simulate, film, detect, estimate, score, report.
@@ -63,31 +64,23 @@ def run(
     console.print(f"report: {folder / 'report.html'}", soft_wrap=True, highlight=False, markup=False)
 
 
+@grouped()
 def render(
     scenario: ScenarioFile,
     overrides: Overrides = None,
     seed: Seed = None,
-    video: Annotated[bool, typer.Option("--video", help="Write MP4 films instead of PNG pictures.")] = False,
-    overlay: Annotated[
-        str,
-        typer.Option(
-            metavar="LAYERS",
-            help="Draw [cyan]truth,detections,estimates[/], or some of them, into the pictures.",
-        ),
-    ] = "",
-    also: Annotated[
-        str,
-        typer.Option(metavar="CHANNELS", help="Also write [cyan]depth,ids,parts[/], or some of them."),
-    ] = "",
-    every: Annotated[int, typer.Option(metavar="N", help="Render every Nth frame only.")] = 1,
-    out: Annotated[
-        Path,
-        typer.Option(
-            metavar="FOLDER",
-            help="Folder in which the pictures get a folder with the name of the scenario.",
-            file_okay=False,
-        ),
-    ] = Path("results/renders"),
+    video: bool = option(False, "Write MP4 films instead of PNG pictures.", "--video"),
+    overlay: str = option(
+        "", "Draw [cyan]truth,detections,estimates[/], or some of them, into the pictures.", metavar="LAYERS"
+    ),
+    also: str = option("", "Also write [cyan]depth,ids,parts[/], or some of them.", metavar="CHANNELS"),
+    every: int = option(1, "Render every Nth frame only.", metavar="N"),
+    out: Path = option(
+        Path("results/renders"),
+        "Folder in which the pictures get a folder with the name of the scenario.",
+        metavar="FOLDER",
+        file_okay=False,
+    ),
 ) -> None:
     """Render the pictures of all cameras of a scenario, and a mosaic of them.
 
@@ -133,6 +126,7 @@ def _table(title: str, columns: "Sequence[Column]", variants: Mapping[str, Any])
     return ScoreTable(title, ("variant",), headings, rows)
 
 
+@grouped()
 def export(
     scenario: ScenarioFile,
     folder: Annotated[
@@ -143,8 +137,8 @@ def export(
     ] = Path("results/exports"),
     overrides: Overrides = None,
     seed: Seed = None,
-    every: Annotated[int, typer.Option(metavar="N", help="Write every Nth frame only.")] = 1,
-    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Write the pictures.")] = True,
+    every: int = option(1, "Write every Nth frame only.", metavar="N"),
+    pictures: bool = option(True, "Write the pictures.", "--pictures/--no-pictures"),
 ) -> None:
     """Write a scenario as a benchmark in the layout of CMU Panoptic: pictures, truth, calibration, detections.
 

@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
 
+from mvpose.commands.option_groups import grouped, option
 from simharness.cli.program import PROGRAM, Overrides, ScenarioFile, Seed
 
 if TYPE_CHECKING:
@@ -86,11 +87,11 @@ def _needs(plan: "ScenarioPlan") -> str:
     return "".join(f"# {line}".rstrip() + "\n" for line in ("", *describe(needs, trials=plan.trials)))
 
 
+@grouped()
 def schema(
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the schema to this file instead of printing it.", dir_okay=False),
-    ] = None,
+    out: Path | None = option(
+        None, "Write the schema to this file instead of printing it.", metavar="FILE", dir_okay=False
+    ),
 ) -> None:
     """Print the JSON schema of scenario files, with which editors complete and validate them."""
     with PROGRAM.exit_on_error():
@@ -104,18 +105,17 @@ def schema(
         write_text(dumps(), out)
 
 
+@grouped()
 def mjcf(
     scenario: ScenarioFile,
     overrides: Overrides = None,
     seed: Seed = None,
-    out: Annotated[
-        Path,
-        typer.Option(
-            metavar="FOLDER",
-            help="Folder in which the scene gets a folder with the name of the scenario.",
-            file_okay=False,
-        ),
-    ] = Path("results/mjcf"),
+    out: Path = option(
+        Path("results/mjcf"),
+        "Folder in which the scene gets a folder with the name of the scenario.",
+        metavar="FOLDER",
+        file_okay=False,
+    ),
 ) -> None:
     """Write the scene of a scenario, with its people at the first frame and its cameras, as MJCF.
 

@@ -64,17 +64,12 @@ def add_to(app: typer.Typer) -> None:
 def study(
     file: ScenarioFile,
     overrides: Overrides = None,
-    seeds: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Number of seeds, instead of the file's.")
-    ] = None,
-    variant: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="VARIANT", help="A preset such as [cyan]fast[/], instead of the file's variants. Repeatable."
-        ),
-    ] = None,
+    seeds: int | None = option(None, "Number of seeds, instead of the file's.", metavar="N", min=1),
+    variant: list[str] | None = option(
+        None, "A preset such as [cyan]fast[/], instead of the file's variants. Repeatable.", metavar="VARIANT"
+    ),
     blame: BlameSeeds = 0,
-    yes: Annotated[bool, typer.Option("--yes", help="Run even a study of more than 10,000 trials.")] = False,
+    yes: bool = option(False, "Run even a study of more than 10,000 trials.", "--yes"),
     *,
     running: Running,
 ) -> None:

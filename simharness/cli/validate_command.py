@@ -4,12 +4,13 @@ import os
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.console import Console
 
 from mvpose.commands.errors import failing
+from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
 from mvpose.commands.programs import FOUND
 from simharness.cli.program import PROGRAM, AllWorkers, JsonFile, RecordingFile, RecordingFolder
@@ -28,31 +29,24 @@ def add_to(app: typer.Typer) -> None:
     app.command()(validate)
 
 
+@grouped()
 def validate(
     recording: RecordingFile,
     folder: RecordingFolder = None,
-    twins: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=2, help=f"Number of twins. [dim]\\[default: {_TWINS}, quick {_QUICK_TWINS}][/]"),
-    ] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="A third of the frames and four twins, for a first look.")
-    ] = False,
-    fit_on: Annotated[
-        Path | None,
-        typer.Option(metavar="RECORDING", help="Fit the detector to another recording, and predict this one."),
-    ] = None,
-    split_half: Annotated[
-        bool, typer.Option("--split-half", help="Also fit to each half of the recording, and predict the other.")
-    ] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Folder of validation.html and validation.json. [dim]\\[default: results/validation/NAME][/]",
-            file_okay=False,
-        ),
-    ] = None,
+    twins: int | None = option(
+        None, f"Number of twins. [dim]\\[default: {_TWINS}, quick {_QUICK_TWINS}][/]", metavar="N", min=2
+    ),
+    quick: bool = option(False, "A third of the frames and four twins, for a first look.", "--quick"),
+    fit_on: Path | None = option(
+        None, "Fit the detector to another recording, and predict this one.", metavar="RECORDING"
+    ),
+    split_half: bool = option(False, "Also fit to each half of the recording, and predict the other.", "--split-half"),
+    out: Path | None = option(
+        None,
+        "Folder of validation.html and validation.json. [dim]\\[default: results/validation/NAME][/]",
+        metavar="FOLDER",
+        file_okay=False,
+    ),
     json_file: JsonFile = None,
     workers: AllWorkers = None,
 ) -> None:
@@ -139,22 +133,15 @@ def _print_verdicts(verdicts: "Sequence[BoundVerdict]", name: str, console: Cons
     console.print(table, highlight=False)
 
 
+@grouped()
 def fit_detector(
     recording: RecordingFile,
     folder: RecordingFolder = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the profile (TOML) to this file.", dir_okay=False)
-    ] = None,
-    figure: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Plot the measured errors and those of a simulated twin (PNG).", dir_okay=False
-        ),
-    ] = None,
-    json_file: Annotated[
-        Path | None,
-        typer.Option("--json", metavar="FILE", help="Write all numbers to this file.", dir_okay=False),
-    ] = None,
+    out: Path | None = option(None, "Write the profile (TOML) to this file.", metavar="FILE", dir_okay=False),
+    figure: Path | None = option(
+        None, "Plot the measured errors and those of a simulated twin (PNG).", metavar="FILE", dir_okay=False
+    ),
+    json_file: Path | None = option(None, "Write all numbers to this file.", "--json", metavar="FILE", dir_okay=False),
 ) -> None:
     """Measure the errors of the detector of a recording, and write a detector profile with them."""
     with PROGRAM.exit_on_error():
