@@ -150,7 +150,7 @@ def estimate_clocks(
     part, first = _busiest(sightings)
     tracks = ImageTracks.of_sightings(rig, part, without=repeated[first : first + len(part.times)])
     names = camera_names(rig)
-    if not _comparable(tracks):
+    if (np.isfinite(tracks.points[..., 0]).sum(axis=1) >= 2).sum() < _FEWEST:
         return _unknown(names, repeated, sightings.times, tracks.period)
     adjustment = adjust(rig, tracks, coarse_offsets(rig, tracks, largest=largest))
     steps: list[ClockStep] = []
@@ -180,11 +180,6 @@ def _busiest(sightings: Sightings) -> tuple[Sightings, int]:
     first = int((total[_MOST_FRAMES:] - total[:-_MOST_FRAMES]).argmax())
     inside = sightings.select((sightings.frame >= first) & (sightings.frame < first + _MOST_FRAMES))
     return replace(inside, frame=inside.frame - first, times=inside.times[first : first + _MOST_FRAMES]), first
-
-
-def _comparable(tracks: ImageTracks) -> bool:
-    """Return whether views share enough for any comparison."""
-    return bool((np.isfinite(tracks.points[..., 0]).sum(axis=1) >= 2).sum() >= _FEWEST)
 
 
 def _clocks(

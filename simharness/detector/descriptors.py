@@ -272,7 +272,7 @@ class DescriptorModel:
         start = np.concatenate([start, np.zeros(len(levels) - 1), np.log(np.full(bins, 0.1)), [0.5, -3.0]])
         shares, louder, noise, uneven, common = unpack(least_squares(misfit, start).x)
         composition = tuple(DescriptorShares(*map(float, each)) for each in zip(*shares, louder, strict=True))
-        middles = tuple(map(float, _middles(edges)))
+        middles = tuple(map(float, 0.5 * (edges[1:] + edges[:-1])))
         return cls(dimensions, tuple(levels), composition, middles, tuple(map(float, noise)), uneven, common)
 
     def shares_at(self, look_alike: ArrayLike) -> Floats:
@@ -368,11 +368,6 @@ def _better(measured: Mapping[float, Any], bins: int) -> Floats:
     single = np.diff(np.sqrt(np.cumsum(pairs) / pairs.sum()), prepend=0.0)
     probability = np.triu(np.broadcast_to(single[:, None], (bins, bins)), 1) * 2 + np.diag(single)
     return np.asarray(probability / np.maximum(probability.sum(axis=0), 1e-9))
-
-
-def _middles(edges: Floats) -> Floats:
-    """Return the middles of the bins between edges (b + 1,), (b,)."""
-    return 0.5 * (edges[1:] + edges[:-1])
 
 
 def _check_ranges(ranks: Many[float], measured: Mapping[float, Any]) -> None:

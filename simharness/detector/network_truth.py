@@ -39,7 +39,9 @@ def with_detections(truth: Truth, found: Detections, ids: Ids) -> Truth:
             found.keypoints[row], truth.pixels[view], truth.visibility[view], truth.boxes[view]
         )
     order = np.argsort(-similarity, axis=1, kind="stable")
-    person = np.where(similarity.max(axis=1, initial=0.0) >= SIMILAR, order[:, 0], -1) if order.size else _nobody(count)
+    person = (
+        np.where(similarity.max(axis=1, initial=0.0) >= SIMILAR, order[:, 0], -1) if order.size else np.full(count, -1)
+    )
     for row in np.flatnonzero(person < 0).tolist():
         person[row] = _person_at(found.keypoints[row], ids(int(found.view[row])), people=len(truth.joints))
     return replace(truth, person=person, error=_errors(truth, found, person, similarity))
@@ -87,7 +89,3 @@ def _errors(truth: Truth, found: Detections, person: Integers, similarity: Float
     units = oks_units(truth.boxes[view, shown])
     error[real] = classify(found.keypoints[real], truth.pixels[view, shown], units, other=swapped)
     return error
-
-
-def _nobody(count: int) -> Integers:
-    return np.full(count, -1)

@@ -89,7 +89,7 @@ def _cameras(path: str, size: tuple[int, int] | None) -> CamerasSection:
     sized = {} if size is None else {"size": list(size)}
     if not os.path.exists(path) and not Path(path).suffix:
         settings = read_preset(RIGS, file_of(RIGS, path, [Path()]))
-    elif path.endswith(".toml") and _is_rig_file(Path(path)):
+    elif path.endswith(".toml") and (read_toml(Path(path)).keys() <= {*CamerasSection.model_fields, RIGS.key}):
         settings = read_preset(RIGS, Path(path))
     else:
         settings = {"layout": "file", "file": path} | sized
@@ -97,11 +97,6 @@ def _cameras(path: str, size: tuple[int, int] | None) -> CamerasSection:
         return CamerasSection.model_validate_json(json.dumps(settings, default=str))
     except ValueError as error:
         raise ValueError(one_line(f"{path}: {error}")) from None
-
-
-def _is_rig_file(path: Path) -> bool:
-    """Return whether a TOML file has the keys of a section of cameras; else it is a calibration."""
-    return read_toml(path).keys() <= {*CamerasSection.model_fields, RIGS.key}
 
 
 def _same_lens(one: Camera, other: Camera) -> bool:

@@ -281,7 +281,10 @@ def standing_scenes(
     """
     if people < 1 or repeats < 1:
         raise ValueError(f"expected at least 1 person and 1 repeat, got {people} people and {repeats} repeats")
-    places, blocked = volume.places(spacing), [taken_floor(each) for each in obstacles if _in_the_way(each)]
+    places, blocked = (
+        volume.places(spacing),
+        [taken_floor(each) for each in obstacles if (each.center[2] - each.half[2] < _OVERHEAD)],
+    )
     for taken in blocked:
         places = places[~taken.contains(places)]
     if not len(places):
@@ -306,11 +309,6 @@ def taken_floor(obstacle: Box) -> Floor:
     """Return the floor on which nobody stands because of an obstacle: a quarter of a metre around it is included."""
     (x, y, z), (u, v, w) = obstacle.center, obstacle.half
     return Box((x, y, z), (u + _CLEARANCE, v + _CLEARANCE, w), obstacle.yaw).footprint
-
-
-def _in_the_way(obstacle: Box) -> bool:
-    """Return whether nobody can stand where an obstacle is; False for one that hangs overhead."""
-    return obstacle.center[2] - obstacle.half[2] < _OVERHEAD
 
 
 def _grouped(position: Floats, order: Integers, people: int) -> Integers:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from mvpose import COCO17, Detections, Rig
-from mvpose.arrays import Bools, Floats
+from mvpose.arrays import Floats
 from mvpose.commands.progress import Silence, Stages
 from mvpose.formats.calibration.opencv import write_calibration
 from mvpose.formats.people import write_people
@@ -126,13 +126,13 @@ def film(
             present[rows, person] = True
         advance(1)
     source = np.broadcast_to(np.arange(frames)[:, None], (frames, views))
-    sequence = Sequence(_waiting(landmarks, present), np.arange(count), np.arange(frames) / recording.rate, present)
+    sequence = Sequence(
+        np.stack([held(landmarks[:, person], here) for person, here in enumerate(present.T)], axis=1),
+        np.arange(count),
+        np.arange(frames) / recording.rate,
+        present,
+    )
     return FilmedRecording(sequence, Views(pixels, visibility, boxes, area, source), rig, floor)
-
-
-def _waiting(landmarks: Floats, present: Bools) -> Floats:
-    """Return landmarks (F, P, L, 3) in which people keep the pose of the nearest frame in which they are present."""
-    return np.stack([held(landmarks[:, person], here) for person, here in enumerate(present.T)], axis=1)
 
 
 def cut_takes(recording: AnnotatedRecording, people: People) -> list[Take]:

@@ -136,7 +136,7 @@ def check_calibration(faults: FaultsSection, exposures: ExposureSchedule) -> Non
                 continue
             true = exposures.camera(frame, view)
             for quantity, difference, allowed in (
-                ("orientation, degrees", np.degrees(_angle(true.R @ believed.R.T)),
+                ("orientation, degrees", np.degrees(float(np.linalg.norm(cv2.Rodrigues(true.R @ believed.R.T)[0]))),
                  faults.rotation + faults.rotation_drift * minutes),
                 ("position, metres", float(np.abs(true.center - believed.center).max()),
                  faults.translation + faults.translation_drift * minutes),
@@ -150,11 +150,6 @@ def check_calibration(faults: FaultsSection, exposures: ExposureSchedule) -> Non
                         f"{difference:.3g}; "
                         f"the faults allow {_SIGMAS * allowed:.3g}"
                     )
-
-
-def _angle(rotation: Floats) -> float:
-    """Return the angle of a rotation matrix (3, 3) in radians; exact for small angles."""
-    return float(np.linalg.norm(cv2.Rodrigues(rotation)[0]))
 
 
 def _check_projection(playback: Playback, exposures: ExposureSchedule, views: Views, frame: int) -> None:

@@ -43,7 +43,10 @@ def write(export: Export) -> Iterator[tuple[str, bytes]]:
     frames = []
     for k, time in enumerate(people.times.tolist()):
         bodies: list[dict[str, Any]] = [
-            {"id": int(people.ids[column]), key: _nulls(values[k, column].ravel().tolist())}
+            {
+                "id": int(people.ids[column]),
+                key: [None if math.isnan(value) else value for value in values[k, column].ravel().tolist()],
+            }
             for column in np.flatnonzero(present[k])
         ]
         frames.append(_compact({"frame": int(people.numbers[k]), "time": round(time, _DECIMALS), "bodies": bodies}))
@@ -53,11 +56,6 @@ def write(export: Export) -> Iterator[tuple[str, bytes]]:
 
 def _compact(value: object) -> str:
     return json.dumps(value, separators=(",", ":"), allow_nan=False)
-
-
-def _nulls(values: list[float]) -> list[float | None]:
-    """Return values with None, which JSON writes as null, instead of NaN."""
-    return [None if math.isnan(value) else value for value in values]
 
 
 def read(files: PeopleFiles) -> People:

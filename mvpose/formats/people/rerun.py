@@ -8,9 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mvpose.arrays import Bools
 from mvpose.formats.people.people_files import Export
-from mvpose.skeleton import Skeleton
 
 _COLORS = ((31, 119, 180), (255, 127, 14), (44, 160, 44), (214, 39, 40), (148, 103, 189), (140, 86, 75))  # by person
 _JOINT, _BONE = 0.02, 0.01  # metres, radii
@@ -38,12 +36,7 @@ def write(export: Export) -> Iterator[tuple[str, bytes]]:
             labels = [people.skeleton.joints[j] for j in np.flatnonzero(seen)]
             points = rerun.Points3D(joints[seen], colors=color, radii=_JOINT, labels=labels, show_labels=False)
             recording.log(f"{place}/joints", points)
-            strips = [joints[list(edge)] for edge in _edges(people.skeleton, seen)]
+            strips = [joints[list(edge)] for edge in people.skeleton.edges if seen[list(edge)].all()]
             recording.log(f"{place}/bones", rerun.LineStrips3D(strips, colors=color, radii=_BONE))
     content = stream.read()
     yield "people.rrd", content or b""
-
-
-def _edges(skeleton: Skeleton, seen: Bools) -> list[tuple[int, int]]:
-    """Return the edges of which both joints are present."""
-    return [(parent, child) for parent, child in skeleton.edges if seen[parent] and seen[child]]

@@ -121,7 +121,11 @@ def _points(validation: Validation) -> dict[str, dict[str, list[tuple[float, flo
     names = validation.plan.variants
     result: dict[str, dict[str, list[tuple[float, float]]]] = {
         "all cameras": {
-            name: [(each.real.mean, each.twin.mean) for each in _published(validation, name)] for name in names
+            name: [
+                (each.real.mean, each.twin.mean)
+                for each in [validation.variants[name]["pcp"][rule] for rule in tables.PUBLISHED]
+            ]
+            for name in names
         }
     }
     most = max(validation.subsets.curves)
@@ -142,10 +146,6 @@ def _points(validation: Validation) -> dict[str, dict[str, list[tuple[float, flo
             for name in names
         }
     return result
-
-
-def _published(validation: Validation, name: str) -> list[Compared]:
-    return [validation.variants[name]["pcp"][rule] for rule in tables.PUBLISHED]
 
 
 def _plots(validation: Validation) -> dict[str, str]:

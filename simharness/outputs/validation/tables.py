@@ -11,7 +11,7 @@ from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.validation import Validation
 from simharness.reality.validation.verdicts import GROUPS, BoundVerdict, VerdictState
 from simharness.runtime.number_text import fixed, signed
-from simharness.scoring.frame_scores import RULES, HeadRule
+from simharness.scoring.frame_scores import RULES
 from simharness.statistics.intervals import Interval
 
 NOTHING = "–"
@@ -182,13 +182,9 @@ def people_rows(validation: Validation) -> list[tuple[str, list[ComparedCells]]]
 def contrast_rows(validation: Validation) -> list[tuple[str, list[ComparedCells]]]:
     """Return a row for each pair of variants: the difference of PCP by every rule for the head."""
     return [
-        (f"{one} − {other}", [cells(figures[rule], 1) for rule in _contrast_rules()])
+        (f"{one} − {other}", [cells(figures[rule], 1) for rule in (*PUBLISHED, RULES[2])])
         for (one, other), figures in validation.contrasts.items()
     ]
-
-
-def _contrast_rules() -> tuple[HeadRule, ...]:
-    return (*PUBLISHED, RULES[2])
 
 
 def subset_rows(validation: Validation) -> Iterator[tuple[str, list[tuple[str, ComparedCells]]]]:

@@ -272,7 +272,7 @@ def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0
             look = _groomed(look, stream(seed, "people", i, "grooming"))
         look = _styled(look, stream(seed, "people", i, "hair style"), female=female)
         look = _with_accessories(look, stream(seed, "people", i, "accessories"), female=female)
-        look = _expressive(look, stream(seed, "people", i, "expression"))
+        look = replace(look, expression=_pick(_EXPRESSIONS, float(stream(seed, "people", i, "expression").random())))
         looks.append(_toward(look, uniform, look_alike, changes.tolist()) if i < (alike or count) else look)
     return tuple(looks)
 
@@ -300,11 +300,6 @@ def _styled(look: Look, rng: np.random.Generator, *, female: bool) -> Look:
             if of_women < share:
                 return replace(look, hair_style=style)
     return look
-
-
-def _expressive(look: Look, rng: np.random.Generator) -> Look:
-    """Return the look with the expression of the face drawn: half of the faces are neutral, an assumption."""
-    return replace(look, expression=_pick(_EXPRESSIONS, float(rng.random())))
 
 
 def _with_accessories(look: Look, rng: np.random.Generator, *, female: bool) -> Look:

@@ -96,7 +96,7 @@ class Solid:
             return self.hull
         pose = self.trajectory.at(time)
         if np.abs(pose[4:6]).max() < 1e-6:  # upright
-            return self._extent.moved(pose[:2], _yaw(pose)).raised(pose[2])
+            return self._extent.moved(pose[:2], yaw_of(pose)).raised(pose[2])
         return Box.around(transform_points(self._extent.corners, pose))
 
     @cached_property
@@ -114,5 +114,5 @@ class Solid:
             geom.add_to(spec, body, self.name if len(self.geoms) == 1 else f"{self.name} {k}")
 
 
-def _yaw(pose: Floats) -> float:
+def yaw_of(pose: Floats) -> float:
     return float(2 * np.arctan2(pose[6], pose[3]))

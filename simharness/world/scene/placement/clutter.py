@@ -28,7 +28,7 @@ from simharness.world.scene.objects.laboratory import (
 from simharness.world.scene.objects.materials import draw_sheet
 from simharness.world.scene.objects.object_files import load_object, load_shipped, variants
 from simharness.world.scene.objects.plants import draw_plant
-from simharness.world.scene.objects.solids import ObjectModel, Solid
+from simharness.world.scene.objects.solids import ObjectModel, Solid, yaw_of
 from simharness.world.scene.placement.free_space import (
     BODY_HALF_WIDTH,
     LIMB,
@@ -165,7 +165,7 @@ def place_cart(seed: int, k: int, site: Site) -> Solid:
     for _ in range(TRIES):
         path = _draw_path(rng, space)
         period = path.at(path.period * np.arange(_PHASES) / _PHASES)
-        if not all(site.clear(cart.extent.moved(pose[:2], _yaw(pose))) for pose in period):
+        if not all(site.clear(cart.extent.moved(pose[:2], yaw_of(pose))) for pose in period):
             continue
         pose = path.at(space.time)
         if not (_meets_people(cart.extent, pose, space, _COARSE) or _meets_people(cart.extent, pose, space, 1)):
@@ -237,10 +237,6 @@ def _least_distance(extent: Box, pose: Floats, points: Floats) -> float:
     x, y = np.moveaxis(points[..., :2] - pose[:, None, :2], -1, 0)
     local = np.stack([c * x + s * y, c * y - s * x, np.zeros_like(x)], axis=-1)
     return float(extent.distance_on_floor(local).min(initial=np.inf))
-
-
-def _yaw(pose: Floats) -> float:
-    return float(2 * np.arctan2(pose[6], pose[3]))
 
 
 def place_decoys(seed: int, decoys: DecoysSection, space: FreeSpace) -> tuple[Solid, ...]:

@@ -70,7 +70,7 @@ def make_fittings(
                     _door(local, opening, leaf)
                 (a, b), (low, high) = opening.span, opening.heights
                 taken.append((a - 0.12, b + 0.35, low, high + 0.1))
-        if not _plain(room):
+        if room.size[2] >= 1.8:  # lower ones have no fittings
             _prints(local, room, stream(seed, "room", "prints", number), wall, taken)
         _sockets(local, wall, taken)
         if local.parts:
@@ -85,11 +85,6 @@ def make_fittings(
 
 
 Taken = list[tuple[float, float, float, float]]  # left, right, lower and upper edge of parts of a wall
-
-
-def _plain(room: RoomSection) -> bool:
-    """Return whether nothing can hang on the walls."""
-    return room.size[2] < 1.8
 
 
 def _taken(wall: Wall, solids: Sequence[Solid], depth: float = 0.45) -> Taken:
