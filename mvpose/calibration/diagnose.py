@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mvpose.arrays import Floats, Integers
+from mvpose.calibration import sufficiency
 from mvpose.calibration.camera_findings import findings_of_cameras, possible_errors, turn_finding
 from mvpose.calibration.camera_models import ALWAYS
 from mvpose.calibration.cameras import CameraFit, fit
@@ -27,16 +28,6 @@ from mvpose.calibration.pieces import cut_into_windows
 from mvpose.calibration.reading_changes import reread_rig, reread_tracklets
 from mvpose.calibration.rig_size import relative_size
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
-from mvpose.calibration.sufficiency import (
-    DIFFERENT,
-    RECORD,
-    SHORT,
-    PairAgreement,
-    silent_views,
-    strangers,
-    travelled,
-    unknowns,
-)
 from mvpose.calibration.tracklet_matching import PeopleGroups
 from mvpose.calibration.tracklets import Tracklets, link
 from mvpose.calibration.unseen_mistakes import size_findings, unit_findings, world_findings
@@ -63,13 +54,13 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
     names = camera_names(rig)
     tracklets = link(rig, frames, period=period)
     if not len(tracklets.frame):
-        empty = Finding("cannot-tell", "cannot tell: there are no detections", "unknown", 1.0, mend=RECORD)
+        empty = Finding("cannot-tell", "cannot tell: there are no detections", "unknown", 1.0, mend=sufficiency.RECORD)
         return Diagnosis.of_findings([empty], evidence=[], cameras=names, residuals=np.full(len(rig), np.nan))
     detections = np.bincount(tracklets.view, minlength=len(rig))
     consistency = Consistency(cut_into_windows(tracklets))
     files = _examine_files(rig, tracklets, consistency, names)
     reading = files.reading
-    findings = [*files.findings, *silent_views(detections, names)]
+    findings = [*files.findings, *sufficiency.silent_views(detections, names)]
     mended = reread_rig(rig, reading)
     if mended is None:
         findings.append(_nowhere(rig))
@@ -81,8 +72,8 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
         matched_better = match_over_time(_with_found_faults(mended, reading, result), tracklets)
         sightings, joints, rows, result = _fitted(mended, tracklets, matched_better)
     moved = replace(reading, cameras=matched.rig.packed)
-    agreement = PairAgreement.measured(consistency, reading, _corrected(reading, result), moved)
-    found_strangers = strangers(agreement, detections, names)
+    agreement = sufficiency.PairAgreement.measured(consistency, reading, _corrected(reading, result), moved)
+    found_strangers = sufficiency.strangers(agreement, detections, names)
     if found_strangers:
         sightings = sightings.select(
             ~np.isin(sightings.view, [each.view for each in found_strangers if each.view is not None])
@@ -93,7 +84,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
     useless = {each.view for each in findings if each.kind in _USELESS and each.view is not None}
     times = np.nanmin(sightings.times[sightings.frame[rows]], axis=1) - np.nanmin(sightings.times)
     first = joints.start[:-1]
-    missing = unknowns(
+    missing = sufficiency.unknowns(
         result,
         seconds=_seconds(times),
         moved=_travelled(sightings, rows[first], result.equations.joints),
@@ -105,7 +96,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
     starts = np.array([times[first][joints.block == block].min(initial=np.inf) for block in range(joints.blocks)])
     undetermined = any(each.camera is None for each in missing)
     of_cameras = findings_of_cameras(result, mended, starts, names, undetermined=undetermined)
-    if undetermined and not any(SHORT in each.text for each in missing):
+    if undetermined and not any(sufficiency.SHORT in each.text for each in missing):
         of_cameras = [replace(each, severity="unknown") if each.severity == "alarm" else each for each in of_cameras]
     findings += [each for each in of_cameras if each.view not in files.turned or each.kind != "moved-camera"]
     of_world, line = world_findings(mended, sightings, rows, result.equations.joints, joints, up)
@@ -113,7 +104,9 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
     findings += of_world + [
         turn_finding(rig, after, result.covariance[view], view, names) for view in sorted(files.turned - useless)
     ]
-    different = any(DIFFERENT in each.text for each in missing)  # then neither files nor clocks can be compared
+    different = any(
+        sufficiency.DIFFERENT in each.text for each in missing
+    )  # then neither files nor clocks can be compared
     if not different:
         clocks = estimate_clocks(_with_found_faults(mended, reading, result), sightings, period=period)
         findings += [each for each in clocks.findings() if each.view not in useless]
@@ -265,14 +258,14 @@ def _travelled(sightings: Sightings, rows: Integers, joints: Floats) -> float:
     for each in np.unique(person):
         own = np.flatnonzero(person == each)
         names, counts = np.unique(number[own], return_counts=True)
-        result += travelled(joints[own[number[own] == names[np.argmax(counts)]]])
+        result += sufficiency.travelled(joints[own[number[own] == names[np.argmax(counts)]]])
     return result
 
 
 def _evidence(
     result: CameraFit,
     times: Floats,
-    agreement: PairAgreement,
+    agreement: sufficiency.PairAgreement,
     size: tuple[float, int],
     medians: tuple[Floats, Floats],
     names: Sequence[str],

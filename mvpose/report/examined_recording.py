@@ -22,14 +22,7 @@ from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.reconstruction.error_scale import PRIOR_FREEDOM
 from mvpose.recording import People
-from mvpose.report.measures import (
-    Bone,
-    bones,
-    median_by,
-    share_on_one_view,
-    supporting_views,
-    views_of_people,
-)
+from mvpose.report import measures
 from mvpose.report.reprojection import Reprojection, reproject
 from mvpose.report.tables import joint_groups
 
@@ -68,13 +61,13 @@ class ExaminedRecording:
     def of(cls, people: People, rig: Rig, frames: Sequence[Detections]) -> Self:
         """Measure a recording."""
         seen = reproject(rig, frames, people)
-        supports, views = supporting_views(seen, people), views_of_people(seen, people)
+        supports, views = measures.supporting_views(seen, people), measures.views_of_people(seen, people)
         return cls(people, rig, frames, camera_names(rig), seen, supports, views, *joint_groups(people.skeleton))
 
     @cached_property
-    def bones(self) -> list[Bone]:
+    def bones(self) -> list[measures.Bone]:
         """Lengths of all bones of all people."""
-        return bones(self.people)
+        return measures.bones(self.people)
 
     @cached_property
     def errors(self) -> Floats:
@@ -100,7 +93,7 @@ class ExaminedRecording:
             "frames_measured": len(self.seen.frames),
             "residual_px": _json(pixels),
             "residual_mm": _json(1000 * metres),
-            "joints_on_one_view": _json(share_on_one_view(self.supports)),
+            "joints_on_one_view": _json(measures.share_on_one_view(self.supports)),
             "expected_error_mm": _json(1000 * expected_error(people)),
             "people": [self._numbers_of_person(row) for row in range(len(people))],
             "cameras": self._numbers_of_cameras(),
@@ -115,7 +108,7 @@ class ExaminedRecording:
             "from_s": _json(float(people.times[span.start])),
             "to_s": _json(float(people.times[max(span.start, span.stop - 1)])),
             "median_views": _json(float(np.median(views)) if len(views) else math.nan),
-            "joints_on_one_view": _json(share_on_one_view(self.supports[:, row])),
+            "joints_on_one_view": _json(measures.share_on_one_view(self.supports[:, row])),
             "expected_error_mm": {
                 name: _json(1000 * value) for name, value in zip(self.groups, self.errors[row].tolist(), strict=True)
             },
@@ -132,8 +125,8 @@ class ExaminedRecording:
 
     def _numbers_of_cameras(self) -> dict[str, Any]:
         seen, joints = self.seen, self.people.skeleton.joints
-        by_camera = median_by(seen.pixels, (seen.view, len(self.rig)))
-        by_joint = median_by(seen.pixels, (seen.view, len(self.rig)), (seen.joint, len(joints)))
+        by_camera = measures.median_by(seen.pixels, (seen.view, len(self.rig)))
+        by_joint = measures.median_by(seen.pixels, (seen.view, len(self.rig)), (seen.joint, len(joints)))
         return {
             camera: {
                 "residual_px": _json(float(by_camera[view])),

@@ -18,18 +18,9 @@ from scipy.special import pdtr
 
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Rig
+from simharness.detector import false_positives
 from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import Key, KeyedDraws
-from simharness.detector.false_positives import (
-    MIN_JOINTS,
-    NORMALS,
-    bounding_box,
-    false_positive_block,
-    keypoint_scores,
-    postures,
-    project_upright,
-    rotate_about_z,
-)
 from simharness.detector.steps import Context, StepStage, step
 from simharness.scenario.sections.detector_section import PhantomsSection
 from simharness.types.random_streams import stream
@@ -80,7 +71,7 @@ def _block(
     """Return the phantoms of all views, from the frames, views, slots, numbers, keypoints and scores of each view."""
     frame, view, slot, number = (np.concatenate(column) for column in zip(*rows, strict=True))
     where = (frame, view, slot)
-    return false_positive_block(
+    return false_positives.false_positive_block(
         rig, frames, where, np.concatenate(keypoints), np.concatenate(scores), origin=Origin.PHANTOM, number=number
     )
 
@@ -97,8 +88,8 @@ def _figures(rig: Rig, config: PhantomsSection, draws: KeyedDraws) -> DetectionB
     rate = config.rate * config.views * len(rig)
     process = BirthDeathProcess(draws, ("phantoms", "room"), config.life, max_rate=rate)
     possible = np.flatnonzero(process.rate_threshold < rate)
-    figures = postures(process.normal("posture", NORMALS)[possible])
-    figures = rotate_about_z(figures, 2 * np.pi * process.uniform("heading")[possible])
+    figures = false_positives.postures(process.normal("posture", false_positives.NORMALS)[possible])
+    figures = false_positives.rotate_about_z(figures, 2 * np.pi * process.uniform("heading")[possible])
     anywhere = (process.uniform("anywhere", 17, 3)[possible] - [0.5, 0.5, 0.0]) * _BOX
     plausible = process.uniform("plausible")[possible] < config.plausible
     figures = np.where(plausible[:, None, None], figures, anywhere)
@@ -122,7 +113,9 @@ def _figures(rig: Rig, config: PhantomsSection, draws: KeyedDraws) -> DetectionB
         rows.append((frame[seen], np.full(seen.sum(), view), slot[row[seen]], number))
         keypoints.append(project_to_image(camera, joints[seen]))
         separate = frame_noise(draws, *process.key, "score", view, offset=offset[seen], frame=frame[seen], size=1)
-        scores.append(keypoint_scores(config.score, config.deviation, common[row[seen]], separate[..., 0]))
+        scores.append(
+            false_positives.keypoint_scores(config.score, config.deviation, common[row[seen]], separate[..., 0])
+        )
     return _block(rig, len(draws.time), rows, keypoints, scores)
 
 
@@ -146,7 +139,9 @@ def _placed(rig: Rig, figures: Floats, uniform: Floats) -> tuple[Floats, NDArray
         place = center + np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
         placed[left] = figures[left] + np.pad(place, ((0, 0), (0, 1)))[:, None]
         for view, camera in enumerate(rig):
-            contained[left, view] = camera.inside(project_to_image(camera, placed[left])).sum(axis=-1) >= MIN_JOINTS
+            contained[left, view] = (
+                camera.inside(project_to_image(camera, placed[left])).sum(axis=-1) >= false_positives.MIN_JOINTS
+            )
         left = left[contained[left].sum(axis=1) < 2]
     return placed, contained
 
@@ -185,10 +180,10 @@ def _single_view(views: Views, rig: Rig, config: PhantomsSection, draws: KeyedDr
         if config.parts > 0:
             made = process.uniform("parts")[individual][row] < config.parts
             poses[made] = _poses_of_parts(views, view, process, individual[row[made]], frame[made], poses[made])
-        low, high = bounding_box(poses)
+        low, high = false_positives.bounding_box(poses)
         keypoints.append(poses + _JITTER * (high - low)[:, None, 1:] * noise[..., :2])
         common = process.normal("score")[individual][row]
-        scores.append(keypoint_scores(config.score, config.deviation, common, noise[..., 2]))
+        scores.append(false_positives.keypoint_scores(config.score, config.deviation, common, noise[..., 2]))
         slot = assign_slots(process.born[individual], process.last[individual])
         rows.append((frame, np.full(len(frame), view), slot[row], process.identifier[individual[row]]))
     return _block(rig, len(views), rows, keypoints, scores)
@@ -206,8 +201,8 @@ def _poses(process: "BirthDeathProcess", individual: Integers, size: tuple[int, 
         plausible: share of upright people.
     """
     heading, tilt, height = process.uniform("view", 3)[individual].T
-    normals = process.normal("posture", NORMALS)[individual]
-    poses = project_upright(postures(normals), 2 * np.pi * heading, _TILT * tilt)
+    normals = process.normal("posture", false_positives.NORMALS)[individual]
+    poses = false_positives.project_upright(false_positives.postures(normals), 2 * np.pi * heading, _TILT * tilt)
     width = np.maximum(np.ptp(poses[..., 0], axis=1), _WIDTH)
     box = np.stack([width, np.ones(len(width))], axis=-1)
     anywhere = (process.uniform("anywhere", 17, 2)[individual] - 0.5) * box[:, None]
@@ -242,7 +237,7 @@ def _poses_of_parts(
     seen = views.visibility[frame, view] != Visibility.OUTSIDE  # (r, P, 17)
     points = np.where(seen[..., None], views.pixels[frame, view], np.nan)
     boxes = views.boxes[frame, view]
-    usable = seen.sum(axis=-1) >= MIN_JOINTS
+    usable = seen.sum(axis=-1) >= false_positives.MIN_JOINTS
     row = np.arange(len(individual))
     donor = np.where(usable, priority, np.inf).argmin(axis=-1)
     size = boxes[row, donor, 2:]
@@ -263,7 +258,7 @@ def _poses_of_parts(
 
 def _enough_joints(poses: Floats) -> NDArray[np.bool_]:
     """Return which poses (r, 17, 2) have enough finite joints to be detected, (r, 1, 1)."""
-    return (np.isfinite(poses).all(axis=-1).sum(axis=-1) >= MIN_JOINTS)[:, None, None]
+    return (np.isfinite(poses).all(axis=-1).sum(axis=-1) >= false_positives.MIN_JOINTS)[:, None, None]
 
 
 _LAYER = 0.25  # mean number alive at once in a layer: as many layers are drawn as the rate needs

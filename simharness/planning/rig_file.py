@@ -89,7 +89,7 @@ def _cameras(path: str, size: tuple[int, int] | None) -> CamerasSection:
     sized = {} if size is None else {"size": list(size)}
     if not os.path.exists(path) and not Path(path).suffix:
         settings = read_preset(RIGS, file_of(RIGS, path, [Path()]))
-    elif path.endswith(".toml") and (read_toml(Path(path)).keys() <= {*CamerasSection.model_fields, RIGS.key}):
+    elif path.endswith(".toml") and read_toml(Path(path)).keys() <= {*CamerasSection.model_fields, RIGS.key}:
         settings = read_preset(RIGS, Path(path))
     else:
         settings = {"layout": "file", "file": path} | sized

@@ -9,20 +9,8 @@ from functools import reduce
 from typing import Any
 
 from mvpose.files.message_text import shown
+from simharness.scenario import layers
 from simharness.scenario.file_model import MOST_TRIALS
-from simharness.scenario.layers import (
-    PRESET_KINDS,
-    RANGE,
-    Key,
-    Origins,
-    is_range,
-    leaves,
-    merge,
-    merge_with_presets,
-    nested,
-    overlap,
-    set_origin,
-)
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.sections.section import Section
 from simharness.scenario.validation_messages import explain, is_key, origin_of, section_at
@@ -34,7 +22,7 @@ _HOW = 'write a list, [2, 3, 5], or a range, { from = 0.0, to = 2.0, steps = 5 }
 _SEEDS = "write seeds = 20, or a list of seeds, at the top of the file"
 _NAMES = "write [cases.NAME] with the keys that differ"
 _VARIANTS = 'write variants = ["full", "fast"] at the top of the file: all variants get the same detections'
-NOT_VARIED: dict[Key, str] = {
+NOT_VARIED: dict[layers.Key, str] = {
     ("seed",): _SEEDS,
     ("seeds",): _SEEDS,
     ("name",): _NAMES,
@@ -111,7 +99,7 @@ class Sweep:
 class SweepReader:
     """Reader of [sweep], [cases] and seeds; mistakes are collected in a list."""
 
-    def __init__(self, origins: Origins, file: str, mistakes: list[str]) -> None:
+    def __init__(self, origins: layers.Origins, file: str, mistakes: list[str]) -> None:
         """Read sections of ``file``, whose keys have the origins ``origins``; append messages to ``mistakes``."""
         self.origins = origins
         self._file = file
@@ -138,7 +126,7 @@ class SweepReader:
             self._refuse(("sweep", "paired"), f"paired: expected tables [[sweep.paired]], got {_shown(paired)}")
         keys = [tuple(key.split(".")) for axis in axes for key in axis.keys]
         for index, key in enumerate(keys):
-            if clash := next((other for other in keys[:index] if overlap(key, other)), None):
+            if clash := next((other for other in keys[:index] if layers.overlap(key, other)), None):
                 also = "" if clash == key else f", because {'.'.join(clash)} is swept"
                 self._refuse(("sweep", *key), f"{'.'.join(key)} is swept twice{also}; remove one of them")
         return Sweep(tuple(axes), one_at_a_time is True, self._swept)
@@ -159,7 +147,7 @@ class SweepReader:
                 if key in NOT_VARIED or key[:1] in NOT_VARIED:
                     how = NOT_VARIED.get(key) or NOT_VARIED[key[:1]]
                     self._refuse(("cases", name, *key), f"a case cannot change {dotted}: {how}")
-                elif any(overlap(key, other) for other in swept):
+                elif any(layers.overlap(key, other) for other in swept):
                     self._refuse(
                         ("cases", name, *key), f"{dotted} is swept as well; remove it from the case or from the sweep"
                     )
@@ -192,7 +180,7 @@ class SweepReader:
 
     def check_presets(self, data: Mapping[str, Any], sweep: Sweep) -> None:
         """Refuse to sweep over presets beside a section that is written out and would change each of them."""
-        for kind in PRESET_KINDS:
+        for kind in layers.PRESET_KINDS:
             key = f"{kind.section}.{kind.key}"
             written = data.get(kind.section)
             if key in sweep.keys and isinstance(written, Mapping) and written and not kind.name_in(data):
@@ -203,20 +191,22 @@ class SweepReader:
                     f'[{kind.section}] {kind.key} = "NAME"',
                 )
 
-    def change(self, data: dict[str, Any], name: str, changes: Mapping[str, Any]) -> tuple[dict[str, Any], Origins]:
+    def change(
+        self, data: dict[str, Any], name: str, changes: Mapping[str, Any]
+    ) -> tuple[dict[str, Any], layers.Origins]:
         """Return the keys of the file with the changes of a case, and the origins of all keys."""
         origins = dict(self.origins)
-        for key in leaves(changes):
-            set_origin(origins, key, self.origin(("cases", name, *key)))
-        return merge_with_presets(data, changes), origins
+        for key in layers.leaves(changes):
+            layers.set_origin(origins, key, self.origin(("cases", name, *key)))
+        return layers.merge_with_presets(data, changes), origins
 
-    def origin(self, key: Key) -> str:
+    def origin(self, key: layers.Key) -> str:
         """Return the origin of a key of [sweep] or [cases], with which its messages begin."""
         origin = origin_of(key, self.origins, self._file)
         section = "sweep" if key[0] == "sweep" else ".".join(key[:2])
         return origin if origin.startswith("--") else f"{origin}, [{section}]"
 
-    def _refuse(self, key: Key, message: str) -> None:
+    def _refuse(self, key: layers.Key, message: str) -> None:
         self._mistakes.append(f"{self.origin(key)}: {message}")
 
     def _pair(self, table: Mapping[str, Any]) -> Axis | None:
@@ -232,14 +222,14 @@ class SweepReader:
         self._refuse_repeated(axis, ("sweep", "paired"))
         return axis
 
-    def _refuse_repeated(self, axis: Axis, key: Key) -> None:
+    def _refuse_repeated(self, axis: Axis, key: layers.Key) -> None:
         repeated = next((value for index, value in enumerate(axis.values) if value in axis.values[:index]), None)
         if repeated is not None:
             values = " and ".join(map(_shown, repeated))
             self._refuse(key, f"{' and '.join(axis.keys)}: {values} is in the list twice; remove one of them")
 
     def _varied(
-        self, section: Mapping[str, Any], within: Key = ("sweep",), above: Key = ()
+        self, section: Mapping[str, Any], within: layers.Key = ("sweep",), above: layers.Key = ()
     ) -> Iterator[tuple[str, list]]:
         """Yield every dotted key with its values; invalid ones are reported and left out."""
         for name, value in section.items():
@@ -250,13 +240,13 @@ class SweepReader:
             elif not is_key(key):
                 unknown = {"type": "extra_forbidden", "loc": key}
                 self._mistakes.append(explain(unknown, {key: self.origin(full)}, self._file))
-            elif isinstance(value, Mapping) and section_at(key) is not None and not is_range(value):
+            elif isinstance(value, Mapping) and section_at(key) is not None and not layers.is_range(value):
                 yield from self._varied(value, within, key)
             elif values := self._values(".".join(key), value, full):
                 self._swept[".".join(key)] = self.origin(full)
                 yield ".".join(key), values
 
-    def _values(self, dotted: str, value: Any, key: Key) -> list[Value]:
+    def _values(self, dotted: str, value: Any, key: layers.Key) -> list[Value]:
         try:
             return _values(value)
         except ValueError as error:
@@ -265,8 +255,8 @@ class SweepReader:
 
 
 def vary(
-    data: dict[str, Any], origins: Origins, sweep: Sweep, values: Mapping[str, Value]
-) -> tuple[dict[str, Any], Origins]:
+    data: dict[str, Any], origins: layers.Origins, sweep: Sweep, values: Mapping[str, Value]
+) -> tuple[dict[str, Any], layers.Origins]:
     """Return the keys of a scenario file with swept keys at some values, and the origins of all keys.
 
     Args:
@@ -279,9 +269,9 @@ def vary(
     origins = dict(origins)
     for dotted, value in values.items():
         key = tuple(dotted.split("."))
-        changes = merge(changes, nested(key, value))
-        set_origin(origins, key, sweep.origins[dotted])
-    return merge_with_presets(data, changes), origins
+        changes = layers.merge(changes, layers.nested(key, value))
+        layers.set_origin(origins, key, sweep.origins[dotted])
+    return layers.merge_with_presets(data, changes), origins
 
 
 def value_at(scenario: Scenario, data: Mapping[str, Any], key: str) -> Value:
@@ -292,7 +282,7 @@ def value_at(scenario: Scenario, data: Mapping[str, Any], key: str) -> Value:
         data: keys of its scenario file, which name its presets.
         key: dotted key of a scenario file.
     """
-    for kind in PRESET_KINDS:
+    for kind in layers.PRESET_KINDS:
         if key == f"{kind.section}.{kind.key}":
             return kind.name_in(data)
     value: Any = reduce(getattr, key.split("."), scenario)
@@ -324,7 +314,7 @@ def _frozen(value: Any) -> Value:
 
 def _range(table: dict[str, Any]) -> list[Value]:
     """Return the values of { from, to, steps, scale }, (steps,)."""
-    first, last, steps, scale = (table.pop(key, None) for key in RANGE)
+    first, last, steps, scale = (table.pop(key, None) for key in layers.RANGE)
     if table or first is None or last is None or steps is None:
         wrong = f"{', '.join(table)} is not a key of a range" if table else "a range needs from, to and steps"
         raise ValueError(f"{wrong}; {_HOW}")
@@ -348,7 +338,7 @@ def _range(table: dict[str, Any]) -> list[Value]:
     return [int(value) if whole and float(value).is_integer() else float(value) for value in values]
 
 
-def _written(changes: Mapping[str, Any], above: Key = ()) -> Iterator[Key]:
+def _written(changes: Mapping[str, Any], above: layers.Key = ()) -> Iterator[layers.Key]:
     """Yield the keys that a case changes, down to values and to sections that cannot be varied."""
     for name, value in changes.items():
         key = (*above, name)

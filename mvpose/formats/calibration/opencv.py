@@ -19,16 +19,9 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from mvpose.files.message_text import prefixed
+from mvpose.formats.calibration import file_storage
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
 from mvpose.formats.calibration.camera_entry import check_names, is_camera, read_camera
-from mvpose.formats.calibration.file_storage import (
-    matrix,
-    missing_half,
-    read_beside,
-    read_storage,
-    with_matrices,
-    write_storage,
-)
 
 _K = ("camera_matrix", "K", "cameraMatrix", "intrinsics", "M")  # of a stereo pair, with 1 and 2 appended
 _TERMS = ("distortion_coefficients", "dist", "distCoeffs", "distortion", "D")
@@ -57,7 +50,7 @@ def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
     """
     path = Path(path)
     plain = _plain_values(CalibrationFile(path, _WHAT))
-    values = read_beside(path, what=_WHAT) if plain is None else plain
+    values = file_storage.read_beside(path, what=_WHAT) if plain is None else plain
     with prefixed(path):
         stereo = _stereo(values, path)
         entries = stereo or _entries(values)
@@ -80,12 +73,12 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
             raise ValueError(
                 f"camera {each.name!r}: OpenCV drops spaces at the ends of a name; expected a name without them"
             )
-    write_storage(Path(path), {"cameras": [{"name": each.name, **_entry(each)} for each in rig]})
+    file_storage.write_storage(Path(path), {"cameras": [{"name": each.name, **_entry(each)} for each in rig]})
 
 
 def write_values(path: Path, camera: Camera) -> None:
     """Write one camera into a file of its own, without its name."""
-    write_storage(path, _entry(camera))
+    file_storage.write_storage(path, _entry(camera))
 
 
 def _entry(camera: Camera) -> dict[str, Any]:
@@ -93,9 +86,9 @@ def _entry(camera: Camera) -> dict[str, Any]:
         "image_width": camera.size[0],
         "image_height": camera.size[1],
         "camera_matrix": camera.K,
-        "distortion_coefficients": matrix(camera.distortion),
+        "distortion_coefficients": file_storage.matrix(camera.distortion),
         "R": camera.R,
-        "T": matrix(camera.t).T,
+        "T": file_storage.matrix(camera.t).T,
     }
 
 
@@ -106,7 +99,7 @@ def values_of(file: CalibrationFile) -> dict[str, Any]:
         ValueError: it does not exist or cannot be parsed.
     """
     plain = _plain_values(file)
-    return read_storage(file.path, what=_WHAT) if plain is None else plain
+    return file_storage.read_storage(file.path, what=_WHAT) if plain is None else plain
 
 
 def _recognises(file: CalibrationFile) -> bool:
@@ -135,7 +128,7 @@ def _plain_values(file: CalibrationFile) -> dict[str, Any] | None:
     """Return the named values of a JSON or TOML file; None for other files."""
     plain = file.json if file.json is not None else None if file.storage is not None else file.toml
     with prefixed(file.path):
-        return None if plain is None else dict(with_matrices(plain))
+        return None if plain is None else dict(file_storage.with_matrices(plain))
 
 
 def _stereo(values: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
@@ -145,13 +138,13 @@ def _stereo(values: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
     if matrices is None:
         if {"R", "T", "P1", "P2"} <= values.keys():
             raise ValueError(
-                f"R and T of a stereo pair without M1 and M2, which are missing in {missing_half(path)}, too"
+                f"R and T of a stereo pair without M1 and M2, which are missing in {file_storage.missing_half(path)}, too"
             )
         return {}
     missing = [key for key in ("R", "T") if key not in values]
     if missing:
         raise ValueError(
-            f"{matrices}1 and {matrices}2 without {' and '.join(missing)}, missing in {missing_half(path)}, too"
+            f"{matrices}1 and {matrices}2 without {' and '.join(missing)}, missing in {file_storage.missing_half(path)}, too"
         )
     baseline = float(np.linalg.norm(values["T"]))
     if baseline > _LONGEST_BASELINE:

@@ -15,19 +15,13 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.files.message_text import shown
-from mvpose.formats.detections.detection_file import (
-    DetectionFile,
-    DetectionFormat,
-    PicturePeople,
-    nameless_skeleton,
-    picture_people,
-)
+from mvpose.formats.detections import detection_file
 from mvpose.formats.joint_names import KNOWN, JointNames
 
 _WHAT = "COCO keypoint results: a list of {image_id, keypoints: [x, y, score, ...], score, bbox}"
 
 
-def _read(file: DetectionFile, skeleton: JointNames | None) -> dict[int, PicturePeople]:
+def _read(file: detection_file.DetectionFile, skeleton: JointNames | None) -> dict[int, detection_file.PicturePeople]:
     path, content = file.path, file.json
     if not isinstance(content, list) or not all(isinstance(each, dict) for each in content):
         raise ValueError(f"{path}: expected {_WHAT}, got a {type(content).__name__}")
@@ -38,25 +32,25 @@ def _read(file: DetectionFile, skeleton: JointNames | None) -> dict[int, Picture
             rows.setdefault(frame, [])
             continue
         if skeleton is None and "keypoints" in entry:
-            skeleton = nameless_skeleton(max(np.size(np.asarray(entry["keypoints"], object)) // 3, 1))
+            skeleton = detection_file.nameless_skeleton(max(np.size(np.asarray(entry["keypoints"], object)) // 3, 1))
         rows.setdefault(frame, []).append((_keypoints(path, index, entry, skeleton or KNOWN["coco17"]), box, score))
     pictures = {}
     for frame in sorted(rows):
         if not rows[frame]:
-            pictures[frame] = PicturePeople.nobody()
+            pictures[frame] = detection_file.PicturePeople.nobody()
             continue
         values = np.stack([each for each, _, _ in rows[frame]])
         boxes = [np.full(4, np.nan) if box is None else box for _, box, _ in rows[frame]]
         scores = [np.nan if score is None else min(max(score, 0.0), 1.0) for _, _, score in rows[frame]]
-        pictures[frame] = picture_people(path, values[..., :2], values[..., 2], skeleton, boxes, scores)
+        pictures[frame] = detection_file.picture_people(path, values[..., :2], values[..., 2], skeleton, boxes, scores)
     return pictures
 
 
-def _recognises(file: DetectionFile) -> bool:
+def _recognises(file: detection_file.DetectionFile) -> bool:
     return file.json == [] or (bool(file.entries) and "image_id" in file.entries[0])  # of a camera that saw nobody
 
 
-FORMAT = DetectionFormat("COCO", _recognises, _read, complete=False)
+FORMAT = detection_file.DetectionFormat("COCO", _recognises, _read, complete=False)
 
 
 def _frame(path: Path, index: int, entry: Mapping[str, Any]) -> int:

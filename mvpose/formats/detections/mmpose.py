@@ -11,29 +11,23 @@ from typing import Any
 import numpy as np
 
 from mvpose.files.message_text import shown
-from mvpose.formats.detections.detection_file import (
-    DetectionFile,
-    DetectionFormat,
-    PicturePeople,
-    picture_people,
-    summary,
-)
+from mvpose.formats.detections import detection_file
 from mvpose.formats.joint_names import KNOWN, JointNames, canonical
 
 
-def _recognises(file: DetectionFile) -> bool:
+def _recognises(file: detection_file.DetectionFile) -> bool:
     if isinstance(file.object.get("instance_info"), list) or _is_of_picture(file):
         return True
     return bool(file.entries) and "instances" in file.entries[0] and "image_id" not in file.entries[0]
 
 
-def _is_of_picture(file: DetectionFile) -> bool:
+def _is_of_picture(file: detection_file.DetectionFile) -> bool:
     if isinstance(file.json, list):
         return bool(file.json) and isinstance(file.json[0], dict) and "keypoint_scores" in file.json[0]
     return isinstance(file.object.get("instances"), list)
 
 
-def _read(file: DetectionFile, skeleton: JointNames | None) -> dict[int, PicturePeople]:
+def _read(file: detection_file.DetectionFile, skeleton: JointNames | None) -> dict[int, detection_file.PicturePeople]:
     if _is_of_picture(file):
         return {0: _people(file.path, file.object.get("instances", file.json), skeleton)}
     info = file.object.get("instance_info")
@@ -42,7 +36,7 @@ def _read(file: DetectionFile, skeleton: JointNames | None) -> dict[int, Picture
     return _frames(file.path, file.json, skeleton)
 
 
-def _frames(path: Path, frames: Any, skeleton: JointNames | None) -> dict[int, PicturePeople]:
+def _frames(path: Path, frames: Any, skeleton: JointNames | None) -> dict[int, detection_file.PicturePeople]:
     """Return the people of frames, which count from 0 or 1."""
     pictures = {}
     for row, frame in enumerate(frames if isinstance(frames, list) else [frames]):
@@ -55,11 +49,13 @@ def _frames(path: Path, frames: Any, skeleton: JointNames | None) -> dict[int, P
     return pictures
 
 
-def _people(path: Path, instances: Sequence[Any], skeleton: JointNames | None) -> PicturePeople:
+def _people(path: Path, instances: Sequence[Any], skeleton: JointNames | None) -> detection_file.PicturePeople:
     """Return the people of one picture; ``bbox`` holds corners, in a list of one."""
     instances = [each for each in instances if not (isinstance(each, dict) and each.get("keypoints") == [])]
     if not all(isinstance(each, dict) and {"keypoints", "keypoint_scores"} <= each.keys() for each in instances):
-        raise ValueError(f"{path}: instances must have keypoints and keypoint_scores; got {summary(list(instances))}")
+        raise ValueError(
+            f"{path}: instances must have keypoints and keypoint_scores; got {detection_file.summary(list(instances))}"
+        )
     boxes = []
     for each in instances:
         corners = np.asarray(each.get("bbox", ()), dtype=object).ravel()
@@ -67,7 +63,7 @@ def _people(path: Path, instances: Sequence[Any], skeleton: JointNames | None) -
         x0, y0, x1, y1 = corners.astype(float) if numbers else (np.nan,) * 4
         boxes.append([x0, y0, x1 - x0, y1 - y0])
     scores = [each.get("bbox_score") for each in instances]
-    return picture_people(
+    return detection_file.picture_people(
         path,
         [each["keypoints"] for each in instances],
         [each["keypoint_scores"] for each in instances],
@@ -95,4 +91,4 @@ def _is_same(own: JointNames, known: JointNames) -> bool:
     )
 
 
-FORMAT = DetectionFormat("MMPose", _recognises, _read, _is_of_picture)
+FORMAT = detection_file.DetectionFormat("MMPose", _recognises, _read, _is_of_picture)

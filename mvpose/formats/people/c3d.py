@@ -18,15 +18,7 @@ from mvpose.arrays import Floats
 from mvpose.files.input_files import read_bytes
 from mvpose.files.message_text import one_line, prefixed, shown
 from mvpose.formats.joint_names import JointNames, skeleton_of
-from mvpose.formats.people.people_files import (
-    METRES,
-    Export,
-    PeopleFiles,
-    each_person,
-    identity_of,
-    marker_label,
-    side_by_side,
-)
+from mvpose.formats.people import people_files
 from mvpose.recording import People
 
 _WHAT = "a C3D file of motion capture"
@@ -34,9 +26,9 @@ _OF_PERSON = re.compile(r"P(-?\d+):(.*)")  # labels of a file with several peopl
 _MOST_TEXTS = 255  # of a parameter; the following ones are in LABELS2, LABELS3 and so on
 
 
-def write(export: Export) -> Iterator[tuple[str, bytes]]:
+def write(export: people_files.Export) -> Iterator[tuple[str, bytes]]:
     """Yield a file for each person, from the first to the last frame in which it is present, or one file for all."""
-    people, labels = export.uniform, [marker_label(joint) for joint in export.people.skeleton.joints]
+    people, labels = export.uniform, [people_files.marker_label(joint) for joint in export.people.skeleton.joints]
     points = _points(people, export.axes("z"))
     screen = "+Y" if export.options.up == "y" else "+Z"
     if export.options.together:
@@ -44,7 +36,7 @@ def write(export: Export) -> Iterator[tuple[str, bytes]]:
             joined = [f"P{identity}:{label}" for identity in people.ids.tolist() for label in labels]
             yield "people.c3d", _file(points.reshape(people.frames, -1, 5), joined, people.rate, 1, screen)
         return
-    for row, identity, span in each_person(people):
+    for row, identity, span in people_files.each_person(people):
         content = _file(points[span, row], labels, people.rate, span.start + 1, screen)
         yield f"person_{identity}.c3d", content
 
@@ -90,7 +82,7 @@ def _set_texts(group: Any, name: str, what: str, texts: Sequence[str]) -> None:
         group.add_str(name + (str(part) if part > 1 else ""), what, joined, width, len(some))
 
 
-def read(files: PeopleFiles) -> People:
+def read(files: people_files.PeopleFiles) -> People:
     """Read the markers of one person from each file, or of all people from one file with labels such as ``P3:LHip``.
 
     The axis that points up is that of the files, of POINT:Y_SCREEN, or z.
@@ -99,10 +91,10 @@ def read(files: PeopleFiles) -> People:
         ValueError: a file is missing, truncated or no C3D file, has no points or points in an unknown unit, or other
             markers than the first file; or the package c3d is not installed.
     """
-    return side_by_side([_read_file(path, files) for path in files.paths], files)
+    return people_files.side_by_side([_read_file(path, files) for path in files.paths], files)
 
 
-def _read_file(path: Path, files: PeopleFiles) -> People:
+def _read_file(path: Path, files: people_files.PeopleFiles) -> People:
     try:
         from c3d import Reader
     except ImportError:
@@ -126,12 +118,12 @@ def _read_file(path: Path, files: PeopleFiles) -> People:
             f"{path}: expected frames {reader.first_frame} to {reader.last_frame}, got {len(frames)} frames; it was "
             "probably cut off: copy it again"
         )
-    if unit not in METRES:
-        raise ValueError(f"{path}: POINT:UNITS must be one of {', '.join(METRES)}, got {shown(unit)}")
+    if unit not in people_files.METRES:
+        raise ValueError(f"{path}: POINT:UNITS must be one of {', '.join(people_files.METRES)}, got {shown(unit)}")
     if not labels:
         raise ValueError(f"{path}: has no points; expected labelled markers (POINT:LABELS)")
     points = np.stack([each for _, each in frames]).astype(float)[:, : len(labels)]
-    markers = METRES[unit] * np.where(points[..., 3:4] >= 0, points[..., :3], np.nan)
+    markers = people_files.METRES[unit] * np.where(points[..., 3:4] >= 0, points[..., :3], np.nan)
     axes = files.axes("y" if screen == "+y" else "z")
     numbers = int(frames[0][0]) + np.arange(len(frames))
     ids, names, joints = _by_person(path, labels, markers @ axes.T)
@@ -147,7 +139,7 @@ def _by_person(path: Path, labels: tuple[str, ...], markers: Floats) -> tuple[li
     ids = list(dict.fromkeys(int(each[1]) for each in found if each))
     names = tuple(each[2] for each in found if each and int(each[1]) == ids[0])
     if list(labels) != [f"P{identity}:{name}" for identity in ids for name in names]:
-        return [identity_of(path)], labels, markers[:, None]
+        return [people_files.identity_of(path)], labels, markers[:, None]
     return ids, names, markers.reshape(len(markers), len(ids), len(names), 3)
 
 

@@ -15,15 +15,7 @@ import numpy as np
 from mvpose.files.input_files import read_bytes
 from mvpose.files.message_text import prefixed
 from mvpose.formats.joint_names import JointNames, skeleton_of
-from mvpose.formats.people.people_files import (
-    METRES,
-    Export,
-    PeopleFiles,
-    each_person,
-    identity_of,
-    marker_label,
-    side_by_side,
-)
+from mvpose.formats.people import people_files
 from mvpose.recording import People
 
 _KEYS = (
@@ -33,12 +25,12 @@ _DECIMALS = {"m": 6, "mm": 3}  # micrometres
 _WHAT = "a TRC file: a header with Units, a line 'Frame# Time MARKER ...', and a line for each frame"
 
 
-def write(export: Export) -> Iterator[tuple[str, bytes]]:
+def write(export: people_files.Export) -> Iterator[tuple[str, bytes]]:
     """Yield a file for each person; y up and metres unless the options say otherwise."""
     people, unit = export.uniform, export.options.units
     markers = people.joints @ export.axes("y").T * {"m": 1.0, "mm": 1000.0}[unit]
-    labels = [marker_label(joint) for joint in people.skeleton.joints]
-    for row, identity, span in each_person(people):
+    labels = [people_files.marker_label(joint) for joint in people.skeleton.joints]
+    for row, identity, span in people_files.each_person(people):
         name = f"person_{identity}.trc"
         first, count, rate = span.start + 1, span.stop - span.start, f"{people.rate:.6f}"
         values = (rate, rate, str(count), str(len(labels)), unit, rate, str(first), str(count))
@@ -57,17 +49,17 @@ def write(export: Export) -> Iterator[tuple[str, bytes]]:
         yield name, ("\n".join(lines) + "\n").encode()
 
 
-def read(files: PeopleFiles) -> People:
+def read(files: people_files.PeopleFiles) -> People:
     """Read the markers of one person from each file; y up unless the declared axis is z.
 
     Raises:
         ValueError: a file is missing or of another layout, has a marker in an unknown unit, or other markers than the
             first file.
     """
-    return side_by_side([_read_person(path, files) for path in files.paths], files)
+    return people_files.side_by_side([_read_person(path, files) for path in files.paths], files)
 
 
-def _read_person(path: Path, files: PeopleFiles) -> People:
+def _read_person(path: Path, files: people_files.PeopleFiles) -> People:
     lines = read_bytes(path, what=_WHAT).decode("utf-8-sig", errors="replace").splitlines()
     header = next((row for row, line in enumerate(lines) if line.lower().startswith("frame#")), None)
     if header is None or header < 2:
@@ -100,7 +92,7 @@ def _read_person(path: Path, files: PeopleFiles) -> People:
     with prefixed(path):
         return People(
             files.times(np.array(numbers), times, rate=rate),
-            np.array([identity_of(path)]),
+            np.array([people_files.identity_of(path)]),
             (markers @ files.axes("y").T)[:, None],
             skeleton=skeleton_of(JointNames(path.name, names)),
             numbers=np.array(numbers),
@@ -114,9 +106,9 @@ def _units_and_rate(path: Path, header: list[str]) -> tuple[float, float]:
         if "units" in columns:
             cells = dict(zip(columns, [cell.strip().lower() for cell in values.split("\t")], strict=False))
             unit = cells.get("units", "")
-            if unit in METRES:
-                return METRES[unit], _number(cells.get("datarate", ""))
-            raise ValueError(f"{path}: Units must be one of {', '.join(METRES)}, got {unit!r}")
+            if unit in people_files.METRES:
+                return people_files.METRES[unit], _number(cells.get("datarate", ""))
+            raise ValueError(f"{path}: Units must be one of {', '.join(people_files.METRES)}, got {unit!r}")
     raise ValueError(f"{path}: the header has no Units; expected {_WHAT}")
 
 

@@ -7,22 +7,13 @@ from matplotlib.patches import Polygon
 
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
+from mvpose.report import svg_plots
 from mvpose.report.rig_plots import camera_from_above, name_cameras
-from mvpose.report.svg_plots import (
-    FAINT,
-    INK,
-    LINE,
-    STAGE_COLORS,
-    VARIANT_COLORS,
-    Color,
-    legend_above,
-    svg_plot,
-)
 
-VISIBILITY_COLORS: tuple[Color, ...] = ("#2e9e6b", "#d9a514", "#d9643a", "#8a63c9", "#8b93a1")
+VISIBILITY_COLORS: tuple[svg_plots.Color, ...] = ("#2e9e6b", "#d9a514", "#d9643a", "#8a63c9", "#8b93a1")
 
 
-def error_over_time(time: Floats, errors: Floats, present: Bools, *, colors: Sequence[Color]) -> str:
+def error_over_time(time: Floats, errors: Floats, present: Bools, *, colors: Sequence[svg_plots.Color]) -> str:
     """Plot the mean joint error of each person over time.
 
     Args:
@@ -31,7 +22,7 @@ def error_over_time(time: Floats, errors: Floats, present: Bools, *, colors: Seq
         present: who is in the scene, (T, P); where such a person was not found is marked below the axis.
         colors: colours of the P people.
     """
-    with svg_plot("error-over-time") as (axes, written):
+    with svg_plots.svg_plot("error-over-time") as (axes, written):
         top = float(np.nanmax(errors)) * 1.15 if np.isfinite(errors).any() else 100.0
         for person in range(errors.shape[1]):
             axes.plot(time, errors[:, person], color=colors[person], lw=1.6, label=f"person {person}", zorder=3)
@@ -43,7 +34,7 @@ def error_over_time(time: Floats, errors: Floats, present: Bools, *, colors: Seq
         axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= top])
         axes.set_xlim(time[0], max(time[-1], time[0] + 1e-6))
         axes.grid(axis="y")
-        legend_above(axes)
+        svg_plots.legend_above(axes)
     return written[0]
 
 
@@ -54,21 +45,21 @@ def error_distribution(errors: Mapping[str, Floats], *, limit: float = 150.0) ->
         errors: millimetres by variant, (n,); NaN counts as infinite.
         limit: end of the axis, millimetres.
     """
-    with svg_plot("error-distribution") as (axes, written):
+    with svg_plots.svg_plot("error-distribution") as (axes, written):
         grid = np.linspace(0, limit, 301)
-        for (variant, values), color in zip(errors.items(), VARIANT_COLORS * len(errors), strict=False):
+        for (variant, values), color in zip(errors.items(), svg_plots.VARIANT_COLORS * len(errors), strict=False):
             ranked = np.sort(np.where(np.isnan(values), np.inf, values))
             share = np.searchsorted(ranked, grid, side="right") / max(1, len(ranked))
             axes.plot(grid, 100 * share, color=color, lw=1.8, label=variant, zorder=3)
         axes.set(xlabel="joint error up to, mm", ylabel="share of all true joints, %", xlim=(0, limit), ylim=(0, 101))
         axes.grid()
-        axes.legend(loc="lower right", labelcolor=INK)
+        axes.legend(loc="lower right", labelcolor=svg_plots.INK)
     return written[0]
 
 
 def visibility_shares(cameras: Sequence[str], shares: Floats, *, labels: Sequence[str]) -> str:
     """Plot the visibility of the joints in each camera: shares (V, 5), 0 to 1, by visibility label."""
-    with svg_plot("visibility", size=(5.2, max(2.0, 1.1 + 0.36 * len(cameras)))) as (axes, written):
+    with svg_plots.svg_plot("visibility", size=(5.2, max(2.0, 1.1 + 0.36 * len(cameras)))) as (axes, written):
         left = np.zeros(len(cameras))
         rows = np.arange(len(cameras))
         for column, (label, color) in enumerate(zip(labels, VISIBILITY_COLORS, strict=True)):
@@ -77,9 +68,9 @@ def visibility_shares(cameras: Sequence[str], shares: Floats, *, labels: Sequenc
             left += width
         axes.set(xlabel="share of joints, %", xlim=(0, 100), yticks=rows, yticklabels=cameras)
         axes.invert_yaxis()
-        axes.tick_params(axis="y", length=0, labelcolor=INK)
+        axes.tick_params(axis="y", length=0, labelcolor=svg_plots.INK)
         axes.spines["left"].set_visible(False)
-        legend_above(axes)
+        svg_plots.legend_above(axes)
     return written[0]
 
 
@@ -90,13 +81,15 @@ def stage_times(times: Mapping[str, Mapping[str, float]]) -> str:
         times: milliseconds per frame, by variant and stage. A variant with a "total" alone has one stage, "method".
     """
     times = {name: {"method": each["total"]} if set(each) == {"total"} else each for name, each in times.items()}
-    with svg_plot("stage-times", size=(5.2, max(1.9, 1.2 + 0.42 * len(times)))) as (axes, written):
+    with svg_plots.svg_plot("stage-times", size=(5.2, max(1.9, 1.2 + 0.42 * len(times)))) as (axes, written):
         rows = np.arange(len(times))
         left = np.zeros(len(times))
         stages = list(dict.fromkeys(stage for each in times.values() for stage in each if stage != "total"))
-        for stage, spare in zip(stages, VARIANT_COLORS * len(stages), strict=False):
+        for stage, spare in zip(stages, svg_plots.VARIANT_COLORS * len(stages), strict=False):
             width = np.array([each.get(stage, 0.0) for each in times.values()])
-            axes.barh(rows, width, left=left, height=0.6, color=STAGE_COLORS.get(stage, spare), label=stage, lw=0)
+            axes.barh(
+                rows, width, left=left, height=0.6, color=svg_plots.STAGE_COLORS.get(stage, spare), label=stage, lw=0
+            )
             left += width
         for row, (end, each) in enumerate(zip(left.tolist(), times.values(), strict=True)):
             text = f"{each.get('total', end):.1f} ms"
@@ -104,9 +97,9 @@ def stage_times(times: Mapping[str, Mapping[str, float]]) -> str:
         axes.set(xlabel="median, ms", yticks=rows, yticklabels=list(times))
         axes.set_xlim(0, max(1e-6, left.max(initial=0.0)) * 1.18)
         axes.invert_yaxis()
-        axes.tick_params(axis="y", length=0, labelcolor=INK)
+        axes.tick_params(axis="y", length=0, labelcolor=svg_plots.INK)
         axes.spines["left"].set_visible(False)
-        legend_above(axes)
+        svg_plots.legend_above(axes)
     return written[0]
 
 
@@ -117,7 +110,7 @@ def floor_plan(
     things: Sequence[Floats],
     paths: Floats,
     estimates: Floats,
-    colors: Sequence[Color],
+    colors: Sequence[svg_plots.Color],
 ) -> str:
     """Plot the scene from above.
 
@@ -129,12 +122,12 @@ def floor_plan(
         estimates: positions of the estimates, (k, 2) metres.
         colors: colours of the P people.
     """
-    with svg_plot("floor-plan", size=(5.2, 4.8)) as (axes, written):
+    with svg_plots.svg_plot("floor-plan", size=(5.2, 4.8)) as (axes, written):
         half = np.array(room) / 2
         corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        axes.add_patch(Polygon(corners, fill=False, ec=FAINT, lw=1.2))
+        axes.add_patch(Polygon(corners, fill=False, ec=svg_plots.FAINT, lw=1.2))
         for outline in things:
-            axes.add_patch(Polygon(outline, fc=LINE, ec=FAINT, lw=0.8))
+            axes.add_patch(Polygon(outline, fc=svg_plots.LINE, ec=svg_plots.FAINT, lw=0.8))
         for camera in rig:
             camera_from_above(axes, camera)
         for person in range(paths.shape[1]):
@@ -148,13 +141,13 @@ def floor_plan(
             )
             axes.plot(*paths[-1, person], "o", ms=5, color=colors[person], zorder=4, label=f"person {person}")
         if len(estimates):
-            axes.plot(*estimates.T, ".", ms=2.2, color=INK, mew=0, zorder=5)
-            axes.plot([], [], ".", ms=5, color=INK, mew=0, label="estimated")
+            axes.plot(*estimates.T, ".", ms=2.2, color=svg_plots.INK, mew=0, zorder=5)
+            axes.plot([], [], ".", ms=5, color=svg_plots.INK, mew=0, label="estimated")
         reach = np.vstack([corners, rig.centers[:, :2]])
         low, high = reach.min(axis=0) - 0.4, reach.max(axis=0) + 0.4
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x, m", ylabel="y, m")
         axes.set_aspect("equal")
         axes.spines[:].set_visible(False)
-        legend_above(axes)
+        svg_plots.legend_above(axes)
         name_cameras(axes, rig, lines=[np.vstack([each, each[:1]]) for each in (corners, *things)])
     return written[0]

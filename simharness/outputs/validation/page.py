@@ -121,11 +121,8 @@ def _points(validation: Validation) -> dict[str, dict[str, list[tuple[float, flo
     names = validation.plan.variants
     result: dict[str, dict[str, list[tuple[float, float]]]] = {
         "all cameras": {
-            name: [
-                (each.real.mean, each.twin.mean)
-                for each in [validation.variants[name]["pcp"][rule] for rule in tables.PUBLISHED]
-            ]
-            for name in names
+            name: [(pcp[rule].real.mean, pcp[rule].twin.mean) for rule in tables.PUBLISHED]
+            for name, pcp in ((name, validation.variants[name]["pcp"]) for name in names)
         }
     }
     most = max(validation.subsets.curves)

@@ -9,19 +9,7 @@ from mvpose.arrays import Bools, Floats
 from simharness.detector.draws import GROSS, LIMB_OF_JOINT
 from simharness.detector.error_classes import MIRROR
 from simharness.detector.viewing_conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
-from simharness.reality.detector_fit.detector_sums import (
-    BoneSums,
-    DependenceSums,
-    FalseSums,
-    FrameSums,
-    JitterSums,
-    MissSums,
-    PairSums,
-    PeopleSums,
-    ScatterSums,
-    ScoreHistograms,
-    Trials,
-)
+from simharness.reality.detector_fit import detector_sums
 from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints
 from simharness.reality.detector_fit.tetrachoric import correlation_grid, joint_probability
 from simharness.reality.people_tracks import LIMB_JOINTS
@@ -62,11 +50,11 @@ def lags(step: float) -> NDArray[np.int64]:
     return np.unique(np.geomspace(1, max(1.0, round(_LONGEST / step)), _LAGS).round().astype(np.int64))
 
 
-def frame_sums(labels: LabelledJoints) -> FrameSums:
+def frame_sums(labels: LabelledJoints) -> detector_sums.FrameSums:
     """Return the sums of each frame alone."""
     size, size_drop = _sizes(labels)
     border, outside = _border(labels)
-    return FrameSums(
+    return detector_sums.FrameSums(
         classes=_shares(labels),
         face=_face(labels),
         size=size,
@@ -94,7 +82,7 @@ def _by_occlusion(values: Bools, labels: LabelledJoints) -> Floats:
     return np.stack([_by_kind(values & (labels.occlusion == occlusion)) for occlusion in OCCLUSIONS], axis=1)
 
 
-def _shares(labels: LabelledJoints) -> dict[str, Trials]:
+def _shares(labels: LabelledJoints) -> dict[str, detector_sums.Trials]:
     """Return the joints each class could have taken and took, by occlusion class, (T, 3, 9).
 
     The number of misses that look like inversions and swaps by chance is subtracted from these and added to misses.
@@ -106,16 +94,16 @@ def _shares(labels: LabelledJoints) -> dict[str, Trials]:
         k[key] -= by_chance
         n["miss"] += by_chance
         k["miss"] += by_chance
-    return {key: Trials(n[key], k[key]) for key in CLASSES}
+    return {key: detector_sums.Trials(n[key], k[key]) for key in CLASSES}
 
 
-def _face(labels: LabelledJoints) -> Trials:
+def _face(labels: LabelledJoints) -> detector_sums.Trials:
     """Return joints of the face that nobody else hides, and those not reported, by kind and bearing, (T, 3, 12).
 
     Bearings count towards the side of the joint, so that left and right joints are alike.
     """
     seen, dropped = labels.risk["drop"] & (labels.occlusion != OCCLUDED), labels.taken["drop"]
-    result = Trials(*np.zeros((2, len(seen), 3, len(BEARINGS))))
+    result = detector_sums.Trials(*np.zeros((2, len(seen), 3, len(BEARINGS))))
     for joint in range(LIMB_JOINTS[0]):
         towards = labels.bearing if MIRROR[joint] >= joint else -labels.bearing % len(BEARINGS)
         at = towards[..., None] == np.arange(len(BEARINGS))
@@ -124,7 +112,7 @@ def _face(labels: LabelledJoints) -> Trials:
     return result
 
 
-def _bones(labels: LabelledJoints) -> BoneSums:
+def _bones(labels: LabelledJoints) -> detector_sums.BoneSums:
     """Return sums of limb lengths on which three views or more agree."""
     joints, agree = labels.consensus.joints, labels.consensus.agrees.sum(axis=1)
     one, other = np.array(BONES).T
@@ -139,10 +127,10 @@ def _bones(labels: LabelledJoints) -> BoneSums:
     variance = labels.consensus.variance
     noise = np.where(known, variance[:, :, one] + variance[:, :, other], 0.0)
     scale = np.where(known, labels.consensus.scale[:, :, one] + labels.consensus.scale[:, :, other], 0.0)
-    return BoneSums(known.astype(float), away, away**2, noise.sum(axis=(1, 2)), scale.sum(axis=(1, 2)))
+    return detector_sums.BoneSums(known.astype(float), away, away**2, noise.sum(axis=(1, 2)), scale.sum(axis=(1, 2)))
 
 
-def _sizes(labels: LabelledJoints) -> tuple[Trials, Trials]:
+def _sizes(labels: LabelledJoints) -> tuple[detector_sums.Trials, detector_sums.Trials]:
     """Return limb joints that are reported and not good, and dropped ones, by tercile of the person's size, (T, 3)."""
     size = np.sqrt(labels.boxes[..., 2] * labels.boxes[..., 3])
     present = labels.association.detected & labels.known[:, None]
@@ -157,8 +145,8 @@ def _sizes(labels: LabelledJoints) -> tuple[Trials, Trials]:
             float
         )
 
-    dropped = Trials(by_tercile(labels.risk["drop"]), by_tercile(labels.taken["drop"]))
-    return Trials(by_tercile(reported), by_tercile(wrong)), dropped
+    dropped = detector_sums.Trials(by_tercile(labels.risk["drop"]), by_tercile(labels.taken["drop"]))
+    return detector_sums.Trials(by_tercile(reported), by_tercile(wrong)), dropped
 
 
 def _wrong(labels: LabelledJoints) -> Bools:
@@ -166,7 +154,7 @@ def _wrong(labels: LabelledJoints) -> Bools:
     return labels.taken["swap"] | labels.taken["inversion"] | labels.taken["miss"] | labels.taken["jitter"]
 
 
-def _misses(labels: LabelledJoints) -> MissSums:
+def _misses(labels: LabelledJoints) -> detector_sums.MissSums:
     """Return the sums of misses of limbs."""
     miss = labels.taken["miss"].copy()
     miss[..., : LIMB_JOINTS[0]] = False
@@ -178,10 +166,10 @@ def _misses(labels: LabelledJoints) -> MissSums:
     away = np.hypot((x - target[:, :1])[:, :, None], (y - target[:, 1:])[:, None]) / unit[:, None, None]
     counts = (each.sum(axis=(1, 2, 3)).astype(float) for each in (miss, far >= REACH))
     shares = (np.bincount(frame, (away >= limit).mean(axis=(1, 2)), len(miss)) for limit in (MISS_FROM, REACH))
-    return MissSums(*counts, *(each.astype(float) for each in shares))
+    return detector_sums.MissSums(*counts, *(each.astype(float) for each in shares))
 
 
-def _scatter(labels: LabelledJoints) -> ScatterSums:
+def _scatter(labels: LabelledJoints) -> detector_sums.ScatterSums:
     """Return the sums of good keypoints."""
     good = labels.risk["jitter"] & (labels.error == KeypointError.GOOD)
     square = np.where(good, (labels.residual**2).sum(axis=-1), 0.0)
@@ -196,7 +184,7 @@ def _scatter(labels: LabelledJoints) -> ScatterSums:
     first, second = offset[..., one, :], offset[..., other, :]
     product = np.where(both, (first * second).sum(axis=-1), 0.0)
     mean_square = np.where(both, (first**2 + second**2).sum(axis=-1) / 2, 0.0)
-    return ScatterSums(
+    return detector_sums.ScatterSums(
         n=n,
         square=k,
         hidden_n=_by_kind(good & (labels.occlusion != VISIBLE)),
@@ -208,12 +196,12 @@ def _scatter(labels: LabelledJoints) -> ScatterSums:
     )
 
 
-def _jitters(labels: LabelledJoints) -> JitterSums:
+def _jitters(labels: LabelledJoints) -> detector_sums.JitterSums:
     """Return the sums of jitters."""
     jitter = labels.taken["jitter"]
     away = np.where(jitter, np.hypot(labels.residual[..., 0], labels.residual[..., 1]), GOOD_BELOW)
     way = np.clip((away - GOOD_BELOW) / (MISS_FROM - GOOD_BELOW), 0.0, 1.0)
-    return JitterSums(_by_kind(jitter), _by_kind(way))
+    return detector_sums.JitterSums(_by_kind(jitter), _by_kind(way))
 
 
 def _later(offset: Floats, good: Bools, lag: int, labels: LabelledJoints) -> tuple[Floats, Floats]:
@@ -232,7 +220,7 @@ def _consecutive(labels: LabelledJoints, lag: int) -> Bools:
     return np.asarray(labels.time[lag:] - labels.time[:-lag] < (lag + 0.5) * labels.step)
 
 
-def _dependence(labels: LabelledJoints) -> DependenceSums:
+def _dependence(labels: LabelledJoints) -> detector_sums.DependenceSums:
     """Return observed and expected pairs of joints taken by the same class, and their products over time."""
     steps = lags(labels.step)
     frames, states = len(labels.occlusion), len(OCCLUSIONS) * len(KINDS)
@@ -242,7 +230,7 @@ def _dependence(labels: LabelledJoints) -> DependenceSums:
     one, other = np.triu_indices(states)
     same = one == other
     views, gross_views, limb = (
-        PairSums(np.zeros(frames), np.zeros((frames, len(correlation_grid())))) for _ in range(3)
+        detector_sums.PairSums(np.zeros(frames), np.zeros((frames, len(correlation_grid())))) for _ in range(3)
     )
     excess, weight = np.zeros((2, frames, len(steps)))
     for key in CLASSES:
@@ -281,10 +269,10 @@ def _dependence(labels: LabelledJoints) -> DependenceSums:
             whole = _consecutive(labels, lag)
             excess[:-lag, index] += whole * (beyond[:-lag] * beyond[lag:]).sum(axis=(1, 2, 3))
             weight[:-lag, index] += whole * (spread[:-lag] * spread[lag:]).sum(axis=(1, 2, 3))
-    return DependenceSums(views, gross_views, limb, excess, weight)
+    return detector_sums.DependenceSums(views, gross_views, limb, excess, weight)
 
 
-def _scores(labels: LabelledJoints) -> ScoreHistograms:
+def _scores(labels: LabelledJoints) -> detector_sums.ScoreHistograms:
     """Return the histograms of scores."""
     scores, error = labels.association.scores, labels.error
     frames, bins = len(scores), len(LOGITS) - 1
@@ -302,7 +290,7 @@ def _scores(labels: LabelledJoints) -> ScoreHistograms:
     outside = shown & ~labels.inside
     beyond = np.bincount(np.nonzero(outside)[0] * bins + _bin(scores[outside]), minlength=frames * bins)
     by_frame = (each.reshape(frames, bins).astype(float) for each in (flat, beyond))
-    return ScoreHistograms(whole.astype(float), *by_frame)
+    return detector_sums.ScoreHistograms(whole.astype(float), *by_frame)
 
 
 def _bin(scores: Floats) -> NDArray[np.int64]:
@@ -311,36 +299,38 @@ def _bin(scores: Floats) -> NDArray[np.int64]:
     return np.clip(np.digitize(logit, LOGITS) - 1, 0, len(LOGITS) - 2)
 
 
-def _missed_by_hidden_share(labels: LabelledJoints, expected: Bools, missed: Bools) -> Trials:
+def _missed_by_hidden_share(labels: LabelledJoints, expected: Bools, missed: Bools) -> detector_sums.Trials:
     """Return people expected and missed by the share of their limb joints that others or the border hide, (T, 5)."""
     hidden = ((labels.occlusion == OCCLUDED) | ~labels.inside)[..., LIMB_JOINTS].mean(axis=-1)
     nearest = np.round(4 * hidden).astype(int)[..., None] == np.arange(5)
-    return Trials(*((nearest & which[..., None]).sum(axis=(1, 2)).astype(float) for which in (expected, missed)))
+    return detector_sums.Trials(
+        *((nearest & which[..., None]).sum(axis=(1, 2)).astype(float) for which in (expected, missed))
+    )
 
 
-def _border(labels: LabelledJoints) -> tuple[Trials, Trials]:
+def _border(labels: LabelledJoints) -> tuple[detector_sums.Trials, detector_sums.Trials]:
     """Return limb joints outside of the images and those reported, by their distance from the border and by kind."""
     outside = (labels.association.detected & labels.known[:, None])[..., None] & ~labels.inside
     outside[..., : LIMB_JOINTS[0]] = False
     bins = np.digitize(labels.beyond, BORDER[1:-1])[..., None] == np.arange(len(BORDER) - 1)
     reported = outside & (labels.association.scores > 0)
     by_distance = (bins & outside[..., None]).sum(axis=(1, 2, 3)).astype(float)
-    border = Trials(by_distance, reported.sum(axis=(1, 2, 3)).astype(float))
-    return border, Trials(_by_kind(outside), _by_kind(reported))
+    border = detector_sums.Trials(by_distance, reported.sum(axis=(1, 2, 3)).astype(float))
+    return border, detector_sums.Trials(_by_kind(outside), _by_kind(reported))
 
 
-def _people(labels: LabelledJoints) -> PeopleSums:
+def _people(labels: LabelledJoints) -> detector_sums.PeopleSums:
     """Return the sums of people missed, detected and duplicated."""
     expected, detected = labels.expected, labels.association.detected & labels.known[:, None]
     missed = expected & ~detected
     both = expected, missed
     many = [what.sum(axis=1, dtype=float) for what in both]
     duplicates = (labels.association.duplicates * labels.known[:, None]).sum(axis=(1, 2))
-    return PeopleSums(
-        all=Trials(*(what.sum(axis=(1, 2), dtype=float) for what in both)),
+    return detector_sums.PeopleSums(
+        all=detector_sums.Trials(*(what.sum(axis=(1, 2), dtype=float) for what in both)),
         hidden=_missed_by_hidden_share(labels, expected, missed),
-        views=Trials(*(((each**2 - each) / 2).sum(axis=1) for each in many)),
-        time=Trials(*(_again(labels, what) for what in both)),
+        views=detector_sums.Trials(*(((each**2 - each) / 2).sum(axis=1) for each in many)),
+        time=detector_sums.Trials(*(_again(labels, what) for what in both)),
         detected=detected.sum(axis=(1, 2), dtype=float),
         duplicates=duplicates.astype(float),
     )
@@ -356,7 +346,7 @@ def _again(labels: LabelledJoints, what: Bools) -> Floats:
     return time
 
 
-def _false_detections(labels: LabelledJoints) -> FalseSums:
+def _false_detections(labels: LabelledJoints) -> detector_sums.FalseSums:
     """Return the sums of false detections."""
     false, steps = labels.association.false.astype(float), lags(labels.step)
     products, pairs = np.zeros((*false.shape, len(steps) + 1)), np.zeros((len(false), len(steps) + 1))
@@ -365,4 +355,4 @@ def _false_detections(labels: LabelledJoints) -> FalseSums:
         if lag < len(false):
             whole = _consecutive(labels, lag)
             products[:-lag, :, index], pairs[:-lag, index] = whole[:, None] * false[:-lag] * false[lag:], whole
-    return FalseSums(false, labels.association.fragments.sum(axis=1).astype(float), products, pairs)
+    return detector_sums.FalseSums(false, labels.association.fragments.sum(axis=1).astype(float), products, pairs)

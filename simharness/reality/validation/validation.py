@@ -12,6 +12,7 @@ from mvpose.commands.progress import Reporter, Silence
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.twin import TwinModel, simulate_twins
+from simharness.reality.validation import variant_comparison
 from simharness.reality.validation.detection_figures import DetectionFigures, compare_detections, measure_detections
 from simharness.reality.validation.evidence import Compared, Evidence, compared, frame_weights
 from simharness.reality.validation.passes import (
@@ -26,19 +27,6 @@ from simharness.reality.validation.passes import (
     score_recordings,
 )
 from simharness.reality.validation.treatments import treatments
-from simharness.reality.validation.variant_comparison import (
-    DoseResponse,
-    JointDifficulty,
-    SubsetComparison,
-    camera_subsets,
-    compare_contrasts,
-    compare_joints,
-    compare_responses,
-    compare_subsets,
-    compare_variants,
-    median_error,
-    pcp_of_parts,
-)
 from simharness.reality.validation.verdicts import (
     BOUNDS,
     PREDICTION_BOUNDS,
@@ -112,11 +100,11 @@ class Validation:
     medians: Mapping[str, Compared]
     parts: Mapping[str, Mapping[str, Compared]]
     contrasts: Mapping[tuple[str, str], Mapping[HeadRule, Compared]]
-    subsets: SubsetComparison
-    subsets_as_is: SubsetComparison
-    responses: Sequence[DoseResponse]
+    subsets: variant_comparison.SubsetComparison
+    subsets_as_is: variant_comparison.SubsetComparison
+    responses: Sequence[variant_comparison.DoseResponse]
     bases: Mapping[str, tuple[float, float]]
-    joints: JointDifficulty
+    joints: variant_comparison.JointDifficulty
     measured: Mapping[str, Compared]
     affinities: Mapping[str, tuple[np.ndarray, np.ndarray]]
     verdicts: Sequence[BoundVerdict] = field(default=())
@@ -160,7 +148,7 @@ def validate(
         for each in (real, *whole):
             measurements.append(measure_detections(each))
             advance(1)
-    changes: list[RecordingChange] = [Unchanged(), *map(CameraSubset, camera_subsets(len(real.rig)))]
+    changes: list[RecordingChange] = [Unchanged(), *map(CameraSubset, variant_comparison.camera_subsets(len(real.rig)))]
     changes += treatments(draws=plan.draws, detection_draws=plan.detection_draws) if plan.treated else ()
     with reporter.stage("subsets and treatments", len(changes) * (1 + len(thinned))) as advance:
         passes = run_passes([real, *thinned], changes, variants=plan.variants, workers=plan.workers, progress=advance)
@@ -196,11 +184,11 @@ def _compare(
         for each, variants in zip(everyone, scores, strict=True)
     ]
     whole = Evidence.of_tallies(real, tallies[0], tallies[1:])
-    variants = compare_variants(whole, plan.variants)
-    contrasts = compare_contrasts(whole, plan.variants)
+    variants = variant_comparison.compare_variants(whole, plan.variants)
+    contrasts = variant_comparison.compare_contrasts(whole, plan.variants)
     cameras = len(real.rig)
-    subsets = compare_subsets(evidence, cameras, plan.variants)
-    responses = compare_responses(evidence, plan.variants)
+    subsets = variant_comparison.compare_subsets(evidence, cameras, plan.variants)
+    responses = variant_comparison.compare_responses(evidence, plan.variants)
     measured = compare_detections(measurements[0], measurements[1:], frame_weights(real))
     verdicts = [
         *judge_scores(variants, contrasts, bounds),
@@ -215,14 +203,19 @@ def _compare(
         twin_frames=float(np.mean([len(twin) for twin in twins])),
         plan=plan,
         variants=variants,
-        medians={name: _plain([median_error(each[name][RULES[0]]) for each in scores]) for name in plan.variants},
+        medians={
+            name: _plain([variant_comparison.median_error(each[name][RULES[0]]) for each in scores])
+            for name in plan.variants
+        },
         parts={name: _parts(everyone, [each[name][RULES[0]] for each in scores]) for name in plan.variants},
         contrasts=contrasts,
         subsets=subsets,
-        subsets_as_is=compare_subsets(evidence, cameras, plan.variants, rule=RULES[0]),
+        subsets_as_is=variant_comparison.compare_subsets(evidence, cameras, plan.variants, rule=RULES[0]),
         responses=responses,
         bases={name: _base(evidence, name) for name in plan.variants},
-        joints=compare_joints(scores[0][first][RULES[0]], [each[first][RULES[0]] for each in scores[1:]]),
+        joints=variant_comparison.compare_joints(
+            scores[0][first][RULES[0]], [each[first][RULES[0]] for each in scores[1:]]
+        ),
         measured=measured,
         affinities={
             key: (real_shares, np.mean([each.affinities[key] for each in measurements[1:]], axis=0))
@@ -239,7 +232,10 @@ def _base(evidence: Evidence, variant: str) -> tuple[float, float]:
 
 def _parts(recordings: Sequence[AnnotatedRecording], scores: Sequence[FrameScores]) -> dict[str, Compared]:
     """Return the PCP of each group of parts."""
-    each = [pcp_of_parts(one, recording.scored) for recording, one in zip(recordings, scores, strict=True)]
+    each = [
+        variant_comparison.pcp_of_parts(one, recording.scored)
+        for recording, one in zip(recordings, scores, strict=True)
+    ]
     return {group: _plain([values[group] for values in each]) for group in each[0]}
 
 

@@ -10,20 +10,13 @@ from scipy.spatial.transform import Rotation
 from mvpose.arrays import Bools, Floats
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
+from simharness.world.motion import track_planning
 from simharness.world.motion.activity_registry import Activity, configured_activities, solo
 from simharness.world.motion.contact import ContactModel, SampledBody
 from simharness.world.motion.motion import ALWAYS, Motion, Performance, Presence, Prop, Trajectory
 from simharness.world.motion.paths import Loop, RecordedPath, Spot, Track, rotation_2d
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.routes import Route
-from simharness.world.motion.track_planning import (
-    LoopRequest,
-    RecordedRequest,
-    SpotRequest,
-    TrackRequest,
-    VisitRequest,
-    plan_tracks,
-)
 from simharness.world.motion.visits import Door, Visitor, draw_doors
 
 _PACE = (1.05, 1.25)  # steps in a room are short and quick
@@ -101,7 +94,7 @@ def choreograph(
     visitors = any(group.activity.track is Route for group in groups)
     doors = draw_doors(scenario.seed, people.traffic, scenario.room, cameras) if visitors else ()
     stage = _Stage(scenario, groups, cast, time, doors)
-    plan_tracks(
+    track_planning.plan_tracks(
         scenario.seed,
         stage.requests,
         area=people.area,
@@ -233,7 +226,7 @@ class _Stage:
         self._performing: list[partial[Performance]] = []
         self._at_origin: dict[int, Performance] = {}
         self._placed: dict[int, tuple[Performance, list[_Present]]] = {}  # of the groups that have a track
-        self.requests: list[TrackRequest] = []
+        self.requests: list[track_planning.TrackRequest] = []
         for index, group in enumerate(groups):
             manner = stream(seed, "people", group.people[0], "gait")
             froude, pace = manner.uniform(*group.activity.froude), manner.uniform(*_PACE)
@@ -275,20 +268,20 @@ class _Stage:
             self._at_origin[index] = self._performing[index](_ORIGIN)
         return self._at_origin[index]
 
-    def _request(self, index: int, activity: Activity, mover: Kinematics, froude: float) -> TrackRequest:
+    def _request(self, index: int, activity: Activity, mover: Kinematics, froude: float) -> track_planning.TrackRequest:
         if activity.name == "mocap":
-            return RecordedRequest(activity.name, self._time, self._origin(index).motions[0].root[:, :2])
+            return track_planning.RecordedRequest(activity.name, self._time, self._origin(index).motions[0].root[:, :2])
         if activity.track is Route:
-            return VisitRequest(activity.name, self._visitor(index, mover, froude))
+            return track_planning.VisitRequest(activity.name, self._visitor(index, mover, froude))
         if activity.track is not Loop:
             people = len(self._groups[index].people)
-            return SpotRequest(activity.name, activity.clearance, people > 1, people)
+            return track_planning.SpotRequest(activity.name, activity.clearance, people > 1, people)
         unit = np.sqrt(_GRAVITY * mover.leg_length)
         slowest, fastest = (unit * limit for limit in activity.froude)
         running = activity.froude[1] > _RUNNING
         if running:
             slowest = min(slowest, unit * _RUNNING)
-        return LoopRequest(activity.name, unit * froude, slowest, fastest, running)
+        return track_planning.LoopRequest(activity.name, unit * froude, slowest, fastest, running)
 
     def _visitor(self, index: int, mover: Kinematics, froude: float) -> Visitor:
         """Return the plan of a visitor; without people.traffic every visitor comes and goes."""

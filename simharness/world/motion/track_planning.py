@@ -7,16 +7,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.types.random_streams import stream
-from simharness.world.motion.paths import (
-    SWAY,
-    Loop,
-    LoopLimits,
-    Track,
-    draw_loop,
-    draw_recorded,
-    draw_spot,
-    loop_limits,
-)
+from simharness.world.motion import paths
 from simharness.world.motion.routes import Route
 from simharness.world.motion.visits import Visitor
 
@@ -89,7 +80,7 @@ class VisitRequest:
 
 
 TrackRequest = LoopRequest | SpotRequest | RecordedRequest | VisitRequest
-Admit = Callable[[int, Track, Sequence[int]], bool]
+Admit = Callable[[int, paths.Track, Sequence[int]], bool]
 """Condition on tracks: (index of the request, its track, indices of the requests that have one) to accepted or not."""
 
 
@@ -104,7 +95,7 @@ def plan_tracks(
     people: Sequence[int] | None = None,
     widest: float | None = None,
     admit: Admit = lambda index, track, before: True,
-) -> tuple[Track, ...]:
+) -> tuple[paths.Track, ...]:
     """Find a track for every request that stays in the area and away from all other tracks at all times.
 
     Two tracks keep ``spacing`` plus both clearances apart. Requests are served one after another with separate random
@@ -129,8 +120,8 @@ def plan_tracks(
         ValueError: no plan was found, or the area is too small for one of the requests; the message names the keys to
             change.
     """
-    half = area - SWAY
-    limit = half if widest is None else max(half, widest - SWAY)
+    half = area - paths.SWAY
+    limit = half if widest is None else max(half, widest - paths.SWAY)
     for request in requests:
         _check_room(request, half, limit)
     people = range(len(requests)) if people is None else people
@@ -154,7 +145,7 @@ def plan_tracks(
     count = sum(map(_people, requests))
     touching = f" ({refused} tracks kept that distance, but people or their props touched)" if refused else ""
     grown = any(_square(request, half, limit, plan=0) > half for request in requests)
-    room = f" (recorded paths in {limit + SWAY:.2f} m, up to the walls)" if grown else ""
+    room = f" (recorded paths in {limit + paths.SWAY:.2f} m, up to the walls)" if grown else ""
     raise ValueError(
         f"people.count = {count} people do not fit: at most {placed} could be placed in people.area = {area:g} m (half "
         f"the side of a square){room} with people.spacing = {spacing:g} m between any two for {span[1] - span[0]:g} s"
@@ -182,7 +173,7 @@ def _place(
     )
     if isinstance(request, VisitRequest):
         drawn = (_draw_visit(rng, request, board, half=half) for _ in range(_VISIT_TRIES))
-    candidates: Iterable[Track] = (track for tracks in drawn for track in tracks if board.apart(track, request))
+    candidates: Iterable[paths.Track] = (track for tracks in drawn for track in tracks if board.apart(track, request))
     if plan and isinstance(request, SpotRequest):
         candidates = sorted(candidates, key=lambda track: board.elbow_room(track, request, half))
     refusals = 0
@@ -200,7 +191,7 @@ class _Board:
     """Tracks found so far, with their positions at the coarse checks."""
 
     def __init__(self, span: tuple[float, float], spacing: float, around: float) -> None:
-        self.tracks: dict[int, Track] = {}  # by the index of the request, in the order in which they were added
+        self.tracks: dict[int, paths.Track] = {}  # by the index of the request, in the order in which they were added
         self._needs: list[float] = []
         self._spacing, self._around = spacing, around
         self._time = np.linspace(*span, max(2, int(np.ceil((span[1] - span[0]) / _COARSE)) + 1))
@@ -212,21 +203,21 @@ class _Board:
         return float(self._time[0])
 
     @property
-    def loops(self) -> list[Loop]:
-        return [track for track in self.tracks.values() if isinstance(track, Loop)]
+    def loops(self) -> list[paths.Loop]:
+        return [track for track in self.tracks.values() if isinstance(track, paths.Loop)]
 
-    def add(self, index: int, track: Track, request: TrackRequest) -> None:
+    def add(self, index: int, track: paths.Track, request: TrackRequest) -> None:
         self.tracks[index] = track
         self._needs.append(_clearance(request))
         self._taken = np.concatenate([self._taken, _places(track, self._time)[None]])
 
-    def apart(self, track: Track, request: TrackRequest) -> bool:
+    def apart(self, track: paths.Track, request: TrackRequest) -> bool:
         """Return whether a track keeps its distance from the centre and, at all times, from all other tracks."""
         if self._around and not self._clear_of_centre(track, request):
             return False
         if not self.tracks:
             return True
-        least = self._spacing + 2 * SWAY + _clearance(request) + np.array(self._needs)[:, None]
+        least = self._spacing + 2 * paths.SWAY + _clearance(request) + np.array(self._needs)[:, None]
         screen = self._time[::_SCREEN]
         if (_distance(_places(track, screen), self._taken[:, ::_SCREEN]) < least).any():
             return False
@@ -248,32 +239,32 @@ class _Board:
         """Return whether a route keeps its distance from all tracks between two times, checked coarsely."""
         times = np.arange(start, end + _FREE, _FREE)
         places = _places(route, times)
-        if (np.hypot(*places.T) < self._around + SWAY).any() and self._around:
+        if (np.hypot(*places.T) < self._around + paths.SWAY).any() and self._around:
             return False
         for other, need in zip(self.tracks.values(), self._needs, strict=True):
-            if (_distance(places, _places(other, times)) < self._spacing + 2 * SWAY + need + _FREE_MARGIN).any():
+            if (_distance(places, _places(other, times)) < self._spacing + 2 * paths.SWAY + need + _FREE_MARGIN).any():
                 return False
         return True
 
-    def _clear_of_centre(self, track: Track, request: TrackRequest) -> bool:
-        least = self._around + SWAY + _clearance(request)
+    def _clear_of_centre(self, track: paths.Track, request: TrackRequest) -> bool:
+        least = self._around + paths.SWAY + _clearance(request)
         if (np.hypot(*track.position(self._time).T) < least).any():
             return False
         fine = np.arange(self._time[0], self._time[-1], _FINE)
         return track.fastest == 0 or bool((np.hypot(*track.position(fine).T) >= least).all())
 
-    def elbow_room(self, spot: Track, request: TrackRequest, half: float) -> float:
+    def elbow_room(self, spot: paths.Track, request: TrackRequest, half: float) -> float:
         """Return the distance of a spot beyond the required one to the nearest track or edge of the square, metres.
 
         Summed over both axes, so that it is smallest in corners.
         """
         place = spot.position(0.0)
-        least = self._spacing + 2 * SWAY + _clearance(request) + np.array(self._needs)[:, None]
+        least = self._spacing + 2 * paths.SWAY + _clearance(request) + np.array(self._needs)[:, None]
         others = (_distance(place, self._taken) - least).min(initial=np.inf)
         return float(np.minimum(others, half - _clearance(request) - np.abs(place)).sum())
 
 
-def _places(track: Track, time: Floats) -> Floats:
+def _places(track: paths.Track, time: Floats) -> Floats:
     """Return the positions of a track at times (...), (..., 2) metres; NaN, which is near nobody, while absent."""
     if not isinstance(track, Route) or track.presence.always:
         return track.position(time)
@@ -299,20 +290,20 @@ def _people(request: TrackRequest) -> int:
     return request.people or (2 if request.together else 1)
 
 
-def _limits(request: LoopRequest, half: float) -> LoopLimits:
-    return loop_limits(
+def _limits(request: LoopRequest, half: float) -> paths.LoopLimits:
+    return paths.loop_limits(
         request.speed, slowest=request.slowest, fastest=request.fastest, half=half, running=request.running
     )
 
 
 def _draw(
     rng: np.random.Generator, request: TrackRequest, board: _Board, *, half: float, wide: float, following: float
-) -> Sequence[Track]:
+) -> Sequence[paths.Track]:
     """Draw candidate tracks, possibly none; candidates on one loop differ in their start positions."""
     if isinstance(request, SpotRequest):
-        return [draw_spot(rng, half=half - request.clearance, apart=request.together)]
+        return [paths.draw_spot(rng, half=half - request.clearance, apart=request.together)]
     if isinstance(request, RecordedRequest):
-        recorded = draw_recorded(rng, half=half, time=request.time, offset=request.offset)
+        recorded = paths.draw_recorded(rng, half=half, time=request.time, offset=request.offset)
         return [] if recorded is None else [recorded]
     assert isinstance(request, LoopRequest)  # visitors have :func:`_draw_visit`
     limits = _limits(request, half)
@@ -325,7 +316,7 @@ def _draw(
             return []
         return [replace(ahead, start=float(start) * ahead.length) for start in starts]
     widest = limits.tightest + wide * (half - limits.tightest)
-    loop = draw_loop(rng, half=half, speed=limits.speed, tightest=limits.tightest, widest=widest)
+    loop = paths.draw_loop(rng, half=half, speed=limits.speed, tightest=limits.tightest, widest=widest)
     if loop is None:
         return []
     if ahead is not None:
@@ -335,7 +326,9 @@ def _draw(
     return [replace(loop, start=float(start) * loop.length) for start in starts]
 
 
-def _draw_visit(rng: np.random.Generator, request: VisitRequest, board: _Board, *, half: float) -> Sequence[Track]:
+def _draw_visit(
+    rng: np.random.Generator, request: VisitRequest, board: _Board, *, half: float
+) -> Sequence[paths.Track]:
     """Draw a route of a visitor round the other tracks, possibly none."""
     route = request.visitor.draw(rng, half=half, start=board.start, free=board.free)
     return [] if route is None else [route]
@@ -363,17 +356,17 @@ def _extents(request: RecordedRequest) -> Floats:
 
 def _check_room(request: TrackRequest, half: float, limit: float) -> None:
     """Raise ValueError if the area is too small for one of the requests alone."""
-    area = half + SWAY
+    area = half + paths.SWAY
     least = None
     if isinstance(request, SpotRequest) and half <= request.clearance:
-        least = max(request.clearance, SWAY) + SWAY
+        least = max(request.clearance, paths.SWAY) + paths.SWAY
     elif isinstance(request, LoopRequest) and half < _NARROWEST:
-        least = _NARROWEST + SWAY
+        least = _NARROWEST + paths.SWAY
     elif isinstance(request, LoopRequest) and _limits(request, half).speed < _limits(request, half).slowest:
         grown = np.arange(half, half + 100.0, 0.05)
         least = (
             next((float(h) for h in grown if _limits(request, h).speed >= _limits(request, h).slowest), grown[-1])
-            + SWAY
+            + paths.SWAY
         )
     elif isinstance(request, RecordedRequest):
         _check_recorded(request, half, limit)
@@ -389,17 +382,17 @@ def _check_recorded(request: RecordedRequest, half: float, limit: float) -> None
     extents = _extents(request)
     if extents.min() <= 2 * limit:
         return
-    needed = np.ceil(100 * (extents.max() / 2 + SWAY) + 1) / 100
+    needed = np.ceil(100 * (extents.max() / 2 + paths.SWAY) + 1) / 100
     path = f"people.motion: the recorded path extends over {extents.max():.2f} m"
     if limit > half:
-        grown = np.ceil(100 * 2 * (needed - limit - SWAY)) / 100
+        grown = np.ceil(100 * 2 * (needed - limit - paths.SWAY)) / 100
         raise ValueError(
             f"{path} and needs people.area = {needed:.2f} m (half the side of a square), but the walls of the room "
-            f"leave {limit + SWAY:.2f} m: enlarge the first two numbers of room.size by {grown:.2f} m, shorten "
+            f"leave {limit + paths.SWAY:.2f} m: enlarge the first two numbers of room.size by {grown:.2f} m, shorten "
             "duration, or set another people.motion.start"
         )
     raise ValueError(
-        f"{path} and does not fit into people.area = {half + SWAY:g} m (half the side of a square): set people.area to "
+        f"{path} and does not fit into people.area = {half + paths.SWAY:g} m (half the side of a square): set people.area to "
         f"{needed:.2f} m or more, shorten duration, or set another people.motion.start"
     )
 

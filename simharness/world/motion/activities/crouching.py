@@ -7,19 +7,10 @@ from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
+from simharness.world.motion.poses import timing
 from simharness.world.motion.poses.foot_placement import PEELING, foot_path, hip_position, pelvis_from_hips, stance
 from simharness.world.motion.poses.inverse_kinematics import pose_angles, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.timing import (
-    Curves,
-    blend,
-    cycle_time,
-    limb,
-    limbs,
-    minimum_jerk,
-    relaxed_posture,
-    smooth_noise,
-)
 
 _ON_TOES, _TIPPED = np.radians(
     [-88.0, -94.5]
@@ -32,13 +23,13 @@ _OTHER = {"left": "right", "right": "left"}
 def squat(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
     """Bend the knees until the thighs are nearly level, heels down, arms forward for balance, and come up again."""
     deep, wide, arms, head = rng.uniform(size=4)
-    u, marks = cycle_time(time, (1.2, 0.5, 1.2, 0.7), rng=rng, pace=pace)
-    low = minimum_jerk(u, (0.0, 0.0), (marks[1], 1.0), (marks[2], 1.0), (marks[3], 0.0))
-    curves = relaxed_posture(time, rng)
-    blend(
+    u, marks = timing.cycle_time(time, (1.2, 0.5, 1.2, 0.7), rng=rng, pace=pace)
+    low = timing.minimum_jerk(u, (0.0, 0.0), (marks[1], 1.0), (marks[2], 1.0), (marks[3], 0.0))
+    curves = timing.relaxed_posture(time, rng)
+    timing.blend(
         curves,
         low,
-        **limbs(shoulder_flexion=85 + 40 * arms, shoulder_abduction=4.0, elbow_flexion=8.0 + 30 * (1 - arms)),
+        **timing.limbs(shoulder_flexion=85 + 40 * arms, shoulder_abduction=4.0, elbow_flexion=8.0 + 30 * (1 - arms)),
         lumbar_flexion=14.0,
         thorax_flexion=10.0,
         neck_flexion=-8.0 - 10 * head,
@@ -50,7 +41,9 @@ def squat(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     prints = {side: stance(kinematics, side, apart=1.05 + 0.3 * wide, out=np.radians(10 + 8 * wide)) for side in SIDES}
     hip[:, 0] += prints["left"].place[0] + 0.1  # centres the path of the pelvis on the spot
     prints = {side: foot.moved(0.1) for side, foot in prints.items()}
-    pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=lean, aside=0.004 * smooth_noise(time, rng, 0.2))
+    pelvis, height = pelvis_from_hips(
+        kinematics, spot, hip, lean=lean, aside=0.004 * timing.smooth_noise(time, rng, 0.2)
+    )
     feet = {side: foot_path(kinematics, spot, time, prints[side]) for side in SIDES}
     return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
@@ -61,12 +54,12 @@ def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     handed, bow, look = rng.uniform(size=3)
     back = "right" if handed < 0.6 else "left"
     front = _OTHER[back]
-    u, marks = cycle_time(time, (0.8, 0.9, 0.9, 0.9, 0.8, 0.5), rng=rng, pace=pace)
+    u, marks = timing.cycle_time(time, (0.8, 0.9, 0.9, 0.9, 0.8, 0.5), rng=rng, pace=pace)
     stepped, down, stayed, up, home, _ = marks[1:]
 
     def through(standing: float, lunging: float, kneeling: float) -> Floats:
         keys = ((0.0, standing), (stepped, lunging), (down, kneeling), (stayed, kneeling), (up, lunging))
-        return minimum_jerk(u, *keys, (home, standing))
+        return timing.minimum_jerk(u, *keys, (home, standing))
 
     shank, thigh, on_toes = _kneeling(kinematics)
     pitch = np.radians(through(0.0, -38.0, np.degrees(on_toes)))
@@ -95,10 +88,10 @@ def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
             lift=0.09,
         ),
     }
-    curves = relaxed_posture(time, rng)
+    curves = timing.relaxed_posture(time, rng)
     low = through(0.0, 0.15, 1.0)
     _rest_on_knee(curves, low, front)
-    blend(curves, low, lumbar_flexion=8.0 + 10 * bow, thorax_flexion=5.0 + 8 * bow, neck_flexion=10.0 * look)
+    timing.blend(curves, low, lumbar_flexion=8.0 + 10 * bow, thorax_flexion=5.0 + 8 * bow, neck_flexion=10.0 * look)
     return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
 
@@ -109,7 +102,7 @@ def crouch(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.G
     back = "right" if handed < 0.6 else "left"
     front = _OTHER[back]
     rate = 0.3 * pace
-    fidget = smooth_noise(time, rng, rate)
+    fidget = timing.smooth_noise(time, rng, rate)
     pitch, shank = np.radians(-42.0), np.radians(58.0)
     thigh = np.radians(52.0 + 14.0 * deep)
     middle = hip_position(kinematics, shank=shank, thigh=thigh, pitch=pitch)
@@ -117,37 +110,39 @@ def crouch(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.G
     back_print = stance(kinematics, back).moved(-middle[0])
     front_print = stance(kinematics, front).moved(_front_offset(kinematics, middle, shank=np.radians(12.0)) - middle[0])
     hip[:, 0] += back_print.place[0]
-    lean = np.radians(16.0 + 8.0 * smooth_noise(time, rng, rate))
-    aside = 0.035 * smooth_noise(time, rng, rate)
+    lean = np.radians(16.0 + 8.0 * timing.smooth_noise(time, rng, rate))
+    aside = 0.035 * timing.smooth_noise(time, rng, rate)
     pelvis, height = pelvis_from_hips(
-        kinematics, spot, hip, lean=lean, aside=aside, bearing=np.radians(9.0) * smooth_noise(time, rng, rate)
+        kinematics, spot, hip, lean=lean, aside=aside, bearing=np.radians(9.0) * timing.smooth_noise(time, rng, rate)
     )
     feet = {
         back: foot_path(kinematics, spot, time, back_print, pitch=pitch),
         front: foot_path(kinematics, spot, time, front_print),
     }
-    curves = relaxed_posture(time, rng)
+    curves = timing.relaxed_posture(time, rng)
     on = np.ones(len(time))
     _rest_on_knee(curves, on, front)
-    blend(
+    timing.blend(
         curves,
         on,
-        lumbar_flexion=14.0 + 10.0 * smooth_noise(time, rng, rate),
+        lumbar_flexion=14.0 + 10.0 * timing.smooth_noise(time, rng, rate),
         thorax_flexion=10.0,
-        thorax_rotation=22.0 * smooth_noise(time, rng, rate),
-        neck_flexion=-14.0 + 8.0 * smooth_noise(time, rng, rate),
-        neck_rotation=35.0 * smooth_noise(time, rng, rate),
+        thorax_rotation=22.0 * timing.smooth_noise(time, rng, rate),
+        neck_flexion=-14.0 + 8.0 * timing.smooth_noise(time, rng, rate),
+        neck_rotation=35.0 * timing.smooth_noise(time, rng, rate),
     )
     return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
 
-def _rest_on_knee(curves: Curves, on: Floats, front: str) -> None:
+def _rest_on_knee(curves: timing.Curves, on: Floats, front: str) -> None:
     """Blend in, by ``on``, a forearm that rests on the front thigh and another arm that hangs ahead of the hip."""
-    blend(
+    timing.blend(
         curves,
         on,
-        **limb(front, shoulder_flexion=32.0, shoulder_abduction=10.0, shoulder_rotation=20.0, elbow_flexion=72.0),
-        **limb(_OTHER[front], shoulder_flexion=14.0, shoulder_abduction=14.0, elbow_flexion=30.0),
+        **timing.limb(
+            front, shoulder_flexion=32.0, shoulder_abduction=10.0, shoulder_rotation=20.0, elbow_flexion=72.0
+        ),
+        **timing.limb(_OTHER[front], shoulder_flexion=14.0, shoulder_abduction=14.0, elbow_flexion=30.0),
     )
 
 

@@ -12,25 +12,17 @@ from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
+from simharness.world.motion.poses import timing
 from simharness.world.motion.poses.foot_placement import foot_path, spot_to_world, stance
 from simharness.world.motion.poses.inverse_kinematics import Pelvis, pose_angles, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.timing import (
-    Curves,
-    blend,
-    draw_side,
-    gesture_envelope,
-    limb,
-    relaxed_posture,
-    smooth_noise,
-)
 
 _STRAIGHTEST = np.radians(8.0)  # smallest knee flexion
 _FURTHEST = 0.034  # metres: largest offset of the pelvis from the spot along either axis
 _SHIFT = 0.018  # metres: sideways shift of the weight from foot to foot
 
 
-Bend = Callable[[Curves, Floats, np.random.Generator], None]
+Bend = Callable[[timing.Curves, Floats, np.random.Generator], None]
 GESTURES: dict[str, Bend] = {}
 """Gestures by name; each changes, in place, the joint angle curves (degrees) of a person who stands at ease."""
 
@@ -61,8 +53,11 @@ def gesture(name: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng:
         time: times in seconds, (T,).
         rng: random generator for the active arm, the rhythm and the manner.
     """
-    curves = relaxed_posture(time, rng)
-    curves |= {"forward": 0.006 * smooth_noise(time, rng, 0.2), "aside": _SHIFT * smooth_noise(time, rng, 0.12)}
+    curves = timing.relaxed_posture(time, rng)
+    curves |= {
+        "forward": 0.006 * timing.smooth_noise(time, rng, 0.2),
+        "aside": _SHIFT * timing.smooth_noise(time, rng, 0.12),
+    }
     GESTURES[name](curves, time, rng)
 
     forward, aside = curves.pop("forward"), curves.pop("aside")
@@ -98,18 +93,18 @@ def _shifted(spot: Spot, forward: Floats, aside: Floats, *, turned: Floats, lean
 
 
 @_gesture("stand")
-def _stand(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
+def _stand(curves: timing.Curves, time: Floats, rng: np.random.Generator) -> None:
     """Look around a little more; the weight shifts anyway."""
-    curves["neck_rotation"] = curves["neck_rotation"] + 15.0 * smooth_noise(time, rng, 0.12)
+    curves["neck_rotation"] = curves["neck_rotation"] + 15.0 * timing.smooth_noise(time, rng, 0.12)
 
 
 @_gesture("wave")
-def _wave(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
+def _wave(curves: timing.Curves, time: Floats, rng: np.random.Generator) -> None:
     """Raise a hand beside the head, palm forward, and wave from the elbow."""
-    side, _ = draw_side(rng)
-    on = gesture_envelope(time, rng, hold=2.4, rest=0.5)
+    side, _ = timing.draw_side(rng)
+    on = timing.gesture_envelope(time, rng, hold=2.4, rest=0.5)
     beat = np.sin(2 * np.pi * (rng.uniform(1.2, 1.7) * time + rng.uniform()))
-    arm = limb(
+    arm = timing.limb(
         side,
         shoulder_abduction=rng.uniform(55, 80),
         shoulder_flexion=rng.uniform(15, 35),
@@ -119,21 +114,21 @@ def _wave(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
         wrist_flexion=-6.0 + 10.0 * beat,
         clavicle_elevation=10.0,
     )
-    blend(curves, on, **arm, neck_flexion=-2.0)
+    timing.blend(curves, on, **arm, neck_flexion=-2.0)
 
 
 @_gesture("point")
-def _point(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
+def _point(curves: timing.Curves, time: Floats, rng: np.random.Generator) -> None:
     """Point with a straight arm, and look in the same direction."""
-    side, sign = draw_side(rng)
-    on = gesture_envelope(time, rng, hold=2.0, rest=0.6)
-    away = rng.uniform(-10, 45) + 10.0 * smooth_noise(time, rng, 0.3)  # degrees to the side of the arm
-    blend(
+    side, sign = timing.draw_side(rng)
+    on = timing.gesture_envelope(time, rng, hold=2.0, rest=0.6)
+    away = rng.uniform(-10, 45) + 10.0 * timing.smooth_noise(time, rng, 0.3)  # degrees to the side of the arm
+    timing.blend(
         curves,
         on,
-        **limb(
+        **timing.limb(
             side,
-            shoulder_flexion=rng.uniform(72, 100) + 4.0 * smooth_noise(time, rng, 0.3),
+            shoulder_flexion=rng.uniform(72, 100) + 4.0 * timing.smooth_noise(time, rng, 0.3),
             shoulder_abduction=away,
             shoulder_rotation=0.0,
             elbow_flexion=6.0,
@@ -148,21 +143,21 @@ def _point(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
 
 
 @_gesture("talk")
-def _talk(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
+def _talk(curves: timing.Curves, time: Floats, rng: np.random.Generator) -> None:
     """Move both hands in front of the belly as in speech, and nod."""
     for side in SIDES:
-        on = gesture_envelope(time, rng, hold=3.0, rest=0.5)
-        blend(
+        on = timing.gesture_envelope(time, rng, hold=3.0, rest=0.5)
+        timing.blend(
             curves,
             on,
-            **limb(
+            **timing.limb(
                 side,
-                shoulder_flexion=20.0 + 9.0 * smooth_noise(time, rng, 0.5),
-                shoulder_abduction=13.0 + 5.0 * smooth_noise(time, rng, 0.4),
-                shoulder_rotation=16.0 + 14.0 * smooth_noise(time, rng, 0.6),
-                elbow_flexion=82.0 + 18.0 * smooth_noise(time, rng, 0.7),
-                forearm_pronation=-10.0 + 30.0 * smooth_noise(time, rng, 0.5),
-                wrist_flexion=12.0 * smooth_noise(time, rng, 0.8),
+                shoulder_flexion=20.0 + 9.0 * timing.smooth_noise(time, rng, 0.5),
+                shoulder_abduction=13.0 + 5.0 * timing.smooth_noise(time, rng, 0.4),
+                shoulder_rotation=16.0 + 14.0 * timing.smooth_noise(time, rng, 0.6),
+                elbow_flexion=82.0 + 18.0 * timing.smooth_noise(time, rng, 0.7),
+                forearm_pronation=-10.0 + 30.0 * timing.smooth_noise(time, rng, 0.5),
+                wrist_flexion=12.0 * timing.smooth_noise(time, rng, 0.8),
             ),
         )
-    curves["neck_flexion"] = curves["neck_flexion"] + 4.0 * smooth_noise(time, rng, 0.8)
+    curves["neck_flexion"] = curves["neck_flexion"] + 4.0 * timing.smooth_noise(time, rng, 0.8)

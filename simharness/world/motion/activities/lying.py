@@ -9,6 +9,7 @@ from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
+from simharness.world.motion.poses import timing
 from simharness.world.motion.poses.foot_placement import (
     Footprint,
     foot_path,
@@ -19,16 +20,6 @@ from simharness.world.motion.poses.foot_placement import (
 )
 from simharness.world.motion.poses.inverse_kinematics import arm_angles, pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.timing import (
-    Curves,
-    blend,
-    cycle_time,
-    ease,
-    limbs,
-    minimum_jerk,
-    relaxed_posture,
-    smooth_noise,
-)
 
 _SITTING = 0.68  # distance from ankles to hips when sitting on the floor with bent knees, in leg lengths
 _BACK = 0.05  # additional distance when lying, in leg lengths
@@ -71,13 +62,13 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
     """Go down to the floor, lie on the back for a while, and get up the same way."""
     open_, wide = rng.uniform(size=2)
     lasting = (1.1, 1.1, 1.2, 1.1, 1.6, 1.0, 1.2, 1.1, 1.1, 0.5)
-    u, marks = cycle_time(time, lasting, rng=rng, pace=pace)
+    u, marks = timing.cycle_time(time, lasting, rng=rng, pace=pace)
     squatted, sat, lain, stretched, stirred, bent, curled, raised, stood, _ = marks[1:]
 
     def through(*values: float) -> Floats:
         """Return the curve through values for standing, squatting, sitting and lying, and back."""
         down = zip((0.0, squatted, sat, lain), values, strict=True)
-        return minimum_jerk(u, *down, *zip((bent, curled, raised, stood), reversed(values), strict=True))
+        return timing.minimum_jerk(u, *down, *zip((bent, curled, raised, stood), reversed(values), strict=True))
 
     low, down, roll = through(0.0, 1.0, 1.0, 1.0), through(0.0, 0.0, 1.0, 1.0), through(0.0, 0.0, 0.0, 1.0)
     length = kinematics.leg_length
@@ -91,7 +82,7 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
         far = Footprint((ahead, prints[side].place[1] * (0.9 + 0.5 * open_)), prints[side].bearing, pitch=_TOES_UP)
         out = (lain + late * (stretched - lain), stretched - (0.3 - late) * (stretched - lain))
         home = (stirred + late * (bent - stirred), bent - (0.3 - late) * (bent - stirred))
-        bent_knee = 1.0 - minimum_jerk(u, (out[0], 0.0), (out[1], 1.0), (home[0], 1.0), (home[1], 0.0))
+        bent_knee = 1.0 - timing.minimum_jerk(u, (out[0], 0.0), (out[1], 1.0), (home[0], 1.0), (home[1], 0.0))
         steps = [(*out, far), (*home, prints[side])]
         feet[side] = foot_path(
             kinematics, spot, u, prints[side], steps, pitch=_HEELS * down * bent_knee, lift=0.02, peel=0.0
@@ -106,10 +97,10 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
     lean = np.radians(upright + down * (trunk.pop("lean") - upright))
     pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=lean)
 
-    curves = relaxed_posture(time, rng)
-    blend(curves, low, lumbar_flexion=18.0, thorax_flexion=12.0, neck_flexion=-8.0, thorax_rotation=0.0)
-    blend(curves, low * (1 - down), **limbs(shoulder_flexion=70.0, elbow_flexion=15.0))
-    blend(curves, down, **trunk, neck_rotation=14.0 * roll * smooth_noise(time, rng, 0.12))
+    curves = timing.relaxed_posture(time, rng)
+    timing.blend(curves, low, lumbar_flexion=18.0, thorax_flexion=12.0, neck_flexion=-8.0, thorax_rotation=0.0)
+    timing.blend(curves, low * (1 - down), **timing.limbs(shoulder_flexion=70.0, elbow_flexion=15.0))
+    timing.blend(curves, down, **trunk, neck_rotation=14.0 * roll * timing.smooth_noise(time, rng, 0.12))
     motion = solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
     # The hands support the body behind the hips, and finally lie beside them.
@@ -140,7 +131,7 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
             side,
             spot_to_world(spot, place),
             turn=turn,
-            weight=ease(down / 0.7),
+            weight=timing.ease(down / 0.7),
             guess=guess,
             turn_weight=0.012,
         )
@@ -152,7 +143,7 @@ def _about_z(angle: Floats) -> Floats:
     return Rotation.from_rotvec(angle[:, None] * [0.0, 0.0, 1.0]).as_matrix()
 
 
-def _trunk(roll: Floats) -> Curves:
+def _trunk(roll: Floats) -> timing.Curves:
     """Return the posture of the trunk in degrees at fractions (T,) between sitting and lying."""
     return {name: PchipInterpolator(_ROLL, values)(roll) for name, values in _TRUNK.items()}
 

@@ -10,13 +10,7 @@ from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activity_registry import activity
 from simharness.world.motion.motion import Performance, Prop, Trajectory
 from simharness.world.motion.paths import Spot, Track
-from simharness.world.motion.poses.foot_placement import (
-    foot_path,
-    hip_position,
-    pelvis_from_hips,
-    spot_to_world,
-    stance,
-)
+from simharness.world.motion.poses import foot_placement
 from simharness.world.motion.poses.inverse_kinematics import pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import blend, cycle_time, ease, limbs, minimum_jerk, relaxed_posture
@@ -73,22 +67,24 @@ def sit(
     hip = _sitting_down(kinematics, seat, seated, lean)
 
     half = seat.hip[0, 0] / 2  # centres the path of the pelvis on the spot
-    prints = {side: stance(kinematics, side, apart=1.0 + 0.25 * wide).moved(-half) for side in SIDES}
+    prints = {side: foot_placement.stance(kinematics, side, apart=1.0 + 0.25 * wide).moved(-half) for side in SIDES}
     ankle = prints["left"].place[0]
     hip[:, 0] += ankle
-    pelvis, height = pelvis_from_hips(kinematics, track, hip, lean=lean)
+    pelvis, height = foot_placement.pelvis_from_hips(kinematics, track, hip, lean=lean)
     curves = relaxed_posture(time, rng)
     blend(curves, seated, lumbar_flexion=6.0 + 6 * slouch, thorax_flexion=4.0 + 6 * slouch, neck_flexion=2.0)
     blend(curves, bow, lumbar_flexion=14.0, thorax_flexion=10.0, neck_flexion=-10.0)
     blend(curves, np.maximum(seated, bow), **limbs(shoulder_flexion=24.0, shoulder_abduction=10.0, elbow_flexion=58.0))
-    feet = {side: foot_path(kinematics, track, time, prints[side]) for side in SIDES}
+    feet = {side: foot_placement.foot_path(kinematics, track, time, prints[side]) for side in SIDES}
     motion = solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
     lap = _knee(kinematics)[0] + ankle - (0.2 + 0.35 * along) * kinematics.leg_parts[0]
     for side in SIDES:
-        place = spot_to_world(track, [lap, prints[side].place[1], seat.height + _THIGH * kinematics.body.stature])
+        place = foot_placement.spot_to_world(
+            track, [lap, prints[side].place[1], seat.height + _THIGH * kinematics.body.stature]
+        )
         rested = ease((seated - 0.6) / 0.4)
         motion = reach_with(kinematics, motion, side, np.tile(place, (len(time), 1)), weight=rested)
-    middle = spot_to_world(track, [(seat.front + seat.back) / 2 + ankle, 0.0])
+    middle = foot_placement.spot_to_world(track, [(seat.front + seat.back) / 2 + ankle, 0.0])
     pose = [[*middle, 0.0, np.cos(track.bearing / 2), 0.0, 0.0, np.sin(track.bearing / 2)]]
     chair = Prop("chair", (seat.front - seat.back, _WIDTH, seat.height), Trajectory(time[:1], np.array(pose)))
     return Performance((motion,), (chair,))
@@ -101,7 +97,7 @@ def _sitting_down(kinematics: Kinematics, seat: Seat, d: Floats, lean: Floats) -
     sitting = np.arctan2(knee[0] - end[:, 0], end[:, 1] - knee[1])
     shank = np.radians(4.0) * (1 - d) + _SHANK * d + np.radians(12.0) * 4 * d * (1 - d)
     thigh = np.radians(5.0) * (1 - d) + sitting * d
-    return hip_position(kinematics, shank=shank, thigh=thigh)
+    return foot_placement.hip_position(kinematics, shank=shank, thigh=thigh)
 
 
 def _knee(kinematics: Kinematics) -> Floats:
@@ -123,14 +119,14 @@ def fit_seat(kinematics: Kinematics, *, below_knee: float) -> Seat:
     body, spot, count = kinematics.body, Spot(np.zeros(2), 0.0), len(_LEANS)
     most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
     lap = np.isin(most, [body.index(name) for name in _LAP])
-    prints = {side: stance(kinematics, side) for side in SIDES}
+    prints = {side: foot_placement.stance(kinematics, side) for side in SIDES}
     prints = {side: foot.moved(-foot.place[0]) for side, foot in prints.items()}
-    feet = {side: foot_path(kinematics, spot, np.zeros(count), prints[side]) for side in SIDES}
+    feet = {side: foot_placement.foot_path(kinematics, spot, np.zeros(count), prints[side]) for side in SIDES}
     up = np.full(count, height + 0.1)
     for _ in range(3):
         across = np.sqrt(np.maximum(upper**2 - (up - knee[1]) ** 2, 0.0))
         hip = np.stack([knee[0] - across, up], axis=-1)
-        pelvis, high = pelvis_from_hips(kinematics, spot, hip, lean=_LEANS)
+        pelvis, high = foot_placement.pelvis_from_hips(kinematics, spot, hip, lean=_LEANS)
         motion = solve_legs(kinematics, np.arange(float(count)), pelvis, high, feet, pose_angles(count))
         skins = np.array([body.skin(pose)[lap] for pose in kinematics.transforms(motion)], float)
         over = np.where(skins[..., 0] < front, skins[..., 2], np.inf)

@@ -13,15 +13,8 @@ from simharness.world.motion.contact import ContactModel
 from simharness.world.motion.interactions.partners import blend_angles, face_to_face, lean_forward, offset_angles
 from simharness.world.motion.motion import Motion, Performance
 from simharness.world.motion.paths import Spot
+from simharness.world.motion.poses import inverse_kinematics
 from simharness.world.motion.poses.foot_placement import foot_path, spot_to_world, stance
-from simharness.world.motion.poses.inverse_kinematics import (
-    Foot,
-    Pelvis,
-    pose_angles,
-    reach_with,
-    shoulder_girdle,
-    solve_standing,
-)
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import Curves, bump, cycle_time, ease, limbs, relaxed_posture
 
@@ -213,14 +206,16 @@ def _approach(
 ) -> Motion:
     """Return the motion of stepping up to the other and back, with hanging arms."""
     pelvis, feet = _steps(mover, home, course, u)
-    angles = pose_angles(len(u), **curves)
+    angles = inverse_kinematics.pose_angles(len(u), **curves)
     whole = _steps(mover, home, course, np.linspace(0.0, course.end, 80))
-    motion = solve_standing(mover, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=whole)
+    motion = inverse_kinematics.solve_standing(mover, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=whole)
     near = course.near(u)
     return blend_angles(lean_forward(motion, lean * near), near, neck_bending=9.0)
 
 
-def _steps(mover: Kinematics, home: Spot, course: _Course, u: Floats) -> tuple[Pelvis, dict[str, Foot]]:
+def _steps(
+    mover: Kinematics, home: Spot, course: _Course, u: Floats
+) -> tuple[inverse_kinematics.Pelvis, dict[str, inverse_kinematics.Foot]]:
     """Return pelvis and feet: the right foot, then the left, steps forward, and later back."""
     step = _STEP * mover.leg_length
     times: dict[str, list[tuple[float, float]]] = {"right": [], "left": []}
@@ -235,7 +230,7 @@ def _steps(mover: Kinematics, home: Spot, course: _Course, u: Floats) -> tuple[P
         )
         over = _SHIFT if side == "right" else -_SHIFT
         aside += over * (bump(u, *forth) + bump(u, *back))
-    pelvis = Pelvis(
+    pelvis = inverse_kinematics.Pelvis(
         ground=spot_to_world(home, np.stack([step * course.near(u), aside], axis=-1)),
         bob=np.zeros(len(u)),
         bearing=np.full(len(u), home.bearing),
@@ -276,9 +271,9 @@ def _embrace(
     height = min(shoulder + hold.height, highest)
     inward = Rotation.from_quat(motion.root[:, 3:], scalar_first=True).as_matrix()
     for side, sign in (("right", 1.0), ("left", -1.0)):
-        turn, place = shoulder_girdle(other, others, "left" if sign > 0 else "right")
+        turn, place = inverse_kinematics.shoulder_girdle(other, others, "left" if sign > 0 else "right")
         palm = turn @ _palm_on_trunk(other, height, sign * hold.across, wrap) + place
-        motion = reach_with(
+        motion = inverse_kinematics.reach_with(
             mover,
             motion,
             side,

@@ -11,13 +11,7 @@ from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activities.gestures import gesture
 from simharness.world.motion.activities.sitting import Seat, fit_seat
 from simharness.world.motion.activity_registry import activity
-from simharness.world.motion.interactions.partners import (
-    arm_length,
-    face_to_face,
-    lean_forward,
-    look_ahead,
-    offset_angles,
-)
+from simharness.world.motion.interactions import partners
 from simharness.world.motion.motion import Motion, Performance, Prop, Trajectory
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import foot_path, pelvis_from_hips, spot_to_world, stance
@@ -76,7 +70,7 @@ def table(
     if seated:  # room for toes and knees under the table
         depth = max(depth, sum(_toes(mover, seat) for mover, seat in zip(performers, seats, strict=True)) - sum(edges))
     between = edges[0] + depth + edges[1]
-    spots = face_to_face(spot, between, share=(edges[0] + depth / 2) / between)
+    spots = partners.face_to_face(spot, between, share=(edges[0] + depth / 2) / between)
     props = [Prop("table", (depth, width, top), _standing(spot, 0.0, time))]
     motions = []
     for person, (mover, home) in enumerate(zip(performers, spots, strict=True)):
@@ -85,7 +79,7 @@ def table(
             motion, ankles = _seated(mover, seats[person], home, time, rng)
             props.append(_chair(seats[person], home, ankles, time))
         else:
-            motion = look_ahead(gesture("stand", mover, home, time, rng=rng))
+            motion = partners.look_ahead(gesture("stand", mover, home, time, rng=rng))
         motions.append(_TASKS[(first, other)[person]](mover, motion, place, time, rng))
     return Performance(tuple(motions), tuple(props))
 
@@ -168,12 +162,12 @@ def _lay(mover: Kinematics, motion: Motion, place: _Place, side: str, at: Floats
 def _rest(mover: Kinematics, side: str, frames: int) -> Floats:
     """Return the resting position of a hand on the table, (T, 3), in the coordinates of :func:`_lay`."""
     aside = 0.16 if side == "left" else -0.16
-    return np.tile([0.10, aside * arm_length(mover) / 0.6, 0.0], (frames, 1))
+    return np.tile([0.10, aside * partners.arm_length(mover) / 0.6, 0.0], (frames, 1))
 
 
 def _talk(mover: Kinematics, motion: Motion, place: _Place, time: Floats, rng: np.random.Generator) -> Motion:
     """Raise the hands from the table now and then and move them as in speech."""
-    motion = offset_angles(motion, neck_flexion=3.0 * smooth_noise(time, rng, 0.8))
+    motion = partners.offset_angles(motion, neck_flexion=3.0 * smooth_noise(time, rng, 0.8))
     for side in SIDES:
         on = gesture_envelope(time, rng, hold=2.0, rest=1.0)
         beat = np.stack([0.05 * smooth_noise(time, rng, 0.6), 0.05 * smooth_noise(time, rng, 0.5), 0.0 * time], axis=-1)
@@ -187,7 +181,7 @@ def _talk(mover: Kinematics, motion: Motion, place: _Place, time: Floats, rng: n
 def _write(mover: Kinematics, motion: Motion, place: _Place, time: Floats, rng: np.random.Generator) -> Motion:
     """Write with the right hand, hold the paper with the left, and look at it."""
     lean = 8.0 + 4.0 * rng.uniform()
-    motion = offset_angles(lean_forward(motion, lean), neck_flexion=16.0 + lean)
+    motion = partners.offset_angles(partners.lean_forward(motion, lean), neck_flexion=16.0 + lean)
     motion = _lay(mover, motion, place, "left", _rest(mover, "left", len(time)))
     rate, phase = rng.uniform(1.6, 2.4), rng.uniform(0, 2 * np.pi)
     stroke = 2 * np.pi * rate * time + phase
@@ -206,7 +200,7 @@ def _reach(mover: Kinematics, motion: Motion, place: _Place, time: Floats, rng: 
     )
     side = "right" if rng.uniform() < 0.75 else "left"
     other = "left" if side == "right" else "right"
-    motion = lean_forward(motion, 4.0 + 14.0 * on)
+    motion = partners.lean_forward(motion, 4.0 + 14.0 * on)
     motion = _lay(mover, motion, place, other, _rest(mover, other, len(time)))
     at = _rest(mover, side, len(time))
     target = np.array([far * (place.middle - place.edge), aside, 0.05])

@@ -115,4 +115,5 @@ class Solid:
 
 
 def yaw_of(pose: Floats) -> float:
+    """Return the rotation about the vertical of a pose (7,), radians: place and quaternion of an upright solid."""
     return float(2 * np.arctan2(pose[6], pose[3]))

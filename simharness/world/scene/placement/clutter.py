@@ -13,18 +13,9 @@ from mvpose.arrays import Floats
 from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.motion import Trajectory
+from simharness.world.scene.objects import laboratory
 from simharness.world.scene.objects.decoy_models import DECOY_MODELS
 from simharness.world.scene.objects.geoms import Box
-from simharness.world.scene.objects.laboratory import (
-    draw_box,
-    draw_cart,
-    draw_chair,
-    draw_partition,
-    draw_pillar,
-    draw_rack,
-    draw_shelf,
-    draw_table,
-)
 from simharness.world.scene.objects.materials import draw_sheet
 from simharness.world.scene.objects.object_files import load_object, load_shipped, variants
 from simharness.world.scene.objects.plants import draw_plant
@@ -78,14 +69,14 @@ class ClutterKind:
 
 # In the order of placement: large objects first, because they need more space.
 CLUTTER_KINDS = (
-    ClutterKind("pillar", "pillars", lambda rng, room: draw_pillar(rng, room.size[2]), near_people),
-    ClutterKind("shelf", "shelves", lambda rng, room: draw_shelf(rng), towards_walls),
-    ClutterKind("rack", "racks", lambda rng, room: draw_rack(rng), towards_walls, fills=False),
-    ClutterKind("partition", "partitions", lambda rng, room: draw_partition(rng), towards_walls),
-    ClutterKind("table", "tables", lambda rng, room: draw_table(rng), towards_walls, fills=False),
-    ClutterKind("box", "boxes", lambda rng, room: draw_box(rng), near_people),
+    ClutterKind("pillar", "pillars", lambda rng, room: laboratory.draw_pillar(rng, room.size[2]), near_people),
+    ClutterKind("shelf", "shelves", lambda rng, room: laboratory.draw_shelf(rng), towards_walls),
+    ClutterKind("rack", "racks", lambda rng, room: laboratory.draw_rack(rng), towards_walls, fills=False),
+    ClutterKind("partition", "partitions", lambda rng, room: laboratory.draw_partition(rng), towards_walls),
+    ClutterKind("table", "tables", lambda rng, room: laboratory.draw_table(rng), towards_walls, fills=False),
+    ClutterKind("box", "boxes", lambda rng, room: laboratory.draw_box(rng), near_people),
     ClutterKind("plant", "plants", lambda rng, room: draw_plant(rng), near_people),
-    ClutterKind("chair", "chairs", lambda rng, room: draw_chair(rng), near_people, fills=False),
+    ClutterKind("chair", "chairs", lambda rng, room: laboratory.draw_chair(rng), near_people, fills=False),
 )
 
 
@@ -159,7 +150,7 @@ def place_cart(seed: int, k: int, site: Site) -> Solid:
     Raises:
         ValueError: no path is free.
     """
-    cart = draw_cart(stream(seed, "clutter", "cart", k))
+    cart = laboratory.draw_cart(stream(seed, "clutter", "cart", k))
     rng = stream(seed, "clutter", "cart", k, "way")
     space = site.space
     for _ in range(TRIES):
