@@ -281,10 +281,10 @@ def standing_scenes(
     """
     if people < 1 or repeats < 1:
         raise ValueError(f"expected at least 1 person and 1 repeat, got {people} people and {repeats} repeats")
+    blocked = [taken_floor(each) for each in obstacles if each.center[2] - each.half[2] < _OVERHEAD]
     places = volume.places(spacing)
-    for each in obstacles:
-        if each.center[2] - each.half[2] < _OVERHEAD:  # nobody stands below it
-            places = places[~taken_floor(each).contains(places)]
+    for taken in blocked:
+        places = places[~taken.contains(places)]
     if not len(places):
         raise ValueError("obstacles take the whole floor of the volume: nobody can stand in it; move or remove some")
     if tracks is not None:

@@ -138,13 +138,14 @@ def _stereo(values: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
     if matrices is None:
         if {"R", "T", "P1", "P2"} <= values.keys():
             raise ValueError(
-                f"R and T of a stereo pair without M1 and M2, which are missing in {file_storage.missing_half(path)}, too"
+                f"R and T of a stereo pair without M1 and M2, missing in {file_storage.missing_half(path)}, too"
             )
         return {}
     missing = [key for key in ("R", "T") if key not in values]
     if missing:
         raise ValueError(
-            f"{matrices}1 and {matrices}2 without {' and '.join(missing)}, missing in {file_storage.missing_half(path)}, too"
+            f"{matrices}1 and {matrices}2 without {' and '.join(missing)}, "
+            f"missing in {file_storage.missing_half(path)}, too"
         )
     baseline = float(np.linalg.norm(values["T"]))
     if baseline > _LONGEST_BASELINE:
