@@ -392,8 +392,8 @@ def _check_recorded(request: RecordedRequest, half: float, limit: float) -> None
             "duration, or set another people.motion.start"
         )
     raise ValueError(
-        f"{path} and does not fit into people.area = {half + paths.SWAY:g} m (half the side of a square): set people.area "
-        f"to {needed:.2f} m or more, shorten duration, or set another people.motion.start"
+        f"{path} and does not fit into people.area = {half + paths.SWAY:g} m (half the side of a square): set "
+        f"people.area to {needed:.2f} m or more, shorten duration, or set another people.motion.start"
     )
 
 
