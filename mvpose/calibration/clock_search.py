@@ -15,18 +15,16 @@ from mvpose.camera import Rig
 _MOST = 3000  # points of a view that are compared at each shift
 _LEAST = 30  # points that two views share, for a pair to count
 _ROUNDS = 20
+_LARGEST = 1.0  # s: most by which two clocks differ
 
 
-def coarse_offsets(rig: Rig, tracks: ImageTracks, *, largest: float) -> Floats:
+def coarse_offsets(rig: Rig, tracks: ImageTracks) -> Floats:
     """Return offsets of the clocks, (V,), seconds: whole frames, true time minus given time, some of them 0.
 
-    Args:
-        rig: the calibrated cameras.
-        tracks: tracks of joints.
-        largest: most by which two clocks differ, seconds.
+    Two clocks differ by at most a second.
     """
     views = len(rig)
-    most = max(1, round(largest / tracks.period))
+    most = max(1, round(_LARGEST / tracks.period))
     grid = np.nanmedian(tracks.times, axis=1)
     grid = np.arange(grid[0], grid[-1] + 0.5 * tracks.period, tracks.period)
     samples = tracks.sample(np.repeat(grid[:, None], views, axis=1))

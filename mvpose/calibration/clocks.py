@@ -131,9 +131,7 @@ class Clocks(Sealed):
             yield Finding("repeated-pictures", text, severity, 1.0, name, view, size, cost=cost, repair=repair)
 
 
-def estimate_clocks(
-    rig: Rig, recording: Sequence[Detections] | Sightings, *, period: float = 0.04, largest: float = 1.0
-) -> Clocks:
+def estimate_clocks(rig: Rig, recording: Sequence[Detections] | Sightings, *, period: float = 0.04) -> Clocks:
     """Return the clocks of the cameras; ten seconds of people who walk are enough.
 
     Of a long recording the 3000 frames in a row with most people are taken; pictures that were lost before or after are
@@ -143,7 +141,6 @@ def estimate_clocks(
         rig: the calibrated cameras; it may be off by a few degrees.
         recording: detections of each frame in the order of time, or what :func:`.sightings.gather` makes of them.
         period: time between frames whose detections carry no times, seconds.
-        largest: most by which two clocks differ, seconds.
     """
     sightings = recording if isinstance(recording, Sightings) else gather(rig, recording, period=period)
     repeated = repeated_pictures(sightings)
@@ -152,7 +149,7 @@ def estimate_clocks(
     names = camera_names(rig)
     if (np.isfinite(tracks.points[..., 0]).sum(axis=1) >= 2).sum() < _FEWEST:
         return _unknown(names, repeated, sightings.times, tracks.period)
-    adjustment = adjust(rig, tracks, coarse_offsets(rig, tracks, largest=largest))
+    adjustment = adjust(rig, tracks, coarse_offsets(rig, tracks))
     steps: list[ClockStep] = []
     # Residuals of offsets that do not settle come from other people or wrong cameras, not from lost pictures.
     while len(steps) < _MOST_STEPS and adjustment.settled:

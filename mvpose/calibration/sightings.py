@@ -118,15 +118,13 @@ def gather(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) -> S
     return sightings_of(tracklets, match_over_time(rig, tracklets).person)
 
 
-def match_over_time(
-    rig: Rig, tracklets: Tracklets, *, uncertainties: Sequence[RigUncertainty] = UNCERTAINTIES
-) -> PeopleGroups:
-    """Match tracklets under each uncertainty of the rig, in rising order, and return the likeliest result.
+def match_over_time(rig: Rig, tracklets: Tracklets) -> PeopleGroups:
+    """Match tracklets under each of :data:`UNCERTAINTIES` of the rig, in rising order, and return the likeliest result.
 
     A rig that is further off must explain clearly more: with enough freedom, people who walk alike fit each other.
     """
-    best = match_tracklets(rig, tracklets, uncertainties[0])
-    for each in uncertainties[1:]:
+    best = match_tracklets(rig, tracklets, UNCERTAINTIES[0])
+    for each in UNCERTAINTIES[1:]:
         other = match_tracklets(rig, tracklets, each)
         if other.score > best.score + max(_LEAST_BETTER, _CLEARLY_BETTER * abs(best.score)):
             best = other

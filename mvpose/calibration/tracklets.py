@@ -305,13 +305,7 @@ def chosen_frames(tracklets: Tracklets, *, spacing: float) -> Bools:
     return chosen
 
 
-def keypoint_sigma(
-    keypoints: Floats,
-    scores: Floats,
-    skeleton: Skeleton,
-    *,
-    noise: Noise = _NOISE,
-) -> tuple[Floats, Floats]:
+def keypoint_sigma(keypoints: Floats, scores: Floats, skeleton: Skeleton) -> tuple[Floats, Floats]:
     """Return the area of each person, (n,), pixels², and the standard deviation of keypoints, (n, J), pixels.
 
     The area is that of the box around the keypoints, without the fifth of them that are farthest from the median, times
@@ -321,7 +315,6 @@ def keypoint_sigma(
         keypoints: pixels, (n, J, 2); NaN where missing.
         scores: scores, (n, J); a keypoint of half the score has twice the standard deviation.
         skeleton: the J joints.
-        noise: error model.
 
     Returns:
         Areas and standard deviations; the latter are infinite where the keypoint is missing.
@@ -339,6 +332,6 @@ def keypoint_sigma(
     # quarter of the other.
     sides = np.maximum(sides, 0.25 * sides[:, ::-1])
     area = _BOX_SHARE * sides.prod(axis=1)
-    relative = noise.sigmas(skeleton) / noise.area
-    sigma = np.hypot(np.sqrt(area)[:, None] * relative, noise.pixels) / np.maximum(scores, _LOWEST_SCORE)
+    relative = _NOISE.sigmas(skeleton) / _NOISE.area
+    sigma = np.hypot(np.sqrt(area)[:, None] * relative, _NOISE.pixels) / np.maximum(scores, _LOWEST_SCORE)
     return area, np.where(detected, sigma, np.inf)

@@ -262,7 +262,7 @@ _ZIGZAG = ((0, 1), (1, 2))
 
 
 def mosaic(
-    images: Sequence[NDArray[np.uint8]], titles: Sequence[str], *, columns: int | None = None, gap: int | None = None
+    images: Sequence[NDArray[np.uint8]], titles: Sequence[str], *, columns: int | None = None
 ) -> NDArray[np.uint8]:
     """Arrange pictures row by row, each below its title.
 
@@ -273,7 +273,6 @@ def mosaic(
         images: pictures, each (h, w, 3) uint8.
         titles: one title for each picture.
         columns: tiles in a row; by default about as many as there are rows (five pictures: three and two).
-        gap: pixels between tiles and around them; by default a 60th of the picture height.
 
     Returns:
         (H, W, 3) uint8.
@@ -287,7 +286,7 @@ def mosaic(
             "titles"
         )
     height, width = max(picture.shape[0] for picture in images), max(picture.shape[1] for picture in images)
-    gap = max(2, height // 60) if gap is None else gap
+    gap = max(2, height // 60)
     columns = _columns(len(images)) if columns is None else columns
     rows = math.ceil(len(images) / columns)
     scale = height / 600

@@ -98,9 +98,9 @@ class Comparison:
             if change.undecided and change.loss > 0 and (change.score, change.variant) not in worse
         )
 
-    def changes_of(self, variant: str, case: str | None = None) -> tuple[Change, ...]:
-        """Return the changes of a variant over the whole suite or one case."""
-        return tuple(change for change in self.changes if (change.variant, change.case) == (variant, case))
+    def changes_of(self, variant: str) -> tuple[Change, ...]:
+        """Return the changes of a variant over the whole suite."""
+        return tuple(change for change in self.changes if (change.variant, change.case) == (variant, None))
 
 
 def compare(before: Measurement, after: Measurement, gate: GateSection) -> Comparison:

@@ -57,10 +57,10 @@ def candidate(mount: int, lens: int, place: ArrayLike, aim: ArrayLike) -> Candid
     return Candidate(mount, lens, (x, y, z), float(np.arctan2(way[1], way[0])), tilt)
 
 
-def aims_in(room: Room, *, spacing: float = _AIM_SPACING) -> Floats:
+def aims_in(room: Room) -> Floats:
     """Return points of the volume at which candidates look, (n, 3), metres: its middle first, then a grid."""
     low, high = room.volume.bounds
-    counts = np.maximum(np.round((high - low) / spacing).astype(int), 1) + 1
+    counts = np.maximum(np.round((high - low) / _AIM_SPACING).astype(int), 1) + 1
     x, y = (np.linspace(a, b, n + 2)[1:-1] for a, b, n in zip(low, high, counts, strict=True))
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     grid = grid[room.volume.contains(grid)]
@@ -93,21 +93,18 @@ def places_in(room: Room, *, spacing: float, levels: float) -> list[tuple[int, F
     return found
 
 
-def candidates_in(
-    room: Room, *, spacing: float = 0.75, levels: float = 0.75, most: int | None = None
-) -> list[Candidate]:
+def candidates_in(room: Room, *, spacing: float = 0.75, most: int | None = None) -> list[Candidate]:
     """Return cameras that may hang in a room, on a grid of places, looking at points of the volume.
 
     Args:
         room: the room.
         spacing: largest distance between neighbouring places on a mount, metres.
-        levels: largest distance between places above each other, metres.
         most: largest number of candidates: the spacing is enlarged until they are no more.
 
     Raises:
         ValueError: no place to hang.
     """
-    aims = aims_in(room)
+    aims, levels = aims_in(room), 0.75
     while True:
         places = places_in(room, spacing=spacing, levels=levels)
         found = [

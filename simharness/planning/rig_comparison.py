@@ -118,13 +118,12 @@ def rig_of(room: Room, candidates: Sequence[Candidate]) -> Rig:
     return Rig([*room.fixed, *(each.camera(room, name=name) for each, name in zip(candidates, names, strict=False))])
 
 
-def corner_rig(room: Room, count: int, *, height: float = 2.5, lens: int = 0) -> list[Candidate]:
+def corner_rig(room: Room, count: int, *, lens: int = 0) -> list[Candidate]:
     """Return cameras in the corners of a room; after those, in the middles of its longest free stretches of wall.
 
     Args:
         room: the room.
         count: number of cameras.
-        height: preferred height, metres.
         lens: index of the lens.
     """
     points = [corner for corner in room.space.outline]
@@ -133,15 +132,15 @@ def corner_rig(room: Room, count: int, *, height: float = 2.5, lens: int = 0) ->
         longest = int(np.argmax(np.linalg.norm(sides, axis=1)))
         points.insert(longest + 1, points[longest] + sides[longest] / 2)
     chosen = _spread(np.array(points), count)
-    return _nearest(room, np.column_stack([chosen, np.full(count, height)]), lens)
+    return _nearest(room, np.column_stack([chosen, np.full(count, 2.5)]), lens)
 
 
-def ring_rig(room: Room, count: int, *, height: float = 2.2, lens: int = 0) -> list[Candidate]:
+def ring_rig(room: Room, count: int) -> list[Candidate]:
     """Return cameras at equal bearings around the middle of the volume, as far out as the places allow; as above."""
     middle, reach = room.volume.middle, float(room.space.size.max())
     bearings = np.pi / count + 2 * np.pi * np.arange(count) / count
     away = middle + reach * np.column_stack([np.cos(bearings), np.sin(bearings)])
-    return _nearest(room, np.column_stack([away, np.full(count, height)]), lens, by_bearing=True)
+    return _nearest(room, np.column_stack([away, np.full(count, 2.2)]), 0, by_bearing=True)
 
 
 def simulate_rigs(

@@ -171,9 +171,9 @@ class RigValue:
         result[..., 4], result[..., 5] = right, false
         return result
 
-    def maps(self, terms: Sequence[Floats], *, more: Floats | None = None) -> Maps:
-        """Return the figures of a set of cameras, with one more if it is given."""
-        return self._maps(self._sum(terms), more)
+    def maps(self, terms: Sequence[Floats]) -> Maps:
+        """Return the figures of a set of cameras."""
+        return self._maps(self._sum(terms))
 
     def value(self, terms: Sequence[Floats]) -> float:
         """Return the value of a set."""

@@ -108,17 +108,16 @@ def tolerances(results: Sequence[SceneResult], cameras: Sequence[int]) -> tuple[
     return tuple(found)
 
 
-def cliff_of(levels: Sequence[float], losses: Sequence[float], *, limit: float = CLIFF) -> float | None:
-    """Return the level at which the loss first reaches a limit, by linear interpolation from no loss at level 0.
+def cliff_of(levels: Sequence[float], losses: Sequence[float]) -> float | None:
+    """Return the level at which the loss first reaches :data:`CLIFF`, by linear interpolation from no loss at level 0.
 
     Args:
         levels: levels, ascending and positive.
         losses: loss at each level, points.
-        limit: the limit, points.
     """
     at, lost = np.array([0.0, *levels]), np.array([0.0, *losses])
-    beyond = np.flatnonzero(lost >= limit)
+    beyond = np.flatnonzero(lost >= CLIFF)
     if not len(beyond):
         return None
     k = int(beyond[0])
-    return float(at[k - 1] + (limit - lost[k - 1]) / (lost[k] - lost[k - 1]) * (at[k] - at[k - 1]))
+    return float(at[k - 1] + (CLIFF - lost[k - 1]) / (lost[k] - lost[k - 1]) * (at[k] - at[k - 1]))

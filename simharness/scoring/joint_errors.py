@@ -13,7 +13,6 @@ How well the reported confidence says the errors is scored by the coverage of el
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mvpose import COCO17, Skeleton
 from mvpose.arrays import Floats
 from simharness.scoring.score_registry import ScoreInfo, ScoreInput, finite_mean, score
 
@@ -30,18 +29,17 @@ def joint_errors(truth: ArrayLike, estimate: ArrayLike) -> Floats:
     return np.where(missing, np.inf, error)
 
 
-def bone_errors(truth: ArrayLike, estimate: ArrayLike, *, skeleton: Skeleton = COCO17) -> Floats:
-    """Return the estimated length minus the true length of every bone of the skeleton's tree.
+def bone_errors(truth: ArrayLike, estimate: ArrayLike) -> Floats:
+    """Return the estimated length minus the true length of every bone of COCO-17's tree.
 
     Args:
         truth: joints, (..., J, 3).
         estimate: joints, (..., J, 3), in the same unit.
-        skeleton: skeleton of the J joints.
 
     Returns:
-        Differences, (..., J - 1), in the order of ``skeleton.edges``; NaN where an end is missing in either.
+        Differences, (..., J - 1), in the order of the edges of the skeleton; NaN where an end is missing in either.
     """
-    return _bone_lengths(np.asarray(estimate, float), skeleton) - _bone_lengths(np.asarray(truth, float), skeleton)
+    return _bone_lengths(np.asarray(estimate, float)) - _bone_lengths(np.asarray(truth, float))
 
 
 def jitter(truth: ArrayLike, estimate: ArrayLike) -> Floats:
@@ -98,8 +96,8 @@ def jitter_score(given: ScoreInput) -> float | None:
     return finite_mean(1000.0 * jitter(given.truth, given.paired))
 
 
-def _bone_lengths(joints: Floats, skeleton: Skeleton) -> Floats:
-    parents, children = np.array(skeleton.edges).T
+def _bone_lengths(joints: Floats) -> Floats:
+    parents, children = np.array(COCO17.edges).T
     return np.linalg.norm(joints[..., children, :] - joints[..., parents, :], axis=-1)
 
 

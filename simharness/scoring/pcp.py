@@ -52,18 +52,17 @@ class Part(IntEnum):
     CORRECT = 1
 
 
-def part_states(truth: Floats, compared: Floats, *, alpha: float = ALPHA) -> NDArray[np.int8]:
+def part_states(truth: Floats, compared: Floats) -> NDArray[np.int8]:
     """Return the :class:`Part` values of people, (..., 10), each compared with one estimate.
 
     Args:
         truth: joints on SHELF14, (..., 14, 3), metres; NaN where undefined.
         compared: joints of the estimate of each person, (..., 14, 3), metres; NaN where missing.
-        alpha: largest error of a correct part, as a share of its true length.
     """
     true_ends = part_ends(truth)
     length = np.linalg.norm(true_ends[..., 1, :] - true_ends[..., 0, :], axis=-1)
     error = np.linalg.norm(part_ends(compared) - true_ends, axis=-1).mean(axis=-1)
-    correct = error <= alpha * length  # False where an end is missing
+    correct = error <= ALPHA * length  # False where an end is missing
     return np.where(np.isnan(length), Part.UNDEFINED, correct).astype(np.int8)
 
 

@@ -75,20 +75,18 @@ def values_over_orders(worth: Callable[[int], float], orders: Iterable[Sequence[
     return np.mean(rows, axis=0)
 
 
-def smallest_coalition(worths: ArrayLike, target: float, *, sizes: ArrayLike | None = None) -> int:
+def smallest_coalition(worths: ArrayLike, target: float) -> int:
     """Return the smallest coalition with at least a target worth, a bit mask; of several, the one of the highest worth.
 
     Args:
         worths: worth of each coalition, (2^n,).
         target: least worth. Where no coalition has it, the coalition of the highest worth is returned.
-        sizes: size of each player, (n,); by default 1.
     """
     worths = np.asarray(worths, float)
     n = len(worths).bit_length() - 1
-    sizes = np.ones(n) if sizes is None else np.asarray(sizes, float)
-    total = ((np.arange(len(worths))[:, None] >> np.arange(n)) & 1) @ sizes
+    size = ((np.arange(len(worths))[:, None] >> np.arange(n)) & 1).sum(axis=1)
     enough = worths >= target - 1e-9
     if not enough.any():
         enough = worths >= worths.max()
-    order = np.lexsort((-worths, total))
+    order = np.lexsort((-worths, size))
     return int(order[enough[order]][0])

@@ -82,12 +82,11 @@ def _read(file: DetectionFile, skeleton: JointNames | None) -> dict[int, Picture
 FORMAT = DetectionFormat("OpenPose", lambda file: "people" in file.object, _read, lambda file: "people" in file.object)
 
 
-def read_frame(paths: Sequence[str | Path], *, skeleton: JointNames = _BODY25) -> Detections:
+def read_frame(paths: Sequence[str | Path]) -> Detections:
     """Read one frame of all views.
 
     Args:
-        paths: one file for each view, in the order of the rig's cameras.
-        skeleton: joints of the files.
+        paths: one file of the 25 joints for each view, in the order of the rig's cameras.
 
     Returns:
         The people of all views on COCO-17; boxes enclose their keypoints.
@@ -95,7 +94,7 @@ def read_frame(paths: Sequence[str | Path], *, skeleton: JointNames = _BODY25) -
     Raises:
         ValueError: as :func:`read_people`, for the first faulty file.
     """
-    views = [read_people(path, skeleton=skeleton) for path in paths]
+    views = [read_people(path) for path in paths]
     return Detections.from_keypoints(
         np.repeat(np.arange(len(views)), [len(scores) for _, scores in views]),
         np.concatenate([np.zeros((0, len(COCO17), 2)), *(keypoints for keypoints, _ in views)]),

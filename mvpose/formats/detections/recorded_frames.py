@@ -69,17 +69,16 @@ class RecordedFrames:
     def __len__(self) -> int:
         return len(self.numbers)
 
-    def extents(self, share: float = 0.999) -> Floats:
+    def extents(self) -> Floats:
         """Return the region of each camera's keypoints: least and greatest x and y, (V, 2, 2), pixels; NaN for none.
 
-        Args:
-            share: share of the keypoints within it, so that single wild ones do not count.
+        One in a thousand is outside of each side, so that single wild keypoints do not count.
         """
         result = np.full((len(self.pictures), 2, 2), np.nan)
         for view, pictures in enumerate(self.pictures):
             points = [each.keypoints[each.scores > 0] for each in pictures.values() if len(each)]
             if points:
-                result[view] = np.quantile(np.concatenate(points), [1.0 - share, share], axis=0)
+                result[view] = np.quantile(np.concatenate(points), [0.001, 0.999], axis=0)
         return result
 
     def detections(self, times: Floats) -> list[Detections]:

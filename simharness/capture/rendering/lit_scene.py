@@ -58,7 +58,7 @@ class MovingSamples:
     @classmethod
     def from_meshes(cls, meshes: tuple[Mesh, ...]) -> "MovingSamples":
         """Return the samples of meshes in the order of their faces and vertices."""
-        of_vertex, of_face, corner_samples, group = tuple([] for _ in range(4))
+        of_vertex, of_face, corner_samples, group = (list[Any]() for _ in range(4))
         spans, ranges = [], []
         vertices = faces = samples = parts = 0
         for mesh in meshes:

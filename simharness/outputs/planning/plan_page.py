@@ -80,7 +80,7 @@ def render_preview(room: Room) -> str:
         facts=_facts(room),
         cards=[],
         key=_KEY_OF_PLACES,
-        above=Markup(room_from_above("above", room, places=places, cameras=room.fixed)),
+        above=Markup(room_from_above(room, places=places, cameras=room.fixed)),
         sides=[
             Markup(room_from_side(f"side{axis}", room, axis=axis, places=places, cameras=room.fixed)) for axis in (0, 1)
         ],
@@ -105,7 +105,7 @@ def render_plan(plan: RigPlan, *, command: str = "") -> str:
         facts=_facts(room),
         cards=_cards(plan),
         key=_KEY,
-        above=Markup(room_from_above("above", room, cameras=list(plan.rig))),
+        above=Markup(room_from_above(room, cameras=list(plan.rig))),
         sides=[Markup(room_from_side(f"side{axis}", room, axis=axis, cameras=list(plan.rig))) for axis in (0, 1)],
         cameras=_camera_rows(plan),
         people="one" if room.keys.people.count == 1 else room.keys.people.count,

@@ -25,24 +25,20 @@ _REACH = 1.3  # metres: length of the drawn cones
 _PAD = (0.75, 0.5)  # inches of a figure that its axes do not fill
 
 
-def room_from_above(
-    name: str, room: Room, *, cameras: Sequence[Camera] = (), places: Floats | None = None, width: float = _WIDTH
-) -> str:
+def room_from_above(room: Room, *, cameras: Sequence[Camera] = (), places: Floats | None = None) -> str:
     """Draw a room from above.
 
     Args:
-        name: different from the name of every other plot on the page.
         room: the room.
         cameras: cameras of a rig, with their names; those that hang already have another colour.
         places: places where cameras may hang, (n, 3), metres; darker ones are higher.
-        width: width of the plot, inches of 72 px.
 
     Returns:
         An SVG element.
     """
     low, high = room.space.bounds[0] - _MARGIN, room.space.bounds[1] + _MARGIN
     tall = float((high - low)[1] / (high - low)[0])
-    with svg_plot(name, size=(width, (width - _PAD[0]) * tall + _PAD[1])) as (axes, written):
+    with svg_plot("above", size=(_WIDTH, (_WIDTH - _PAD[0]) * tall + _PAD[1])) as (axes, written):
         draw_room(axes, room)
         if places is not None and len(places):
             shade = np.clip(places[:, 2] / room.space.height, 0.0, 1.0)

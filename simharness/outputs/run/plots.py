@@ -38,13 +38,13 @@ def error_over_time(time: Floats, errors: Floats, present: Bools, *, colors: Seq
     return written[0]
 
 
-def error_distribution(errors: Mapping[str, Floats], *, limit: float = 150.0) -> str:
+def error_distribution(errors: Mapping[str, Floats]) -> str:
     """Plot the share of true joints with at most a given error, for each variant.
 
     Args:
         errors: millimetres by variant, (n,); NaN counts as infinite.
-        limit: end of the axis, millimetres.
     """
+    limit = 150.0  # end of the axis, millimetres
     with svg_plots.svg_plot("error-distribution") as (axes, written):
         grid = np.linspace(0, limit, 301)
         for (variant, values), color in zip(errors.items(), svg_plots.VARIANT_COLORS * len(errors), strict=False):

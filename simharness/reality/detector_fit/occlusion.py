@@ -124,22 +124,20 @@ def occlusion_classes(joints: Floats, normals: Floats, unannotated: Floats, rig:
     return result
 
 
-def person_boxes(joints: Floats, rig: Rig, *, flesh: float = FLESH, crown: float = CROWN) -> Floats:
+def person_boxes(joints: Floats, rig: Rig) -> Floats:
     """Return the boxes x, y, width, height of people in the pictures, (T, V, P, 4); zeros where they are not visible.
 
     Args:
         joints: COCO-17, (T, P, 17, 3) metres; only limb joints are used.
         rig: the V cameras.
-        flesh: margin about every joint, metres.
-        crown: height of the crown above the shoulders, in lengths of the trunk.
     """
-    points = np.concatenate([joints[..., LIMB_JOINTS, :], head(joints, height=crown)[..., None, :]], axis=-2)
+    points = np.concatenate([joints[..., LIMB_JOINTS, :], head(joints, height=CROWN)[..., None, :]], axis=-2)
     result = []
     for camera in rig:
         pixels = camera.project(points)
         focal = np.sqrt(camera.K[0, 0] * camera.K[1, 1])
         with np.errstate(invalid="ignore", divide="ignore"):
-            around = (flesh * focal / camera.depth(points))[..., None]
+            around = (FLESH * focal / camera.depth(points))[..., None]
         limit = np.asarray(camera.size, float) - 1
         whole = np.all(np.isfinite(pixels), axis=(-1, -2))  # no box for people who are partly behind the camera
         low = np.clip(np.where(whole[..., None], (pixels - around).min(axis=-2), 0.0), 0, limit)

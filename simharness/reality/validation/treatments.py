@@ -151,16 +151,15 @@ KINDS: Mapping[str, TreatmentKind] = {
 """Kinds of treatments by key."""
 
 
-def treatments(*, draws: int, detection_draws: int = 1, seed: int = 0) -> list[Treatment]:
+def treatments(*, draws: int, detection_draws: int) -> list[Treatment]:
     """Return all treatments of a validation: every kind at every level, several times.
 
     Args:
         draws: number of draws of the errors of the calibration: of few cameras, so that each draw differs.
         detection_draws: number of draws of the errors of detections, which average over frames as well.
-        seed: seed of all draws.
     """
     return [
-        Treatment(key, level, draw, seed)
+        Treatment(key, level, draw)
         for key, kind in KINDS.items()
         for level in kind.levels
         for draw in range(draws if kind.calibration else detection_draws)

@@ -36,24 +36,20 @@ PCK_LIMIT = 0.1
 _UNCHANGED = Unchanged()
 
 
-def compare_variants(
-    evidence: Evidence, variants: Sequence[str], rules: Sequence[HeadRule] = RULES
-) -> dict[str, dict[str, dict[HeadRule, Compared]]]:
+def compare_variants(evidence: Evidence, variants: Sequence[str]) -> dict[str, dict[str, dict[HeadRule, Compared]]]:
     """Return all scores by variant, key of :data:`SCORES` and rule for the head."""
     return {
         name: {
-            key: {rule: evidence.compare(_figure(score, name, rule)) for rule in rules} for key, score in SCORES.items()
+            key: {rule: evidence.compare(_figure(score, name, rule)) for rule in RULES} for key, score in SCORES.items()
         }
         for name in variants
     }
 
 
-def compare_contrasts(
-    evidence: Evidence, variants: Sequence[str], rules: Sequence[HeadRule] = RULES
-) -> dict[tuple[str, str], dict[HeadRule, Compared]]:
+def compare_contrasts(evidence: Evidence, variants: Sequence[str]) -> dict[tuple[str, str], dict[HeadRule, Compared]]:
     """Return the PCP of one variant minus that of another, points, by pair of variants and rule for the head."""
     return {
-        (one, other): {rule: evidence.compare(_contrast(one, other, rule)) for rule in rules}
+        (one, other): {rule: evidence.compare(_contrast(one, other, rule)) for rule in RULES}
         for one, other in itertools.combinations(variants, 2)
     }
 
@@ -222,20 +218,19 @@ MOST = 40
 """Largest number of subsets of a camera count that are tried; of more, so many are drawn."""
 
 
-def camera_subsets(cameras: int, *, most: int = MOST, seed: int = 0) -> list[tuple[int, ...]]:
+def camera_subsets(cameras: int, *, most: int = MOST) -> list[tuple[int, ...]]:
     """Return the subsets of two cameras and more, smallest first; of counts with many subsets, a random sample.
 
     Args:
         cameras: number of cameras of the rig.
         most: largest number of subsets of a count; the same subsets are drawn for the same number of cameras.
-        seed: seed of the draws.
     """
     subsets: list[tuple[int, ...]] = []
     for count in range(2, cameras + 1):
         if math.comb(cameras, count) <= most:
             subsets += itertools.combinations(range(cameras), count)
             continue
-        generator, drawn = stream(seed, "validation", "subsets", cameras, count), set[tuple[int, ...]]()
+        generator, drawn = stream(0, "validation", "subsets", cameras, count), set[tuple[int, ...]]()
         while len(drawn) < most:
             drawn.add(tuple(sorted(generator.permutation(cameras)[:count].tolist())))
         subsets += sorted(drawn)

@@ -145,7 +145,7 @@ def judge_scores(
         for rule, figure in _published(figures):
             if {one, other} == {"full", "no-3dps"}:
                 yield near("no_3dps", f"no_3dps.{rule}", figure, bounds.no_3dps)
-            order = same_sign("order", f"order.{one}.{other}.{rule}", figure)
+            order = same_sign(f"order.{one}.{other}.{rule}", figure)
             if order is not None:
                 yield order
 
@@ -251,7 +251,7 @@ def at_least(group: str, name: str, rank: Interval, bound: float) -> BoundVerdic
     return BoundVerdict(group, name, float("nan"), rank.mean, f"≥ {bound:g}", state)
 
 
-def same_sign(group: str, name: str, contrast: Compared) -> BoundVerdict | None:
+def same_sign(name: str, contrast: Compared) -> BoundVerdict | None:
     """Return the verdict on the order of two variants, None where reality is not clear about it.
 
     Reality is clear where the interval of its contrast excludes 0; it is unclear whether twins have the same order
@@ -263,7 +263,7 @@ def same_sign(group: str, name: str, contrast: Compared) -> BoundVerdict | None:
     state = VerdictState.HOLDS
     if np.sign(twin.mean) != np.sign(real.mean):
         state = VerdictState.UNCLEAR if twin.low < 0 < twin.high else VerdictState.FAILS
-    return BoundVerdict(group, name, real.mean, twin.mean, "same sign", state)
+    return BoundVerdict("order", name, real.mean, twin.mean, "same sign", state)
 
 
 def _published(figures: Mapping[HeadRule, Compared]) -> Iterator[tuple[HeadRule, Compared]]:

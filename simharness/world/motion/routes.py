@@ -171,11 +171,11 @@ class Itinerary:
         del self._ramps[before[3] :], self._turns[before[4] :]
         return False
 
-    def route(self, presence: Presence = ALWAYS) -> Route:
+    def route(self) -> Route:
         """Return the route so far; before its start and after its end the person stands."""
         place, bearing = self._start
         ramps, turns = np.reshape(self._ramps, (-1, 4)), np.reshape(self._turns, (-1, 3))
-        return Route(place, bearing, self.speed, ramps.astype(float), turns.astype(float), presence)
+        return Route(place, bearing, self.speed, ramps.astype(float), turns.astype(float), ALWAYS)
 
 
 def _slowed(length: float, speed: float, seconds: float) -> tuple[list[tuple[float, float, float]], float]:

@@ -180,7 +180,7 @@ def make_gait(kinematics: Kinematics, *, speed: float, pace: float = 1.0, walk_r
     phase, swing = played.phase, played.phase >= FOOT_OFF
     ahead = played.print_x + stride * phase - played.lead
     progress = np.zeros(len(phase))
-    progress[swing] = pin_ends(phase[swing], ahead[swing] / stride, 0.0, 1.0)
+    progress[swing] = pin_ends(phase[swing], ahead[swing] / stride)
     hasted = np.minimum(FOOT_OFF + _HASTE * (phase - FOOT_OFF), 1.0)
     progress[swing] = PchipInterpolator(phase[swing], progress[swing])(hasted[swing])
     along = np.maximum(phase - FOOT_OFF, 0.0) / (1 - FOOT_OFF)
@@ -249,10 +249,10 @@ def flatten_stance(pitch: Floats, phase: Floats, *, down: float, up: float) -> F
     return np.where(phase < down, landing(np.minimum(phase, down)), rise * pitch)
 
 
-def pin_ends(x: Floats, y: Floats, first: float, last: float) -> Floats:
-    """Add a cubic to the curve ``y`` of ``x`` so that it has zero slope and given values at its ends."""
+def pin_ends(x: Floats, y: Floats) -> Floats:
+    """Add a cubic to the curve ``y`` of ``x`` so that it rises from 0 to 1 with zero slope at its ends."""
     slope = np.gradient(y, x)
-    fault = CubicSpline(x[[0, -1]], [y[0] - first, y[-1] - last], bc_type=((1, slope[0]), (1, slope[-1])))
+    fault = CubicSpline(x[[0, -1]], [y[0], y[-1] - 1.0], bc_type=((1, slope[0]), (1, slope[-1])))
     return y - fault(x)
 
 

@@ -140,7 +140,7 @@ def make_stride(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> G
     lead = float(np.mean(print_x[stance] + stride * phase[stance])) - _EARLY * stride
     progress = np.zeros(len(phase))
     ahead = (print_x + stride * phase - lead) / stride
-    progress[swing] = pin_ends(phase[swing], ahead[swing], 0.0, 1.0)
+    progress[swing] = pin_ends(phase[swing], ahead[swing])
     # A sine wave with two periods per stride, highest in flight. With the acceleration g at its top its amplitude would
     # be g / (4 pi frequency)²; the flight is short, so the amplitude is reduced.
     bob = _FLATTENED * _GRAVITY / (4 * np.pi * frequency) ** 2

@@ -128,8 +128,8 @@ def blend_angles(motion: Motion, on: ArrayLike, **degrees: ArrayLike) -> Motion:
     return Motion(motion.time, motion.root, angles)
 
 
-def look_ahead(motion: Motion, share: float = 0.35) -> Motion:
-    """Return the motion of a person who looks ahead: rotations of head and thorax are scaled by ``share``."""
+def look_ahead(motion: Motion) -> Motion:
+    """Return the motion of a person who looks ahead: rotations of head and thorax are scaled by 0.35."""
     angles = motion.angles.copy()
-    angles[:, [DOFS.index("neck_rotation"), DOFS.index("thorax_rotation")]] *= share
+    angles[:, [DOFS.index("neck_rotation"), DOFS.index("thorax_rotation")]] *= 0.35
     return Motion(motion.time, motion.root, angles)

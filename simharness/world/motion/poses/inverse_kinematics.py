@@ -76,7 +76,6 @@ def solve_standing(
     feet: Mapping[str, Foot],
     angles: Floats,
     *,
-    guess: Mapping[str, Floats] | None = None,
     straightest: float,
     fit: tuple[Pelvis, Mapping[str, Foot]] | None = None,
 ) -> Motion:
@@ -88,13 +87,12 @@ def solve_standing(
         pelvis: motion of the pelvis.
         feet: motion of the feet by side.
         angles: angles of the upper body, (T, D); the columns of the legs are overwritten.
-        guess: as for :func:`solve_legs`.
         straightest: smallest flexion of a knee, radians; it determines the height.
         fit: pelvis and feet to which the height is fitted, if it must not depend on ``time``: their whole cycle, or its
             extremes; None: ``pelvis`` and ``feet``.
     """
     height = highest_pelvis(kinematics, *(fit or (pelvis, feet)), straightest=straightest)
-    return solve_legs(kinematics, time, pelvis, height, feet, angles, guess=guess)
+    return solve_legs(kinematics, time, pelvis, height, feet, angles)
 
 
 def highest_pelvis(kinematics: Kinematics, pelvis: Pelvis, feet: Mapping[str, Foot], *, straightest: float) -> float:

@@ -98,7 +98,7 @@ def test_the_order_counts_where_reality_is_clear(low, high, twin, twin_width, st
     contrast = Compared(
         Interval((low + high) / 2, low, high, 1), Interval(twin, twin - twin_width, twin + twin_width, 9)
     )
-    verdict = same_sign("order", "order.a.b", contrast)
+    verdict = same_sign("order.a.b", contrast)
     assert (verdict and verdict.state) == state
 
 
