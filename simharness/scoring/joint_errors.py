@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
+from mvpose.skeleton import COCO17
 from simharness.scoring.score_registry import ScoreInfo, ScoreInput, finite_mean, score
 
 

@@ -58,7 +58,7 @@ class MovingSamples:
     @classmethod
     def from_meshes(cls, meshes: tuple[Mesh, ...]) -> "MovingSamples":
         """Return the samples of meshes in the order of their faces and vertices."""
-        of_vertex, of_face, corner_samples, group = (list[Any]() for _ in range(4))
+        of_vertex, of_face, corner_samples, group = _lists(4)
         spans, ranges = [], []
         vertices = faces = samples = parts = 0
         for mesh in meshes:
@@ -91,6 +91,10 @@ class MovingSamples:
             np.concatenate([empty, *group]).astype(np.int32),
             np.array(ranges, np.int64).reshape(-1, 2),
         )
+
+
+def _lists(count: int) -> tuple[list[NDArray], ...]:
+    return tuple([] for _ in range(count))
 
 
 @dataclass(frozen=True)
