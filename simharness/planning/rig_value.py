@@ -173,7 +173,7 @@ class RigValue:
 
     def maps(self, terms: Sequence[Floats]) -> Maps:
         """Return the figures of a set of cameras."""
-        return self._maps(self._sum(terms))
+        return self._maps(self._sum(terms), None)
 
     def value(self, terms: Sequence[Floats]) -> float:
         """Return the value of a set."""
