@@ -9,14 +9,4 @@ from mvpose.calibration.findings import Diagnosis, Finding
 from mvpose.calibration.repair import Repair, repair
 from mvpose.calibration.sightings import Sightings, gather
 
-__all__ = [
-    "Clocks",
-    "Diagnosis",
-    "Finding",
-    "Repair",
-    "Sightings",
-    "diagnose",
-    "estimate_clocks",
-    "gather",
-    "repair",
-]
+__all__ = ["Clocks", "Diagnosis", "Finding", "Repair", "Sightings", "diagnose", "estimate_clocks", "gather", "repair"]

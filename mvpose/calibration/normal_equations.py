@@ -22,13 +22,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Bools, Floats, Integers
-from mvpose.calibration.joint_elimination import (
-    PARAMETERS,
-    SightingArrays,
-    TriangulatedJoints,
-    accumulate,
-    triangulate,
-)
+from mvpose.calibration.joint_elimination import PARAMETERS, SightingArrays, TriangulatedJoints, accumulate, triangulate
 from mvpose.calibration.sightings import Sightings
 from mvpose.calibration.tracklets import frame_times
 from mvpose.camera import Camera

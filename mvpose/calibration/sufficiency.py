@@ -94,13 +94,7 @@ def travelled(places: Floats) -> float:
 
 
 def unknowns(
-    fit: CameraFit,
-    *,
-    seconds: float,
-    moved: float,
-    agreement: PairAgreement,
-    left_out: set[int],
-    names: Sequence[str],
+    fit: CameraFit, *, seconds: float, moved: float, agreement: PairAgreement, left_out: set[int], names: Sequence[str]
 ) -> list[Finding]:
     """Return what the recording does not determine.
 

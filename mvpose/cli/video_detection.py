@@ -14,11 +14,7 @@ from mvpose.commands.progress import single_stage
 from mvpose.files.atomic_files import open_manifest, set_aside, write_atomic
 from mvpose.files.input_files import parse_json, read_bytes
 from mvpose.formats.pictures import PictureSource
-from mvpose.networks.detector import (
-    PeopleFinder,
-    PeopleInPicture,
-    detect_people,
-)
+from mvpose.networks.detector import PeopleFinder, PeopleInPicture, detect_people
 from mvpose.networks.pose import PoseHead
 
 DETECT = "mvpose detect"

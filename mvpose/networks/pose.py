@@ -52,12 +52,7 @@ class PoseHead:
     """
 
     def __init__(
-        self,
-        model: str | Path | Session,
-        *,
-        skeleton: Skeleton = COCO17,
-        flip: bool = False,
-        likelihoods: bool = True,
+        self, model: str | Path | Session, *, skeleton: Skeleton = COCO17, flip: bool = False, likelihoods: bool = True
     ) -> None:
         self.session = as_session(model)
         self.skeleton, self.flip, self.likelihoods = skeleton, flip, likelihoods

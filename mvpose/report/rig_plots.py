@@ -45,11 +45,7 @@ def camera_from_above(axes: Axes, camera: Camera, *, color: Color = INK, reach: 
 
 
 def name_cameras(
-    axes: Axes,
-    cameras: Iterable[Camera],
-    *,
-    lines: Iterable[Floats] = (),
-    areas: Iterable[tuple[Floats, Floats]] = (),
+    axes: Axes, cameras: Iterable[Camera], *, lines: Iterable[Floats] = (), areas: Iterable[tuple[Floats, Floats]] = ()
 ) -> None:
     """Write the name of each camera behind it, or where it hides less.
 
@@ -113,11 +109,7 @@ class MapLabel:
 
 
 def write_labels(
-    axes: Axes,
-    labels: Sequence[MapLabel],
-    *,
-    lines: Iterable[Floats] = (),
-    areas: Iterable[tuple[Floats, Floats]] = (),
+    axes: Axes, labels: Sequence[MapLabel], *, lines: Iterable[Floats] = (), areas: Iterable[tuple[Floats, Floats]] = ()
 ) -> list[tuple[Floats, Floats]]:
     """Write labels beside their places, one after the other, each where it hides the least.
 

@@ -177,12 +177,7 @@ class ScenePictures:
     def _render(self, state: PlaybackState, camera: Camera, finer: int) -> Rgb:
         scene = self._playback.scene
         return antialiased(
-            self._renderer,
-            camera,
-            meshes_at(scene, state),
-            finer=finer,
-            lighting=scene.lighting,
-            mirrors=scene.mirrors,
+            self._renderer, camera, meshes_at(scene, state), finer=finer, lighting=scene.lighting, mirrors=scene.mirrors
         )
 
 

@@ -170,12 +170,7 @@ def _table(check: "GateResult", variant: str) -> "Table":
     from simharness.gate.gate_reports import allowed, difference, number, title
 
     table = Table(
-        title=variant,
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        show_edge=False,
-        padding=(0, 1, 0, 0),
+        title=variant, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0)
     )
     table.add_column("score", no_wrap=True)
     for column in ("now", "baseline", "difference\n(95 % interval)", "allowed"):

@@ -57,8 +57,7 @@ Head = Annotated[
     typer.Option(help="Rule that makes the head of Shelf's 14 joints from COCO-17; it changes PCP by one point."),
 ]
 SummaryFile = Annotated[
-    Path | None,
-    typer.Option("--json", metavar="FILE", help="Write the summary to this file as well.", dir_okay=False),
+    Path | None, typer.Option("--json", metavar="FILE", help="Write the summary to this file as well.", dir_okay=False)
 ]
 
 
@@ -107,11 +106,7 @@ def evaluate_recording(
             _estimator(name, lag=seconds, period=1.0)
         data = read_recording(recording, folder, head=head.value)
         pipelines = {name: _estimator(name, lag=seconds, period=1.0 / data.rate) for name in names}
-        with (
-            failing(),
-            reporter() as bars,
-            bars.stage("evaluate", len(data) * len(pipelines)) as advance,
-        ):
+        with failing(), reporter() as bars, bars.stage("evaluate", len(data) * len(pipelines)) as advance:
             evaluation = evaluate(data, pipelines, head=head.value, progress=lambda *_: advance(1))
         if json_file is not None:
             _write(evaluation.summary(), json_file, seeds=(), variants=pipelines, start=start)

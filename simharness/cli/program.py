@@ -75,12 +75,10 @@ BlameSeeds = Annotated[
     ),
 ]
 JsonFile = Annotated[
-    Path | None,
-    typer.Option("--json", metavar="FILE", help="Write all results to this file as well.", dir_okay=False),
+    Path | None, typer.Option("--json", metavar="FILE", help="Write all results to this file as well.", dir_okay=False)
 ]
 Workers = Annotated[
-    int,
-    typer.Option(metavar="N", min=1, max=1024, help="Processes that share the work; the results stay the same."),
+    int, typer.Option(metavar="N", min=1, max=1024, help="Processes that share the work; the results stay the same.")
 ]
 AllWorkers = Annotated[
     int | None,

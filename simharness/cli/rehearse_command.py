@@ -215,8 +215,7 @@ class RoomOptions:
 
 def plan(
     room: Annotated[
-        Path,
-        typer.Argument(help="A room file (TOML), or the name of a shipped room: [cyan]lab[/].", metavar="ROOM"),
+        Path, typer.Argument(help="A room file (TOML), or the name of a shipped room: [cyan]lab[/].", metavar="ROOM")
     ],
     options: RoomOptions,
     scenes: int = option(8, "Simulated scenes that confirm the plan; 0: none.", metavar="N", min=0, max=1000),

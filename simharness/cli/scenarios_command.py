@@ -51,11 +51,7 @@ def scenarios() -> None:
     console.print(f"\nFiles: {_relative(folder)}", soft_wrap=True, highlight=False, markup=False)
 
 
-def show(
-    scenario: ScenarioFile,
-    overrides: Overrides = None,
-    seed: Seed = None,
-) -> None:
+def show(scenario: ScenarioFile, overrides: Overrides = None, seed: Seed = None) -> None:
     """Print a scenario with all keys, defaults and descriptions, and what it needs; of a study also its trials."""
     with PROGRAM.exit_on_error():
         from simharness.scenario.file_model import MOST_TRIALS

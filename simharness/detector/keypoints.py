@@ -292,12 +292,7 @@ MIN_SCORE = 0.02
 def set_scores(block: DetectionBlock, context: Context) -> DetectionBlock:
     """Give every keypoint its score; a person without a scored keypoint is not detected."""
     scores = score_keypoints(
-        block.error,
-        block.guessed,
-        context.conditions,
-        context.config.scores,
-        context.config.correlation,
-        context.draws,
+        block.error, block.guessed, context.conditions, context.config.scores, context.config.correlation, context.draws
     )
     return replace(block, present=np.any(scores > 0, axis=-1), scores=scores)
 

@@ -176,10 +176,7 @@ class Prediction:
         where they are for a while, and so do the errors of the detector.
         """
         moments = _FIRST_MOMENTS + seconds / _MOMENT
-        return {
-            "pcp": _figure(self.person_pcp, moments),
-            "mpjpe_mm": _figure(self.person_error_mm, moments),
-        }
+        return {"pcp": _figure(self.person_pcp, moments), "mpjpe_mm": _figure(self.person_error_mm, moments)}
 
 
 def _prediction(scenes: StandingScenes, terms: Sequence[CameraTerms], made: "Reconstruction") -> Prediction:

@@ -47,10 +47,7 @@ class Figures:
         within = (prediction.pcp >= target.pcp) & (prediction.error_mm <= target.error)
         known = np.isfinite(prediction.pcp)
         return cls(
-            figures["pcp"],
-            figures["mpjpe_mm"],
-            100.0 * float(within[known].mean()),
-            float(prediction.pcp[known].min()),
+            figures["pcp"], figures["mpjpe_mm"], 100.0 * float(within[known].mean()), float(prediction.pcp[known].min())
         )
 
     def to_row(self) -> tuple[Any, ...]:

@@ -118,14 +118,7 @@ class _Work:
     """Steps of a plan; the result of each is kept in the ledger."""
 
     def __init__(
-        self,
-        room: Room,
-        count: int | None,
-        effort: PlanEffort,
-        *,
-        seed: int,
-        folder: Path | None,
-        reporter: Reporter,
+        self, room: Room, count: int | None, effort: PlanEffort, *, seed: int, folder: Path | None, reporter: Reporter
     ) -> None:
         self.room, self.count, self.effort, self.seed, self.reporter = room, count, effort, seed, reporter
         self.candidates = candidates_in(room, most=effort.candidates)
@@ -281,8 +274,7 @@ class _Work:
         results = []
         for k, each in enumerate(refined):
             figures = self.ledger.result(
-                f"judged {self.count} {self.effort.starts} {k}",
-                partial(self._figures_of, self._rig(each.candidates)),
+                f"judged {self.count} {self.effort.starts} {k}", partial(self._figures_of, self._rig(each.candidates))
             )
             results.append((each, Figures.of_row(figures)))
         return sorted(results, key=lambda pair: -self._objective(pair[1]))

@@ -231,12 +231,7 @@ def scenario_of(settings: SceneSettings, frame: SceneFrame, seed: int) -> Scenar
         "duration": settings.frames / settings.rate,
         "rate": settings.rate,
         "room": {"size": (reach, reach, 3.0), "walls": False},
-        "people": {
-            "count": settings.setup.people,
-            "area": half,
-            "activities": activities,
-            "spacing": _SPACINGS[0],
-        },
+        "people": {"count": settings.setup.people, "area": half, "activities": activities, "spacing": _SPACINGS[0]},
         "clutter": settings.setup.clutter,
         "rendering": {"renderer": "rays"},
     }

@@ -131,10 +131,7 @@ class SceneBatch:
 
 
 def simulate_scenes(
-    batches: Sequence[SceneBatch],
-    *,
-    workers: int = 1,
-    progress: Callable[[int], None] = lambda scenes: None,
+    batches: Sequence[SceneBatch], *, workers: int = 1, progress: Callable[[int], None] = lambda scenes: None
 ) -> list[list[SceneResult]]:
     """Simulate the scenes of batches, and score the method under every condition.
 

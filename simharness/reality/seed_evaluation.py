@@ -107,11 +107,7 @@ class SeedEvaluation:
 
 
 def evaluate_seeds(
-    scenario: Scenario,
-    count: int,
-    *,
-    head: HeadMapping = "voxelpose",
-    reporter: Reporter | None = None,
+    scenario: Scenario, count: int, *, head: HeadMapping = "voxelpose", reporter: Reporter | None = None
 ) -> SeedEvaluation:
     """Run and score a scenario at ``count`` seeds: its seed and the following ones, except where people do not fit.
 

@@ -48,11 +48,7 @@ def explain_all(
 
 
 def explain(
-    mistake: Mapping[str, Any],
-    origins: dict[tuple[str, ...], str],
-    file: str,
-    *,
-    root: type[BaseModel] = ScenarioFile,
+    mistake: Mapping[str, Any], origins: dict[tuple[str, ...], str], file: str, *, root: type[BaseModel] = ScenarioFile
 ) -> str:
     """Return one of pydantic's errors as "where: key: what was expected, what was given".
 
@@ -155,10 +151,7 @@ def _expected(mistake: Mapping[str, Any], location: tuple[str | int, ...], key: 
 
 
 def _wrong_length(
-    mistake: Mapping[str, Any],
-    location: tuple[str | int, ...],
-    origins: Mapping[Any, str],
-    root: type[BaseModel],
+    mistake: Mapping[str, Any], location: tuple[str | int, ...], origins: Mapping[Any, str], root: type[BaseModel]
 ) -> str:
     """Return the message about a list of fixed length that is too short or too long; "" for other mistakes."""
     if mistake["type"] == "missing" and location and isinstance(location[-1], int):

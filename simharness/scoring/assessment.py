@@ -98,11 +98,7 @@ def assess(recording: Recording, estimates: Sequence[Estimate], *, whole: WholeB
         | _time_scores(summary)
     )
     return Assessment(
-        scores,
-        _frame_table(recording, variant, groups),
-        _people_table(recording, variant, errors),
-        errors,
-        variant,
+        scores, _frame_table(recording, variant, groups), _people_table(recording, variant, errors), errors, variant
     )
 
 

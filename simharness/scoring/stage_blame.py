@@ -103,10 +103,7 @@ def blame(
 
 
 def blame_frames(
-    recording: Recording,
-    estimator: Estimator,
-    estimates: Sequence[Estimate],
-    input_of: Callable[[int], Detections],
+    recording: Recording, estimator: Estimator, estimates: Sequence[Estimate], input_of: Callable[[int], Detections]
 ) -> Iterator[Blamed]:
     """Find failures and the stage to blame frame by frame, because heat maps of all frames are large.
 

@@ -32,11 +32,7 @@ class BreakingPoint:
 
 
 def breaking_point(
-    values: ArrayLike,
-    scores: ArrayLike,
-    threshold: float,
-    *,
-    better: Literal["higher", "lower"],
+    values: ArrayLike, scores: ArrayLike, threshold: float, *, better: Literal["higher", "lower"]
 ) -> BreakingPoint:
     """Return the value of a factor at which the mean score over scenes becomes worse than a threshold.
 
@@ -104,10 +100,7 @@ def _ends(values: Floats, margin: Floats) -> tuple[float | None, float | None]:
     if below.all():  # before the first
         return None, None
     first, last = int(np.argmin(above)), len(at) - 1 - int(np.argmin(below[::-1]))
-    return (
-        _between(at, low, first - 1) if above[0] else None,
-        _between(at, high, last) if below[-1] else None,
-    )
+    return (_between(at, low, first - 1) if above[0] else None, _between(at, high, last) if below[-1] else None)
 
 
 def _between(at: Floats, end: Floats, before: int) -> float:

@@ -198,8 +198,7 @@ def tables(rows: Sequence[tuple[PlannedTrial, Entry]], factors: Sequence[str]) -
     """
     entries = {(entry.trial, entry.variant): entry for _, entry in rows}  # several settings may share a trial
     return Tables(
-        _trials(rows, factors),
-        *(_joined(entries.values(), name) for name in ("frames", "people", "failures")),
+        _trials(rows, factors), *(_joined(entries.values(), name) for name in ("frames", "people", "failures"))
     )
 
 

@@ -102,10 +102,7 @@ def truth_of(arrays: Arrays, frame: NDArray[np.int64]) -> tuple[Truth, ...]:
         frame: frame of each detection, (n,).
     """
     return tuple(
-        Truth(
-            **{key: arrays[key][index] for key in _OF_FRAMES},
-            **{key: arrays[key][rows] for key in _OF_ERRORS},
-        )
+        Truth(**{key: arrays[key][index] for key in _OF_FRAMES}, **{key: arrays[key][rows] for key in _OF_ERRORS})
         for index, rows in enumerate(rows_of_frames(frame, len(arrays["time"])))
     )
 

@@ -125,10 +125,7 @@ class SceneGeometry:
     def normals(self) -> tuple[Floats, Floats]:
         """Normals of the faces, (k, 3), and of the vertices, (n, 3)."""
         of_faces, of_vertices = self._moving_normals
-        return (
-            np.concatenate([self.still.normals[0], of_faces]),
-            np.concatenate([self.still.normals[1], of_vertices]),
-        )
+        return (np.concatenate([self.still.normals[0], of_faces]), np.concatenate([self.still.normals[1], of_vertices]))
 
     @cached_property
     def faces(self) -> FaceArrays:

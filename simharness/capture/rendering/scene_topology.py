@@ -128,14 +128,7 @@ class SceneTopology:
     def face_arrays(self, face_normals: Floats, vertex_normals: Floats) -> FaceArrays:
         """Return the faces as the shading kernels take them, with normals (k, 3) and (n, 3)."""
         return FaceArrays(
-            self.faces,
-            self.colors,
-            self.smooth,
-            face_normals,
-            vertex_normals,
-            self.texture,
-            self.uv,
-            *self.pyramids,
+            self.faces, self.colors, self.smooth, face_normals, vertex_normals, self.texture, self.uv, *self.pyramids
         )
 
     @cached_property

@@ -106,10 +106,7 @@ def _command(record: Record) -> str:
 def _parts_table(variants: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the table of PCP: a row for each group of parts, a number for each variant."""
     rows = [
-        {
-            "part": group.replace("_", " "),
-            "values": [scores["pcp_parts"][group] for scores in variants.values()],
-        }
+        {"part": group.replace("_", " "), "values": [scores["pcp_parts"][group] for scores in variants.values()]}
         for group in GROUPS
     ]
     return [*rows, {"part": "all", "values": [scores["pcp"] for scores in variants.values()]}]

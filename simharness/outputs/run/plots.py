@@ -131,14 +131,7 @@ def floor_plan(
         for camera in rig:
             camera_from_above(axes, camera)
         for person in range(paths.shape[1]):
-            axes.plot(
-                *paths[:, person].T,
-                color=colors[person],
-                lw=2.2,
-                alpha=0.55,
-                solid_capstyle="round",
-                zorder=3,
-            )
+            axes.plot(*paths[:, person].T, color=colors[person], lw=2.2, alpha=0.55, solid_capstyle="round", zorder=3)
             axes.plot(*paths[-1, person], "o", ms=5, color=colors[person], zorder=4, label=f"person {person}")
         if len(estimates):
             axes.plot(*estimates.T, ".", ms=2.2, color=svg_plots.INK, mew=0, zorder=5)

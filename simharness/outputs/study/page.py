@@ -313,11 +313,7 @@ def _times(results: Results, variants: Sequence[str]) -> dict[str, Any]:
         spread[variant] = times.to_numpy()
         if len(times):
             rows.append((variant, [f"{times.quantile(share):.2f}" for share in (0.5, 0.9, 0.99, 1.0)]))
-    return {
-        "stages": Markup(stage_times(stages)),
-        "spread": Markup(plots.time_distribution(spread)),
-        "rows": rows,
-    }
+    return {"stages": Markup(stage_times(stages)), "spread": Markup(plots.time_distribution(spread)), "rows": rows}
 
 
 def _machine(machine: Any) -> str:

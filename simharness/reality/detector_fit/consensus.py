@@ -98,12 +98,7 @@ def find_consensus(rig: Rig, keypoints: Floats, unit: Floats) -> Consensus:
         size = np.where(agrees, (unit * _depth(lines, joints) / focal) ** 2, 0.0).sum(axis=-1) / agrees.sum(axis=-1)
     joints[few], variance[few], size[few] = np.nan, np.nan, np.nan
     return Consensus(
-        joints,
-        np.moveaxis(agrees, -1, 1),
-        np.moveaxis(predicted, -2, 1),
-        np.moveaxis(noise, -1, 1),
-        variance,
-        size,
+        joints, np.moveaxis(agrees, -1, 1), np.moveaxis(predicted, -2, 1), np.moveaxis(noise, -1, 1), variance, size
     )
 
 

@@ -221,10 +221,7 @@ def _moved(detections: Detections, place: Floats, size: Floats, *, mirrored: boo
         keypoints = np.stack([2 * box[0] + box[2] - keypoints[..., 0], keypoints[..., 1]], axis=-1)
     corner = place * np.maximum(size - box[2:], 0.0)
     return replace(
-        detections,
-        keypoints=keypoints + (corner - box[:2]),
-        scores=scores,
-        boxes=np.array([[*corner, *box[2:]]]),
+        detections, keypoints=keypoints + (corner - box[:2]), scores=scores, boxes=np.array([[*corner, *box[2:]]])
     )
 
 

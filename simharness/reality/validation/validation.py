@@ -327,9 +327,7 @@ def predict_halves(
     for which, name in enumerate(_HALVES):
         other = fits[1 - which]
         model = replace(
-            TwinModel.of_fit(parts[which], fits[which]),
-            detector=other.profile,
-            annotation=other.annotation.of_detected,
+            TwinModel.of_fit(parts[which], fits[which]), detector=other.profile, annotation=other.annotation.of_detected
         )
         twins = simulate_twins(model, count=count, reporter=reporter)
         compared = validate(

@@ -197,11 +197,7 @@ def _response(evidence: Evidence, treatments: Sequence[Treatment], variant: str)
 
 
 def _change(
-    treatment: Treatment,
-    variant: str,
-    score: Callable[[ScoreSums, HeadRule], Floats],
-    sign: float,
-    rule: HeadRule,
+    treatment: Treatment, variant: str, score: Callable[[ScoreSums, HeadRule], Floats], sign: float, rule: HeadRule
 ) -> Figure:
     """Return the figure of a score with the treatment minus without, times a sign."""
     return lambda sums: sign * (score(sums[treatment][variant], rule) - score(sums[_UNCHANGED][variant], rule))

@@ -21,10 +21,7 @@ _TEETH, _THROAT = (0.80, 0.77, 0.71), (0.17, 0.06, 0.06)
 _LINE, _LINE_SHADE = 0.0013, 0.45  # half the height of the line between the lips, metres, and the factor of its colour
 _INNER, _DEEP = 0.0035, 0.005  # half the height of the inner side of the lips, and how far its middle comes forward
 _WIDE = 0.022  # half the width of a mouth, metres
-_CREASE, _CREASE_SHADE = (
-    0.0035,
-    0.80,
-)  # half the width of creases in skin, metres, and the factor of their middle
+_CREASE, _CREASE_SHADE = (0.0035, 0.80)  # half the width of creases in skin, metres, and the factor of their middle
 _LID, _LID_SHADE = 0.005, 0.72  # height of the shadow of the upper lid on the eye, metres
 
 

@@ -80,12 +80,7 @@ def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     feet = {
         back: foot_path(kinematics, spot, time, back_print, pitch=pitch),
         front: foot_path(
-            kinematics,
-            spot,
-            u,
-            front_print,
-            [(PEELING, stepped, lunge), (up + 0.1, home, front_print)],
-            lift=0.09,
+            kinematics, spot, u, front_print, [(PEELING, stepped, lunge), (up + 0.1, home, front_print)], lift=0.09
         ),
     }
     curves = timing.relaxed_posture(time, rng)

@@ -253,12 +253,7 @@ def _embrace(
     """Return the motion with both arms closed around the other person, palms on the back."""
     hold = _HOLDS[role]
     opened = course.open(u)
-    motion = blend_angles(
-        motion,
-        opened,
-        **_OPEN[role],
-        **limbs(forearm_pronation=10.0, wrist_flexion=0.0),
-    )
+    motion = blend_angles(motion, opened, **_OPEN[role], **limbs(forearm_pronation=10.0, wrist_flexion=0.0))
     if role == "over":  # outside the other's arms, which rise at the same time
         out = _DETOUR * 4 * opened * (1 - opened)
         motion = offset_angles(motion, left_shoulder_abduction=out, right_shoulder_abduction=out)

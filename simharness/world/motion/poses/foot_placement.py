@@ -130,22 +130,13 @@ def hip_position(kinematics: Kinematics, *, shank: ArrayLike, thigh: ArrayLike, 
     shank, thigh, pitch = np.broadcast_arrays(*(np.asarray(x, float) for x in (shank, thigh, pitch)))
     ahead, height = kinematics.rolling.at(pitch)
     return np.stack(
-        [
-            ahead + lower * np.sin(shank) - upper * np.sin(thigh),
-            height + lower * np.cos(shank) + upper * np.cos(thigh),
-        ],
+        [ahead + lower * np.sin(shank) - upper * np.sin(thigh), height + lower * np.cos(shank) + upper * np.cos(thigh)],
         axis=-1,
     )
 
 
 def pelvis_from_hips(
-    kinematics: Kinematics,
-    spot: Spot,
-    hip: Floats,
-    *,
-    lean: Floats,
-    aside: ArrayLike = 0.0,
-    bearing: ArrayLike = 0.0,
+    kinematics: Kinematics, spot: Spot, hip: Floats, *, lean: Floats, aside: ArrayLike = 0.0, bearing: ArrayLike = 0.0
 ) -> tuple[Pelvis, Floats]:
     """Return the pelvis with the hips at positions (T, 2), ahead and up in the spot's frame, and its height (T,).
 

@@ -281,12 +281,7 @@ _RISE = 1.5
 
 
 def follow_shank(
-    kinematics: Kinematics,
-    side: str,
-    pelvis: Pelvis,
-    height: Floats,
-    pitch: Floats,
-    foot: Callable[[Floats], Foot],
+    kinematics: Kinematics, side: str, pelvis: Pelvis, height: Floats, pitch: Floats, foot: Callable[[Floats], Foot]
 ) -> Floats:
     """Return the pitch of a foot whose heel rises as the shank leans over it, (T,) radians.
 

@@ -209,9 +209,7 @@ class MotionServos:
         self._strength = np.concatenate([person.strength for person in self.people])
         self.data = mujoco.MjData(self.model)
         self._inverse_dynamics = InverseDynamics(
-            self.model,
-            [person.root_dofs for person in self.people],
-            [person.hinge_dofs for person in self.people],
+            self.model, [person.root_dofs for person in self.people], [person.hinge_dofs for person in self.people]
         )
 
     def run(self) -> Iterator[Floats]:

@@ -101,12 +101,7 @@ class Furnishing:
         return self
 
     def part(
-        self,
-        mesh: Mesh,
-        material: Material = "plain",
-        *,
-        center: Sequence[float] = (0.0, 0.0, 0.0),
-        yaw: float = 0.0,
+        self, mesh: Mesh, material: Material = "plain", *, center: Sequence[float] = (0.0, 0.0, 0.0), yaw: float = 0.0
     ) -> Self:
         """Add a mesh of one material, turned by a yaw, then moved to ``center``.
 
