@@ -19,6 +19,7 @@ from simharness.scenario.sections.section import (
     Point,
     Section,
     Spread,
+    key,
 )
 
 Name = Annotated[str, Field(min_length=1, max_length=60)]
@@ -35,53 +36,49 @@ Millimetres = Annotated[float, Field(gt=0.0, le=1000.0)]
 class ShapeKeys(Section):
     """[room]: the floor and the height."""
 
-    size: Annotated[tuple[Length, Length, Length], Elements(("x", "y", "z"))] | None = Field(
-        None, description="a box around the origin: x, y, z in metres"
+    size: Annotated[tuple[Length, Length, Length], Elements(("x", "y", "z"))] | None = key(
+        None, "a box around the origin: x, y, z in metres"
     )
-    outline: Outline = Field((), description="instead of size: corners of the floor in order, metres")
-    height: Length = Field(3.0, description="height of a room that is given by its outline, metres")
+    outline: Outline = key((), "instead of size: corners of the floor in order, metres")
+    height: Length = key(3.0, "height of a room that is given by its outline, metres")
 
 
 class VolumeKeys(Section):
     """[volume]: where people will be. By default the floor, 0.5 m from the walls."""
 
-    size: Annotated[tuple[Length, Length], Elements(("x", "y"))] | None = Field(
-        None, description="a rectangle around center: x, y in metres"
+    size: Annotated[tuple[Length, Length], Elements(("x", "y"))] | None = key(
+        None, "a rectangle around center: x, y in metres"
     )
-    center: Corner = Field((0.0, 0.0), description="centre of the rectangle, metres")
-    outline: Outline = Field((), description="instead of size: corners in order, metres")
-    height: Annotated[float, Field(ge=0.5, le=5.0)] = Field(2.0, description="height that people reach, metres")
+    center: Corner = key((0.0, 0.0), "centre of the rectangle, metres")
+    outline: Outline = key((), "instead of size: corners in order, metres")
+    height: Annotated[float, Field(ge=0.5, le=5.0)] = key(2.0, "height that people reach, metres")
 
 
 class WallPlaces(Section):
     """[places.walls]: cameras on the walls."""
 
-    heights: Heights = Field((1.0, 2.8), description="lowest and highest camera, metres")
-    clearance: Annotated[float, Field(ge=0.0, le=2.0)] = Field(
-        0.15, description="distance of a camera from its wall, metres"
-    )
-    walls: tuple[Annotated[int, Field(ge=0, lt=100)], ...] = Field(
+    heights: Heights = key((1.0, 2.8), "lowest and highest camera, metres")
+    clearance: Annotated[float, Field(ge=0.0, le=2.0)] = key(0.15, "distance of a camera from its wall, metres")
+    walls: tuple[Annotated[int, Field(ge=0, lt=100)], ...] = key(
         (),
-        max_length=100,
-        description="walls that may be used: wall 0 begins at the first corner of the outline; of a box they are the "
+        "walls that may be used: wall 0 begins at the first corner of the outline; of a box they are the "
         "walls at -y, +x, +y and -x; empty: all",
+        max_length=100,
     )
 
 
 class CeilingPlaces(Section):
     """[places.ceiling]: cameras under the ceiling, or on a truss below it."""
 
-    drop: Annotated[float, Field(ge=0.0, le=50.0)] = Field(
-        0.2, description="distance of a camera below the ceiling, metres"
-    )
-    outline: Outline = Field((), description="part of the ceiling: corners in order, metres; empty: all")
+    drop: Annotated[float, Field(ge=0.0, le=50.0)] = key(0.2, "distance of a camera below the ceiling, metres")
+    outline: Outline = key((), "part of the ceiling: corners in order, metres; empty: all")
 
 
 class TripodPlaces(Section):
     """[[places.tripods]]: an area where tripods may stand."""
 
-    outline: Outline = Field((), description="corners of the area in order, metres; empty: the whole floor")
-    heights: Heights = Field((1.2, 2.2), description="lowest and highest camera, metres")
+    outline: Outline = key((), "corners of the area in order, metres; empty: the whole floor")
+    heights: Heights = key((1.2, 2.2), "lowest and highest camera, metres")
 
 
 class PlacesKeys(Section):
@@ -89,17 +86,17 @@ class PlacesKeys(Section):
 
     walls: WallPlaces | None = None
     ceiling: CeilingPlaces | None = None
-    tripods: tuple[TripodPlaces, ...] = Field((), max_length=20, description="areas for tripods")
+    tripods: tuple[TripodPlaces, ...] = key((), "areas for tripods", max_length=20)
 
 
 class ObstacleKeys(Section):
     """[[obstacles]]: a box that hides people and where no camera is."""
 
-    name: str = Field("", max_length=60, description="name in pictures and messages")
+    name: str = key("", "name in pictures and messages", max_length=60)
     center: Corner = Field(description="centre on the floor, metres")
     size: Annotated[tuple[Length, Length, Length], Elements(("x", "y", "z"))] = Field(description="x, y, z in metres")
-    base: Spread = Field(0.0, description="height of its lower side above the floor, metres")
-    yaw: float = Field(0.0, ge=-360.0, le=360.0, description="rotation about the vertical, degrees")
+    base: Spread = key(0.0, "height of its lower side above the floor, metres")
+    yaw: float = key(0.0, "rotation about the vertical, degrees", ge=-360.0, le=360.0)
 
 
 class DoorKeys(Section):
@@ -113,79 +110,70 @@ class LensKeys(Section):
     """[[lenses]]: a camera with its lens, by its field of view or by focal length and sensor."""
 
     name: Name = "camera"
-    size: Annotated[tuple[Pixels, Pixels], Elements(("width", "height"))] = Field(
-        (1920, 1080), description="width, height in pixels"
+    size: Annotated[tuple[Pixels, Pixels], Elements(("width", "height"))] = key((1920, 1080), "width, height in pixels")
+    fov: Annotated[float, Field(gt=1.0, lt=170.0)] | None = key(
+        None, "horizontal field of view, degrees; 75 where no focal length is given"
     )
-    fov: Annotated[float, Field(gt=1.0, lt=170.0)] | None = Field(
-        None, description="horizontal field of view, degrees; 75 where no focal length is given"
+    focal: Annotated[float, Field(gt=0.1, le=1000.0)] | None = key(None, "instead of fov: focal length, millimetres")
+    sensor: Annotated[float, Field(gt=0.5, le=100.0)] | None = key(None, "with focal: width of the sensor, millimetres")
+    distortion: Annotated[tuple[Term, Term, Term, Term, Term], Elements(("k1", "k2", "p1", "p2", "k3"))] = key(
+        (0.0, 0.0, 0.0, 0.0, 0.0), "lens distortion in OpenCV's order: k1, k2, p1, p2, k3"
     )
-    focal: Annotated[float, Field(gt=0.1, le=1000.0)] | None = Field(
-        None, description="instead of fov: focal length, millimetres"
-    )
-    sensor: Annotated[float, Field(gt=0.5, le=100.0)] | None = Field(
-        None, description="with focal: width of the sensor, millimetres"
-    )
-    distortion: Annotated[tuple[Term, Term, Term, Term, Term], Elements(("k1", "k2", "p1", "p2", "k3"))] = Field(
-        (0.0, 0.0, 0.0, 0.0, 0.0), description="lens distortion in OpenCV's order: k1, k2, p1, p2, k3"
-    )
-    turned: bool = Field(False, description="may also hang turned by 90 degrees, with pictures in portrait format")
-    cost: Annotated[float, Field(ge=0.0, le=1e6)] = Field(1.0, description="cost, in any unit, for cameras.budget")
+    turned: bool = key(False, "may also hang turned by 90 degrees, with pictures in portrait format")
+    cost: Annotated[float, Field(ge=0.0, le=1e6)] = key(1.0, "cost, in any unit, for cameras.budget")
 
 
 class CameraKeys(Section):
     """[cameras]: how many, of which kind, and how far from other things."""
 
-    count: Annotated[int, Field(ge=0, le=MOST_CAMERAS)] | None = Field(
-        None, description="number of cameras, fixed ones included; --cameras replaces it"
+    count: Annotated[int, Field(ge=0, le=MOST_CAMERAS)] | None = key(
+        None, "number of cameras, fixed ones included; --cameras replaces it"
     )
-    wall: Range = Field((0, MOST_CAMERAS), description="least and largest number on walls")
-    ceiling: Range = Field((0, MOST_CAMERAS), description="least and largest number under the ceiling")
-    tripod: Range = Field((0, MOST_CAMERAS), description="least and largest number on tripods")
-    budget: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(
-        None, description="largest sum of the costs of the lenses; without count: as many cameras as it buys"
+    wall: Range = key((0, MOST_CAMERAS), "least and largest number on walls")
+    ceiling: Range = key((0, MOST_CAMERAS), "least and largest number under the ceiling")
+    tripod: Range = key((0, MOST_CAMERAS), "least and largest number on tripods")
+    budget: Annotated[float, Field(gt=0.0, le=1e9)] | None = key(
+        None, "largest sum of the costs of the lenses; without count: as many cameras as it buys"
     )
-    spacing: Spread = Field(0.5, description="smallest distance between two cameras, metres")
-    from_people: Spread = Field(
-        0.3, description="smallest distance on the floor from the volume, of cameras that people could touch, metres"
+    spacing: Spread = key(0.5, "smallest distance between two cameras, metres")
+    from_people: Spread = key(
+        0.3, "smallest distance on the floor from the volume, of cameras that people could touch, metres"
     )
-    from_walls: Annotated[float, Field(ge=0.0, le=5.0)] = Field(
-        0.1, description="smallest distance from the other walls and from obstacles, metres"
+    from_walls: Annotated[float, Field(ge=0.0, le=5.0)] = key(
+        0.1, "smallest distance from the other walls and from obstacles, metres"
     )
 
 
 class FixedKeys(Section):
     """[[fixed]]: a camera that hangs already; the plan adds the others."""
 
-    name: str = Field("", max_length=60, description="name of the camera")
+    name: str = key("", "name of the camera", max_length=60)
     position: Point = Field(description="position, metres")
     aim: Point = Field(description="point at which it looks, metres")
-    lens: str = Field("", description="name of its lens; empty: the first one")
+    lens: str = key("", "name of its lens; empty: the first one")
 
 
 class PeopleKeys(Section):
     """[people]: the people whom the cameras have to see."""
 
-    count: Annotated[int, Field(ge=1, le=40)] = Field(4, description="number of people in the volume at a time")
+    count: Annotated[int, Field(ge=1, le=40)] = key(4, "number of people in the volume at a time")
 
 
 class TargetKeys(Section):
     """[target]: what a place has to reach to count."""
 
-    pcp: Percent = Field(95.0, description="least PCP, percent")
-    error: Millimetres = Field(40.0, description="largest expected error of joints, millimetres")
+    pcp: Percent = key(95.0, "least PCP, percent")
+    error: Millimetres = key(40.0, "largest expected error of joints, millimetres")
 
 
 class ObjectiveKeys(Section):
     """[objective]: what the search maximises."""
 
-    kind: Literal["share", "mean", "worst"] = Field(
+    kind: Literal["share", "mean", "worst"] = key(
         "share",
-        description="share: share of the volume within the target; mean: mean PCP of its places; worst: least PCP of "
-        "any place",
+        "share: share of the volume within the target; mean: mean PCP of its places; worst: least PCP of any place",
     )
-    failing: Count = Field(
-        0, description="number of cameras that may fail: the value counts after the worst such failure"
-    )
+    failing: Count = key(0, "number of cameras that may fail: the value counts after the worst such failure")
 
 
 class RoomKeys(Section):
@@ -193,22 +181,20 @@ class RoomKeys(Section):
 
     model_config = ConfigDict(title="a room")
 
-    name: str = Field("", max_length=60, description="name of the room; by default that of the file")
-    description: str = Field("", max_length=500, description="one line for lists")
+    name: str = key("", "name of the room; by default that of the file", max_length=60)
+    description: str = key("", "one line for lists", max_length=500)
     room: ShapeKeys = ShapeKeys()
     volume: VolumeKeys = VolumeKeys()
     places: PlacesKeys = PlacesKeys()
-    obstacles: tuple[ObstacleKeys, ...] = Field((), max_length=200, description="boxes that stand in the room")
-    doors: tuple[DoorKeys, ...] = Field((), max_length=50, description="doors")
-    lenses: tuple[LensKeys, ...] = Field(
-        (LensKeys(),), min_length=1, max_length=20, description="cameras and lenses to choose from"
-    )
+    obstacles: tuple[ObstacleKeys, ...] = key((), "boxes that stand in the room", max_length=200)
+    doors: tuple[DoorKeys, ...] = key((), "doors", max_length=50)
+    lenses: tuple[LensKeys, ...] = key((LensKeys(),), "cameras and lenses to choose from", min_length=1, max_length=20)
     cameras: CameraKeys = CameraKeys()
-    fixed: tuple[FixedKeys, ...] = Field((), max_length=MOST_CAMERAS, description="cameras that hang already")
+    fixed: tuple[FixedKeys, ...] = key((), "cameras that hang already", max_length=MOST_CAMERAS)
     people: PeopleKeys = PeopleKeys()
-    clutter: ClutterSection = Field(
-        ClutterSection(), description="objects that the simulator places around the people, in the simulation alone"
+    clutter: ClutterSection = key(
+        ClutterSection(), "objects that the simulator places around the people, in the simulation alone"
     )
-    detector: str = Field("typical", description="detector profile: a name in scenarios/detectors, or a TOML file")
+    detector: str = key("typical", "detector profile: a name in scenarios/detectors, or a TOML file")
     target: TargetKeys = TargetKeys()
     objective: ObjectiveKeys = ObjectiveKeys()

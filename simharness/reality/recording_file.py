@@ -29,7 +29,7 @@ from mvpose.formats.people.people_formats import readable
 from mvpose.recording import People
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording, DetectorKind
-from simharness.scenario.sections.section import Section
+from simharness.scenario.sections.section import Section, key
 from simharness.scenario.shipped import shipped_folder
 from simharness.scenario.toml_files import read_toml
 from simharness.scenario.validation_messages import explain_all
@@ -85,9 +85,9 @@ def _pairs(value: Any) -> Any:
 class DeclaredSkeleton(Section):
     """Skeleton of a file: the names of its joints in their order, and ours for some of them."""
 
-    joints: tuple[Name, ...] = Field((), description="names of the joints, in the order of the file")
-    map: dict[str, Name] = Field({}, description="joints whose name is not ours: ours = theirs")
-    name: str = Field("declared", description="name in messages")
+    joints: tuple[Name, ...] = key((), "names of the joints, in the order of the file")
+    map: dict[str, Name] = key({}, "joints whose name is not ours: ours = theirs")
+    name: str = key("declared", "name in messages")
 
     def joint_names(self, names: JointNames | None) -> JointNames:
         """Return the joints of a file.
@@ -111,22 +111,22 @@ class CalibrationKeys(Section):
     """[calibration] of a recording."""
 
     file: Name = Field(description="calibration file of any format that is read")
-    size: Annotated[tuple[tuple[int, int], ...], BeforeValidator(_pairs)] = Field(
-        (), description="width and height of the images, pixels, or one pair for each camera"
+    size: Annotated[tuple[tuple[int, int], ...], BeforeValidator(_pairs)] = key(
+        (), "width and height of the images, pixels, or one pair for each camera"
     )
-    cameras: tuple[str, ...] = Field((), description="names of the cameras to take, in this order; all by default")
+    cameras: tuple[str, ...] = key((), "names of the cameras to take, in this order; all by default")
 
 
 class DetectionKeys(Section):
     """[detections] of a recording."""
 
-    format: Annotated[str, _one_of(lambda: DETECTION_FORMATS)] = Field(
-        "", description="format of the detections; by default recognised by their content"
+    format: Annotated[str, _one_of(lambda: DETECTION_FORMATS)] = key(
+        "", "format of the detections; by default recognised by their content"
     )
     path: Name = Field(description="folder of the detections, with a folder or file for each camera")
-    first: Whole = Field(0, description="frame number of the first picture of each camera; not of COCO results")
-    skeleton: SkeletonKey | None = Field(None, description="skeleton of the detections")
-    kind: DetectorKind = Field("bottom-up", description="kind of the detector")
+    first: Whole = key(0, "frame number of the first picture of each camera; not of COCO results")
+    skeleton: SkeletonKey | None = key(None, "skeleton of the detections")
+    kind: DetectorKind = key("bottom-up", "kind of the detector")
 
 
 class TruthKeys(Section):
@@ -136,12 +136,10 @@ class TruthKeys(Section):
     file: Annotated[tuple[Name, ...], BeforeValidator(_listed)] = Field(
         min_length=1, description="file (of Panoptic the folder), or a list with a file for each person"
     )
-    skeleton: SkeletonKey | None = Field(None, description="skeleton of the true joints")
-    actors: tuple[Whole, ...] | None = Field(None, description="people whose PCP is averaged; all by default")
-    first: Whole | None = Field(
-        None, description="frame number of the first frame of the file; by default as the file says"
-    )
-    up: Literal["z", "y"] = Field("z", description="axis that points up in TRC, C3D, npz and table files")
+    skeleton: SkeletonKey | None = key(None, "skeleton of the true joints")
+    actors: tuple[Whole, ...] | None = key(None, "people whose PCP is averaged; all by default")
+    first: Whole | None = key(None, "frame number of the first frame of the file; by default as the file says")
+    up: Literal["z", "y"] = key("z", "axis that points up in TRC, C3D, npz and table files")
 
 
 class RecordingKeys(Section):
@@ -149,7 +147,7 @@ class RecordingKeys(Section):
 
     model_config = ConfigDict(title="a recording")
 
-    name: str = Field("", description="name of the recording; by default that of the file")
+    name: str = key("", "name of the recording; by default that of the file")
     rate: float = Field(gt=0.0, le=1000.0, description="frames per second, Hz")
     frames: Annotated[tuple[tuple[Whole, Whole], ...], BeforeValidator(_pairs)] = Field(
         min_length=1, description="ranges of frame numbers, [first, last], both included"

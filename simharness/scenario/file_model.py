@@ -11,6 +11,7 @@ from simharness.scenario.sections.cameras_section import CamerasSection, SensorS
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.sections.section import key
 
 MOST_TRIALS = 1_000_000
 """Largest number of trials of a study, and of its seeds."""
@@ -21,18 +22,17 @@ Seed = Annotated[int, Field(ge=0, lt=2**53)]
 class CamerasFileSection(CamerasSection):
     """[cameras] of a file."""
 
-    rig: str = Field(
-        "",
-        description="rig with which the section begins: a name in scenarios/rigs, or a TOML file; other keys change it",
+    rig: str = key(
+        "", "rig with which the section begins: a name in scenarios/rigs, or a TOML file; other keys change it"
     )
 
 
 class SensorFileSection(SensorSection):
     """[sensor] of a file."""
 
-    profile: str = Field(
+    profile: str = key(
         "machine-vision",
-        description="sensor profile with which the section begins: a name in scenarios/sensors, or a TOML file; other "
+        "sensor profile with which the section begins: a name in scenarios/sensors, or a TOML file; other "
         "keys change it; perfect: the pictures as rendered",
     )
 
@@ -40,9 +40,9 @@ class SensorFileSection(SensorSection):
 class DetectorFileSection(DetectorSection):
     """[detector] of a file."""
 
-    profile: str = Field(
+    profile: str = key(
         "typical",
-        description="detector profile with which the section begins: a name in scenarios/detectors, or a TOML file; "
+        "detector profile with which the section begins: a name in scenarios/detectors, or a TOML file; "
         "other keys change it",
     )
 
@@ -50,19 +50,19 @@ class DetectorFileSection(DetectorSection):
 class ScenarioFile(Scenario):
     """Keys of a scenario file. :mod:`simharness.scenario.load` gives them meaning."""
 
-    extends: str = Field(
+    extends: str = key(
         "",
-        description="scenario with which the file begins: a file, relative to this one, or the name of a shipped "
+        "scenario with which the file begins: a file, relative to this one, or the name of a shipped "
         "scenario; keys of this file go over it",
     )
     seeds: (
         Annotated[int, Field(ge=1, le=MOST_TRIALS)]
         | Annotated[tuple[Seed, ...], Field(min_length=1, max_length=MOST_TRIALS)]
-    ) = Field(1, description="number of seeds, from the scenario's seed on, or a list of seeds")
-    variants: tuple[str, ...] = Field((), max_length=100, description="the same as method.variants")
+    ) = key(1, "number of seeds, from the scenario's seed on, or a list of seeds")
+    variants: tuple[str, ...] = key((), "the same as method.variants", max_length=100)
     cameras: CamerasFileSection = CamerasFileSection()
     sensor: SensorFileSection = SensorFileSection()
     detector: DetectorFileSection = DetectorFileSection()
-    sweep: dict[str, Any] = Field({}, description="keys of a scenario, each with a list or a range of values")
-    cases: dict[str, dict[str, Any]] = Field({}, description="named changes, each run with every setting of the sweep")
+    sweep: dict[str, Any] = key({}, "keys of a scenario, each with a list or a range of values")
+    cases: dict[str, dict[str, Any]] = key({}, "named changes, each run with every setting of the sweep")
     gate: GateSection = GateSection()

@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
-from simharness.scenario.sections.section import Elements, Factor, Logits, Section, Share, Span
+from simharness.scenario.sections.section import Elements, Factor, Logits, Section, Share, Span, key
 
 KINDS = ("nose", "eyes", "ears", "shoulders", "elbows", "wrists", "hips", "knees", "ankles")
 """Kinds of COCO-17 joints with separate parameters."""
@@ -161,7 +161,7 @@ class KeypointsSection(Section):
     except that guesses follow from the joints that are localised.
     """
 
-    quality: Factor = Field(1.0, description="factor on the shares of jitter, miss, inversion and swap")
+    quality: Factor = key(1.0, "factor on the shares of jitter, miss, inversion and swap")
     scatter: Amounts = Amounts()  # standard deviation of good keypoints, in units; truncated at 1.14
     jitter: Shares = Shares()  # 1.14 to 2.35 units off
     jitter_mean: Means = Means()  # mean distance of jitters, as a share of the way from 1.14 to 2.35
@@ -174,19 +174,14 @@ class KeypointsSection(Section):
     drop: DropSection = DropSection()
     face: FaceSection = FaceSection()
     guess: GuessSection = GuessSection()
-    border: Factor = Field(
-        0.0, description="joints up to this many units outside of the image are reported, at its border"
-    )
-    reach: float = Field(4.29, ge=2.35, le=20.0, description="largest distance of misses, units")
+    border: Factor = key(0.0, "joints up to this many units outside of the image are reported, at its border")
+    reach: float = key(4.29, "largest distance of misses, units", ge=2.35, le=20.0)
     stray: Shares = Shares()  # share of misses that lie anywhere in the person's box
     self_occluded: Factors = Factors()  # on jitter and miss of self-occluded joints
     occluded: Factors = Factors()  # on jitter and miss of joints hidden by another person or an object
-    truncated: Factor = Field(1.0, description="factor on jitter and miss of people cut by the image border")
-    small: float = Field(
-        0.0,
-        ge=0.0,
-        le=10.0,
-        description="growth of jitter and miss for small people: (64 px / sqrt(area)) to this power",
+    truncated: Factor = key(1.0, "factor on jitter and miss of people cut by the image border")
+    small: float = key(
+        0.0, "growth of jitter and miss for small people: (64 px / sqrt(area)) to this power", ge=0.0, le=10.0
     )
     scatter_hidden: Factors = Factors()  # on scatter of joints that are not visible
 
@@ -194,23 +189,21 @@ class KeypointsSection(Section):
 class CorrelationSection(Section):
     """Correlation of errors over time, views and joints."""
 
-    life: Span = Field(0.0, description="mean life of an error, seconds; 0: drawn anew in every frame")
-    views: Share = Field(0.0, description="correlation over the views of whether a joint is dropped or a jitter")
-    gross_views: Share = Field(
-        0.0, description="correlation over the views of whether a joint is a miss, swap, inversion or guess"
+    life: Span = key(0.0, "mean life of an error, seconds; 0: drawn anew in every frame")
+    views: Share = key(0.0, "correlation over the views of whether a joint is dropped or a jitter")
+    gross_views: Share = key(0.0, "correlation over the views of whether a joint is a miss, swap, inversion or guess")
+    limb: Share = key(0.0, "correlation of whether a joint errs within the face, the arms and the legs")
+    scatter_life: Span = key(0.0, "correlation time of scatter, seconds")
+    scatter_views: Share = key(
+        0.0, "share of the variance of scatter that is one displacement in space, the same for all views"
     )
-    limb: Share = Field(0.0, description="correlation of whether a joint errs within the face, the arms and the legs")
-    scatter_life: Span = Field(0.0, description="correlation time of scatter, seconds")
-    scatter_views: Share = Field(
-        0.0, description="share of the variance of scatter that is one displacement in space, the same for all views"
-    )
-    scatter_near: Share = Field(
+    scatter_near: Share = key(
         0.0,
-        description="correlation of the scatter of two joints of a person that a bone joins; of joints n bones apart, "
+        "correlation of the scatter of two joints of a person that a bone joins; of joints n bones apart, "
         "its n-th power",
     )
-    scatter_noise: Share = Field(
-        0.0, description="share of the variance of scatter that is drawn anew in every frame; the rest has scatter_life"
+    scatter_noise: Share = key(
+        0.0, "share of the variance of scatter that is drawn anew in every frame; the rest has scatter_life"
     )
 
 
@@ -232,124 +225,114 @@ class HiddenScoresSection(Section):
 class ScoresSection(Section):
     """Scores of keypoints: the median of each class, and the spread."""
 
-    good: Share = Field(1.0, description="median score of a good keypoint")
-    jitter: Share = Field(1.0, description="median score of a jitter")
-    miss: Share = Field(1.0, description="median score of a miss")
-    inversion: Share = Field(1.0, description="median score of an inversion")
-    swap: Share = Field(1.0, description="median score of a swap")
+    good: Share = key(1.0, "median score of a good keypoint")
+    jitter: Share = key(1.0, "median score of a jitter")
+    miss: Share = key(1.0, "median score of a miss")
+    inversion: Share = key(1.0, "median score of an inversion")
+    swap: Share = key(1.0, "median score of a swap")
     hidden: HiddenScoresSection = HiddenScoresSection()  # factor on the median scores of joints that are not visible
     guess: Shares = Shares.model_validate(1.0)  # median score of guessed joints; hidden and joint do not apply
-    outside: Share = Field(1.0, description="factor on the median score of joints that are guessed outside the image")
-    deviation: Logits = Field(0.0, description="standard deviation of scores, on the logit scale")
-    overconfident: Share = Field(
-        0.0, description="share of misses and guessed joints with the score of a good keypoint"
-    )
-    underconfident: Share = Field(0.0, description="share of good keypoints with the score of a miss")
+    outside: Share = key(1.0, "factor on the median score of joints that are guessed outside the image")
+    deviation: Logits = key(0.0, "standard deviation of scores, on the logit scale")
+    overconfident: Share = key(0.0, "share of misses and guessed joints with the score of a good keypoint")
+    underconfident: Share = key(0.0, "share of good keypoints with the score of a miss")
     joint: Amounts = Amounts.model_validate(1.0)  # factor on the median scores
 
 
 class BoxesSection(Section):
     """Detected people and their boxes."""
 
-    missed: Share = Field(0.0, description="share of people missed in a view")
-    missed_hidden: ByHiddenShare = Field(
+    missed: Share = key(0.0, "share of people missed in a view")
+    missed_hidden: ByHiddenShare = key(
         (0.0,) * 5,
-        description="share of people missed because others, objects or the border hide 0, 25, 50, 75, 100 % of their "
+        "share of people missed because others, objects or the border hide 0, 25, 50, 75, 100 % of their "
         "joints, with linear interpolation; besides `missed`",
     )
-    missed_views: Share = Field(0.0, description="correlation over the views of whether a person is missed")
-    life: Span = Field(0.0, description="mean life of errors of boxes, seconds; 0: drawn anew in every frame")
-    least_visible: int = Field(
-        0, ge=0, le=17, description="a person with fewer visible joints in a view is never detected there"
-    )
-    jitter: float = Field(0.0, ge=0.0, le=0.5, description="noise of each side, relative to the size of the box")
-    duplicates: Share = Field(0.0, description="share of detected people who are detected twice")
-    merged: Share = Field(0.0, description="share of overlapping pairs that become one detection")
-    merged_overlap: float = Field(0.5, gt=0.0, lt=1.0, description="smallest overlap (IoU) of boxes that may merge")
-    split: Share = Field(
-        0.0, description="share of detected people whose upper and lower halves are detected separately"
-    )
-    score: Share = Field(1.0, description="median score of a box around a wholly visible person")
-    deviation: Logits = Field(0.0, description="standard deviation of box scores, on the logit scale")
+    missed_views: Share = key(0.0, "correlation over the views of whether a person is missed")
+    life: Span = key(0.0, "mean life of errors of boxes, seconds; 0: drawn anew in every frame")
+    least_visible: int = key(0, "a person with fewer visible joints in a view is never detected there", ge=0, le=17)
+    jitter: float = key(0.0, "noise of each side, relative to the size of the box", ge=0.0, le=0.5)
+    duplicates: Share = key(0.0, "share of detected people who are detected twice")
+    merged: Share = key(0.0, "share of overlapping pairs that become one detection")
+    merged_overlap: float = key(0.5, "smallest overlap (IoU) of boxes that may merge", gt=0.0, lt=1.0)
+    split: Share = key(0.0, "share of detected people whose upper and lower halves are detected separately")
+    score: Share = key(1.0, "median score of a box around a wholly visible person")
+    deviation: Logits = key(0.0, "standard deviation of box scores, on the logit scale")
 
 
 class PhantomsSection(Section):
     """Phantoms: false-positive detections that show no person."""
 
-    rate: float = Field(0.0, ge=0.0, le=20.0, description="mean number per view and frame")
-    life: Span = Field(0.0, description="mean life, seconds; 0: one frame each")
-    views: Share = Field(0.0, description="share of phantoms that stand in the room and appear in all views")
-    parts: Share = Field(
-        0.0, description="share of the phantoms of a single view that are composed of parts of the real people in it"
+    rate: float = key(0.0, "mean number per view and frame", ge=0.0, le=20.0)
+    life: Span = key(0.0, "mean life, seconds; 0: one frame each")
+    views: Share = key(0.0, "share of phantoms that stand in the room and appear in all views")
+    parts: Share = key(
+        0.0, "share of the phantoms of a single view that are composed of parts of the real people in it"
     )
-    plausible: Share = Field(
+    plausible: Share = key(
         1.0,
-        description="share of the phantoms not composed of parts that have a human pose; the others have joints "
+        "share of the phantoms not composed of parts that have a human pose; the others have joints "
         "anywhere in the box",
     )
-    score: Share = Field(0.45, description="median score of their keypoints")
-    deviation: Logits = Field(0.6, description="standard deviation of their scores, on the logit scale")
+    score: Share = key(0.45, "median score of their keypoints")
+    deviation: Logits = key(0.6, "standard deviation of their scores, on the logit scale")
 
 
 class DecoyHitsSection(Section):
     """Detections of decoys: posters, mannequins, coat stands, mirror images."""
 
-    share: Share = Field(0.0, description="share of the decoys in a view that are detected as people")
-    life: Span = Field(0.0, description="mean life of such a detection, seconds; 0: drawn anew in every frame")
-    views: Share = Field(0.0, description="correlation over the views of whether a decoy is detected")
-    consistent: Share = Field(
-        1.0,
-        description="share of these detections whose keypoints follow the object; the others get an independent pose",
+    share: Share = key(0.0, "share of the decoys in a view that are detected as people")
+    life: Span = key(0.0, "mean life of such a detection, seconds; 0: drawn anew in every frame")
+    views: Share = key(0.0, "correlation over the views of whether a decoy is detected")
+    consistent: Share = key(
+        1.0, "share of these detections whose keypoints follow the object; the others get an independent pose"
     )
-    score: Share = Field(0.7, description="median score of their keypoints")
-    deviation: Logits = Field(0.6, description="standard deviation of their scores, on the logit scale")
+    score: Share = key(0.7, "median score of their keypoints")
+    deviation: Logits = key(0.6, "standard deviation of their scores, on the logit scale")
 
 
 class HeatmapHeadSection(Section):
     """Heat maps from which the keypoints are read."""
 
-    size: Literal["none", "64x48", "96x72"] = Field(
-        "none", description="height x width of a heat map, cells; none: keypoints alone"
-    )
-    width: float = Field(2.0, ge=0.6, le=20.0, description="standard deviation of a peak, cells")
-    floor: Share = Field(0.01, description="height of the background; at most half the height of a faint peak")
-    rivals: float = Field(
+    size: Literal["none", "64x48", "96x72"] = key("none", "height x width of a heat map, cells; none: keypoints alone")
+    width: float = key(2.0, "standard deviation of a peak, cells", ge=0.6, le=20.0)
+    floor: Share = key(0.01, "height of the background; at most half the height of a faint peak")
+    rivals: float = key(
         0.5,
+        "largest height of a second peak, relative to the first, where two places compete; its height is 1 - score",
         ge=0.0,
         le=0.9,
-        description="largest height of a second peak, relative to the first, where two places compete; its height is "
-        "1 - score",
     )
 
 
 class DetectorSection(Section):
     """Errors of the simulated 2D detector."""
 
-    name: str = Field("perfect", description="name of the detector")
-    kind: Literal["bottom-up", "top-down"] = Field(
+    name: str = key("perfect", "name of the detector")
+    kind: Literal["bottom-up", "top-down"] = key(
         "top-down",
-        description="bottom-up: parts are joined to people along a tree, and a joint is reported only with its parent; "
+        "bottom-up: parts are joined to people along a tree, and a joint is reported only with its parent; "
         "top-down: joints are reported independently",
     )
-    source: Literal["simulated", "network"] = Field(
+    source: Literal["simulated", "network"] = key(
         "simulated",
-        description="simulated: detections are the truth with the errors below; network: a network finds the people in "
+        "simulated: detections are the truth with the errors below; network: a network finds the people in "
         "the rendered pictures, and the errors below are not used",
     )
-    network: str = Field(
+    network: str = key(
         "movenet",
-        min_length=1,
-        description='the network of source = "network", a name of `mvpose networks list` or an ONNX file relative to '
+        'the network of source = "network", a name of `mvpose networks list` or an ONNX file relative to '
         "the scenario file: a detector of people that gives their keypoints, or boxes for the pose head of onnx",
+        min_length=1,
     )
-    onnx: str = Field(
+    onnx: str = key(
         "",
-        description="top-down pose head, a name of `mvpose networks list` or an ONNX file relative to the scenario "
+        "top-down pose head, a name of `mvpose networks list` or an ONNX file relative to the scenario "
         "file, which computes the keypoints in the boxes from the rendered pictures; empty: those of source",
     )
-    skeleton: Literal["coco17", "body25", "halpe26", "openpose137", "wholebody133"] = Field(
+    skeleton: Literal["coco17", "body25", "halpe26", "openpose137", "wholebody133"] = key(
         "coco17",
-        description="joints that the detector reports; those beyond COCO17, such as feet and hands, belong to the "
+        "joints that the detector reports; those beyond COCO17, such as feet and hands, belong to the "
         "ankles and wrists and are estimated after the body",
     )
     keypoints: KeypointsSection = KeypointsSection()
@@ -390,12 +373,11 @@ class DetectorSection(Section):
 class AppearanceSection(Section):
     """Source of the descriptors of detections, the second cue of the method (paper, section 3.2)."""
 
-    source: Literal["none", "pictures", "drawn"] = Field(
+    source: Literal["none", "pictures", "drawn"] = key(
         "none",
-        description="none: detections carry no descriptors; pictures: a network computes them from the rendered "
+        "none: detections carry no descriptors; pictures: a network computes them from the rendered "
         "pictures; drawn: drawn from a model of the network's distances, without pictures",
     )
-    network: str = Field(
-        "",
-        description="ONNX file of a re-ID network, relative to the scenario file; empty: the one shipped with mvpose",
+    network: str = key(
+        "", "ONNX file of a re-ID network, relative to the scenario file; empty: the one shipped with mvpose"
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from pydantic import Field, create_model
 
-from simharness.scenario.sections.section import Section
+from simharness.scenario.sections.section import Section, key
 from simharness.scoring.catalogue import SCORES, TOLERANCES
 
 BOUND = 2.0
@@ -21,11 +21,11 @@ _UNITS = {"%": "percentage points", "mm": "millimetres", "": "in the unit of the
 def _limits(name: str, about: str, defaults: Mapping[str, float | None]) -> Any:
     """Return a section with a limit for each gated score of the catalogue."""
     fields: dict[str, Any] = {}
-    for key, default in defaults.items():
-        score = SCORES[key]
+    for each, default in defaults.items():
+        score = SCORES[each]
         kind = Annotated[float, Field(ge=0.0, le=_MOST.get(score.unit, 1000.0))]
         about_score = f"{score.title}: {_UNITS.get(score.unit, score.unit)}"
-        fields[key] = (kind if default is not None else kind | None, Field(default, description=about_score))
+        fields[score.key] = (kind if default is not None else kind | None, Field(default, description=about_score))
     return create_model(name, __base__=Section, __module__=__name__, __doc__=about, **fields)
 
 
@@ -51,17 +51,14 @@ best value, such as coverage, this is the largest change in either direction."""
 class GateSection(Section):
     """Rule of ``simharness check``: a change fails it that is significant and larger than allowed."""
 
-    level: float = Field(
-        0.05, gt=0.0, lt=1.0, description="significance level: chance of a false alarm where the method did not change"
+    level: float = key(
+        0.05, "significance level: chance of a false alarm where the method did not change", gt=0.0, lt=1.0
     )
-    slowdown: float = Field(
-        1.2,
-        gt=1.0,
-        le=100.0,
-        description="largest factor by which the time of a frame, relative to a reference kernel, may grow",
+    slowdown: float = key(
+        1.2, "largest factor by which the time of a frame, relative to a reference kernel, may grow", gt=1.0, le=100.0
     )
-    slowdown_elsewhere: float = Field(
-        2.0, gt=1.0, le=100.0, description="the same on another kind of processor than that of the baseline"
+    slowdown_elsewhere: float = key(
+        2.0, "the same on another kind of processor than that of the baseline", gt=1.0, le=100.0
     )
     tolerance: Tolerances = Tolerances()
     improvement: Improvements = Improvements()

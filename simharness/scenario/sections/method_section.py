@@ -8,7 +8,7 @@ from typing import Annotated, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from simharness.scenario.sections.section import Section
+from simharness.scenario.sections.section import Section, key
 
 NAME = r"^[a-z0-9][a-z0-9_-]*$"
 """Pattern of the names of scenarios and estimators."""
@@ -51,21 +51,20 @@ class EstimatorsSection(Section):
 class MethodSection(Section):
     """Variants of the method that run on the detections."""
 
-    variants: tuple[str, ...] = Field(
+    variants: tuple[str, ...] = key(
         ("full", "no-3dps"),
+        "presets of mvpose.Pipeline, also with +repair behind them: the rig and the clocks are repaired "
+        "from the whole trial first; and names of method.estimators",
         min_length=1,
         max_length=100,
-        description="presets of mvpose.Pipeline, also with +repair behind them: the rig and the clocks are repaired "
-        "from the whole trial first; and names of method.estimators",
     )
-    lag: Annotated[float, Field(ge=0.0, le=36_000.0)] = Field(
+    lag: Annotated[float, Field(ge=0.0, le=36_000.0)] = key(
         0.2,
-        description="track and track-fast: time of later frames that an estimate waits for, seconds; 0: none; at least "
+        "track and track-fast: time of later frames that an estimate waits for, seconds; 0: none; at least "
         "the duration: the whole recording",
     )
-    estimators: EstimatorsSection = Field(
-        EstimatorsSection(),
-        description='user-defined estimators: name = "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE"',
+    estimators: EstimatorsSection = key(
+        EstimatorsSection(), 'user-defined estimators: name = "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE"'
     )
 
 

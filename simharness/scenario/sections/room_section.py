@@ -2,21 +2,21 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
-from simharness.scenario.sections.section import Count, Elements, Length, Section, Share
+from simharness.scenario.sections.section import Count, Elements, Length, Section, Share, key
 
 
 class RoomSection(Section):
     """The room: a floor and four walls around the origin. A kind or look of "any" is drawn from the seed."""
 
-    size: Annotated[tuple[Length, Length, Length], Elements(("x", "y", "z"))] = Field(
-        (8.0, 8.0, 3.0), description="x, y, z in metres"
+    size: Annotated[tuple[Length, Length, Length], Elements(("x", "y", "z"))] = key(
+        (8.0, 8.0, 3.0), "x, y, z in metres"
     )
-    walls: bool = Field(True, description="false: an open floor, and cameras may stand anywhere above it")
-    kind: Literal["laboratory", "office", "living_room", "gym", "ward", "shop", "stage", "outdoors", "any"] = Field(
+    walls: bool = key(True, "false: an open floor, and cameras may stand anywhere above it")
+    kind: Literal["laboratory", "office", "living_room", "gym", "ward", "shop", "stage", "outdoors", "any"] = key(
         "laboratory",
-        description="kind of the room: its furniture along the walls, windows, lamps, finishes and what hangs on the "
+        "kind of the room: its furniture along the walls, windows, lamps, finishes and what hangs on the "
         "walls; a laboratory has no furniture; outdoors has no walls",
     )
     floor: Literal[
@@ -34,11 +34,11 @@ class RoomSection(Section):
         "asphalt",
         "grass",
         "any",
-    ] = Field("usual", description="look of the floor; usual: one that rooms of this kind have, in a laboratory tiles")
+    ] = key("usual", "look of the floor; usual: one that rooms of this kind have, in a laboratory tiles")
     wall: Literal["usual", "plain", "panels", "brick", "stripes", "tinted", "wallpaper", "tiled", "curtain", "any"] = (
-        Field("usual", description="look of the walls; usual: one that rooms of this kind have, in a laboratory plain")
+        key("usual", "look of the walls; usual: one that rooms of this kind have, in a laboratory plain")
     )
-    light: Literal["day", "warm", "side", "dim", "any"] = Field("day", description="lighting")
+    light: Literal["day", "warm", "side", "dim", "any"] = key("day", "lighting")
 
     @model_validator(mode="after")
     def _open_air(self) -> Self:
@@ -55,22 +55,22 @@ class ClutterSection(Section):
 
     boxes: Count = 0
     shelves: Count = 0
-    racks: Count = Field(0, description="open frames of chest height, which hide little")
+    racks: Count = key(0, "open frames of chest height, which hide little")
     tables: Count = 0
     chairs: Count = 0
     pillars: Count = 0
     partitions: Count = 0
     plants: Count = 0
-    carts: Count = Field(0, description="carts that move about")
-    objects: tuple[str, ...] = Field(
+    carts: Count = key(0, "carts that move about")
+    objects: tuple[str, ...] = key(
         (),
-        max_length=50,
-        description="files of further objects, each placed once: MJCF (.xml), or OBJ (.obj) with its MTL; in metres, "
+        "files of further objects, each placed once: MJCF (.xml), or OBJ (.obj) with its MTL; in metres, "
         "z up, front towards +x; paths relative to the scenario file",
+        max_length=50,
     )
-    coverage: Share | None = Field(
+    coverage: Share | None = key(
         None,
-        description="share of the joints in the pictures that clutter hides, including joints that people hide as "
+        "share of the joints in the pictures that clutter hides, including joints that people hide as "
         "well; objects are added until it is reached",
     )
 

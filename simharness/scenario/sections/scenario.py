@@ -14,7 +14,7 @@ from simharness.scenario.sections.detector_section import AppearanceSection, Det
 from simharness.scenario.sections.method_section import NAME, MethodSection
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
-from simharness.scenario.sections.section import Section, Share, Span, Spread
+from simharness.scenario.sections.section import Section, Share, Span, Spread, key
 
 NETWORK_KEYS = (("detector", "network"), ("detector", "onnx"))
 """Keys whose values are names of networks on this machine, or their ONNX files."""
@@ -39,32 +39,28 @@ class AnnotationSection(Section):
     that of ``simharness export`` and of ``simharness evaluate seeds``.
     """
 
-    shift: Spread = Field(
+    shift: Spread = key(
         0.0,
-        description="constant offset of each joint of each person from the true one: its standard deviation along each "
+        "constant offset of each joint of each person from the true one: its standard deviation along each "
         "axis of the body, metres",
     )
-    random: Spread = Field(
-        0.0, description="standard deviation along each axis of the error that changes over time, metres"
-    )
-    life: Span = Field(0.0, description="correlation time of that error, seconds; 0: drawn anew in every frame")
-    noise: Share = Field(0.0, description="share of the variance of that error that is drawn anew in every frame")
-    people: Literal["all", "whole"] = Field(
-        "all",
-        description="whole: people are annotated only where all cameras but one have all of their limb joints in the "
-        "picture",
+    random: Spread = key(0.0, "standard deviation along each axis of the error that changes over time, metres")
+    life: Span = key(0.0, "correlation time of that error, seconds; 0: drawn anew in every frame")
+    noise: Share = key(0.0, "share of the variance of that error that is drawn anew in every frame")
+    people: Literal["all", "whole"] = key(
+        "all", "whole: people are annotated only where all cameras but one have all of their limb joints in the picture"
     )
 
 
 class RenderingSection(Section):
     """Rendering of the pictures."""
 
-    renderer: Literal["auto", "raster", "gl", "rays"] = Field(
+    renderer: Literal["auto", "raster", "gl", "rays"] = key(
         "raster",
-        description="raster: numba, on any machine; gl: pyrender on EGL; auto: gl where a GL context can be made, else "
+        "raster: numba, on any machine; gl: pyrender on EGL; auto: gl where a GL context can be made, else "
         "raster; rays: no pictures, only visibility by ray casting, fast",
     )
-    color: bool = Field(True, description="render the colour pictures of the report's film")
+    color: bool = key(True, "render the colour pictures of the report's film")
 
 
 class Scenario(Section):
@@ -76,9 +72,9 @@ class Scenario(Section):
         description="lowercase letters, digits, - and _; result folders are named after it",
     )
     description: str = Field("", max_length=1000)
-    seed: int = Field(0, ge=0, lt=2**53, description="seed of every random draw; 0 is a seed like any other")
-    duration: float = Field(4.0, gt=0.0, le=36_000.0, description="seconds")
-    rate: float = Field(10.0, gt=0.0, le=1000.0, description="frames per second")
+    seed: int = key(0, "seed of every random draw; 0 is a seed like any other", ge=0, lt=2**53)
+    duration: float = key(4.0, "seconds", gt=0.0, le=36_000.0)
+    rate: float = key(10.0, "frames per second", gt=0.0, le=1000.0)
     room: RoomSection = RoomSection()
     people: PeopleSection = PeopleSection()
     clutter: ClutterSection = ClutterSection()
@@ -105,14 +101,14 @@ class Scenario(Section):
         name; the network of a simulated detector does not count.
         """
         values: dict[str, object] = {}
-        for key in FILE_KEYS:
-            name, value = ".".join(key), reduce(getattr, key, self)
+        for parts in FILE_KEYS:
+            name, value = ".".join(parts), reduce(getattr, parts, self)
             values |= (
                 {f"{name}.{k}": each for k, each in enumerate(value)} if isinstance(value, tuple) else {name: value}
             )
         if self.detector.source == "simulated":
             del values["detector.network"]
-        return {key: Path(str(value)) for key, value in values.items() if value}
+        return {name: Path(str(value)) for name, value in values.items() if value}
 
     @property
     def files(self) -> tuple[Path, ...]:

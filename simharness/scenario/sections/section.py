@@ -1,9 +1,17 @@
 """Base class and value types of all sections of a scenario file."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
+
+T = TypeVar("T")
+
+
+def key(default: T, description: str, **bounds: Any) -> T:
+    """Return the default and the description of a key of a section, with further arguments of ``pydantic.Field``."""
+    field: T = Field(default, description=description, **bounds)
+    return field
 
 
 @dataclass(frozen=True)
