@@ -4,9 +4,8 @@ from mvpose.cli import detect_command, doctor_command, estimate_command, network
 from mvpose.cli.program import PROGRAM
 
 app = PROGRAM.app()
-estimate_command.add_to(app)
-detect_command.add_to(app)
-networks_command.add_to(app)
-doctor_command.add_to(app)
-repair_command.add_to(app)
-view_command.add_to(app)
+for command in (estimate_command.estimate, detect_command.detect, detect_command.run):
+    app.command()(command)
+app.add_typer(networks_command.group, name="networks")
+for command in (doctor_command.doctor, repair_command.repair, view_command.view):
+    app.command()(command)

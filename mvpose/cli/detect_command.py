@@ -61,12 +61,6 @@ class Networks:
 _LEFT = "detections that are complete are kept, and another run goes on from there"
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(detect)
-    app.command()(run)
-
-
 @grouped()
 def detect(
     videos: Videos,

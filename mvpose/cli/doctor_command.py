@@ -22,11 +22,6 @@ _DOCTOR = "mvpose doctor"  # in the manifest of its folder
 _MARKS = {"alarm": "!", "unknown": "?", "note": "-"}
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command()(doctor)
-
-
 @grouped(without=["joints"])
 def doctor(
     calibration: Calibration,

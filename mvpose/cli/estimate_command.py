@@ -23,11 +23,6 @@ _USUAL_UP = {"trc": "y", "c3d": "z", "csv": "z", "bvh": "y"}  # of formats that 
 _FLAGS = {"films": "--no-films"}
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command()(estimate)
-
-
 @dataclass(frozen=True)
 class Wanted:
     """Options about results, as given."""

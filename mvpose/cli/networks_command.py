@@ -11,15 +11,10 @@ from mvpose.commands.option_groups import grouped, option
 _NAME = Annotated[str, typer.Argument(metavar="NAME", help="Name of a network, as `mvpose networks list` shows it.")]
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the group of commands."""
-    group = typer.Typer(help="List, fetch and show networks that find people in pictures.", no_args_is_help=True)
-    group.command("list")(list_networks)
-    group.command()(get)
-    group.command()(show)
-    app.add_typer(group, name="networks")
+group = typer.Typer(help="List, fetch and show networks that find people in pictures.", no_args_is_help=True)
 
 
+@group.command("list")
 def list_networks() -> None:
     """List the networks that can be fetched and those on this machine, with their licences and sources."""
     with PROGRAM.exit_on_error():
@@ -35,6 +30,7 @@ def list_networks() -> None:
             typer.echo(f"{stored.name}: in the cache of rtmlib\n  {stored.path}")
 
 
+@group.command()
 @grouped()
 def get(
     name: _NAME,
@@ -60,6 +56,7 @@ def get(
         typer.echo(f"{name} ({network.licence}): {path}")
 
 
+@group.command()
 def show(name: _NAME) -> None:
     """Show the file, card, licence, input and outputs of a network on this machine."""
     with PROGRAM.exit_on_error():

@@ -21,11 +21,6 @@ if TYPE_CHECKING:
     from mvpose.cli.inputs import Inputs
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command()(repair)
-
-
 @grouped(without=["joints"])
 def repair(
     calibration: Calibration,

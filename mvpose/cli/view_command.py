@@ -11,11 +11,6 @@ from mvpose.commands.option_groups import grouped, option
 _PAGES = ("recording.html", "doctor.html")
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command()(view)
-
-
 @grouped()
 def view(
     folder: Annotated[

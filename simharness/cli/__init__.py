@@ -21,16 +21,30 @@ from simharness.cli.program import PROGRAM
 __all__ = ["app", "main"]
 
 app = PROGRAM.app()
-run_command.add_to(app)
-scenarios_command.add_to(app)
-check_command.add_to(app)
-blame_command.add_to(app)
-report_command.add_to(app)
-study_command.add_to(app)
+for command in (
+    run_command.run,
+    run_command.render,
+    run_command.export,
+    scenarios_command.scenarios,
+    scenarios_command.show,
+    scenarios_command.schema,
+    scenarios_command.mjcf,
+    check_command.check,
+    blame_command.blame,
+    report_command.report,
+    study_command.study,
+    study_command.merge,
+):
+    app.command()(command)
 app.add_typer(evaluate_command.app, name="evaluate")
-validate_command.add_to(app)
-profile_command.add_to(app)
-rehearse_command.add_to(app)
+for command in (
+    validate_command.fit_detector,
+    validate_command.validate,
+    profile_command.profile_network,
+    rehearse_command.rehearse,
+    rehearse_command.plan,
+):
+    app.command()(command)
 
 
 def main() -> None:

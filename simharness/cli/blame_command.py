@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING
 
-import typer
 from rich.console import Console
 
 from mvpose.commands.option_groups import grouped, option
@@ -11,11 +10,6 @@ from simharness.cli.program import PROGRAM, JsonFile, Overrides, ScenarioFile, S
 
 if TYPE_CHECKING:
     from simharness.study.causes.cause_shares import Blame
-
-
-def add_to(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command()(blame)
 
 
 @grouped()

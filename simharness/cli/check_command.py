@@ -27,11 +27,6 @@ _MARKS = {
 _STYLES: "dict[Verdict, str]" = {"worse": "red", "unexpected": "yellow", "better": "green"}
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command()(check)
-
-
 @grouped()
 def check(
     suite: Annotated[

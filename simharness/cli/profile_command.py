@@ -22,11 +22,6 @@ _RIVALS = ("typical", "topdown", "posefix")
 _TOML = b"# Made by: simharness profile-network"
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("profile-network")(profile_network)
-
-
 def profile_network(
     name: Annotated[
         str,

@@ -29,12 +29,6 @@ _SMALL = 3  # cameras: each set of two and more is the rig, or the rig without o
 _CROWD = 6  # scenes of other numbers of people
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(grouped()(rehearse))
-    app.command()(grouped()(plan))
-
-
 @dataclass(frozen=True)
 class Surroundings:
     """Options that say where people are, and who finds them."""
@@ -65,6 +59,7 @@ class Surroundings:
     )
 
 
+@grouped()
 def rehearse(
     calibration: Annotated[
         Path,
@@ -213,6 +208,7 @@ class RoomOptions:
         return {key: value for key, value in changes.items() if value is not None}
 
 
+@grouped()
 def plan(
     room: Annotated[
         Path, typer.Argument(help="A room file (TOML), or the name of a shipped room: [cyan]lab[/].", metavar="ROOM")

@@ -16,11 +16,6 @@ if TYPE_CHECKING:
     from simharness.study.study_folder import Results
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command()(report)
-
-
 @grouped()
 def report(
     study: Annotated[

@@ -16,13 +16,6 @@ if TYPE_CHECKING:
     from simharness.outputs.run.headline import Column
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(run)
-    app.command()(render)
-    app.command()(export)
-
-
 @grouped()
 def run(
     scenario: ScenarioFile,

@@ -16,14 +16,6 @@ if TYPE_CHECKING:
     from simharness.scenario.load import ScenarioPlan
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(scenarios)
-    app.command()(show)
-    app.command()(schema)
-    app.command()(mjcf)
-
-
 def scenarios() -> None:
     """List the shipped scenarios, and the rigs and the sensor and detector profiles for your own."""
     with PROGRAM.exit_on_error():

@@ -54,12 +54,6 @@ class Running:
     )
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(study)
-    app.command()(merge)
-
-
 @grouped()
 def study(
     file: ScenarioFile,

@@ -23,12 +23,6 @@ if TYPE_CHECKING:
 _TWINS, _QUICK_TWINS = 10, 4
 
 
-def add_to(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command("fit-detector")(fit_detector)
-    app.command()(validate)
-
-
 @grouped()
 def validate(
     recording: RecordingFile,
