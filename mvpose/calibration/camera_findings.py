@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from scipy.special import ndtri
 
 from mvpose.arrays import Floats
 from mvpose.calibration.cameras import CameraFault, CameraFit
@@ -19,6 +20,7 @@ off by 30 to 50 mm); it does not shrink with the length of a recording."""
 _LENSES = ("distortion-ignored", "distortion-model")
 _REPAIR = ("--free", "extrinsics")
 _DRAWS = 4000
+_UPPER = float(ndtri(0.95))  # standard deviations to the upper end of a 90 % interval
 
 
 def findings_of_cameras(
@@ -204,13 +206,13 @@ def _turn(change: Floats, name: str) -> str:
 
 
 def possible_errors(fit: CameraFit, view: int) -> dict[str, float]:
-    """Return turn (degrees) and shift (metres) by which a camera may be off: estimates plus a standard deviation."""
+    """Return turn (degrees) and shift (metres) by which a camera may be off: the upper ends of 90 % intervals."""
     pose, covariance = fit.freed(view)
     high = {}
     for name, part, unit in (("degrees", slice(0, 3), 180.0 / np.pi), ("metres", slice(3, 6), 1.0)):
         length = max(float(np.linalg.norm(pose[part])), 1e-9)
         along = pose[part] / length
-        high[name] = unit * (length + float(np.sqrt(along @ covariance[part, part] @ along)))
+        high[name] = unit * (length + _UPPER * float(np.sqrt(along @ covariance[part, part] @ along)))
     return high
 
 

@@ -64,9 +64,9 @@ outermost tenth of the people, clock, and residual over the usual one. Errors of
 that are estimated for careful, published calibrations are 0.05 to 0.28 degrees and 1 to 2.5 cm (Shelf)."""
 
 EXCLUDED: Mapping[str, float] = MappingProxyType({"degrees": 0.5, "metres": 0.12})
-"""Sizes of which "fine" says that no camera has them: the estimate without trust in the calibration, plus a standard
-deviation, is below. Shifts are less certain than turns: detectors place joints differently from
-different sides, which imitates shifts of 5 cm (Shelf's published cameras), and of distant cameras 9 cm."""
+"""Sizes of which "fine" says that no camera has them: the upper end of the 90 % interval of the estimate without trust
+in the calibration is below. Shifts are less certain than turns: detectors place joints differently from different
+sides, which imitates shifts of 5 cm (Shelf's published cameras), and of distant cameras 9 cm."""
 
 _CLEAR = 2.0  # times the size of an alarm, in a recording that does not determine smaller ones
 _SURE = 0.95

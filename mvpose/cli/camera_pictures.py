@@ -10,11 +10,9 @@ from mvpose.commands.programs import note
 from mvpose.files.message_text import listed
 from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
 from mvpose.formats.detections.sources import Source, assign
-from mvpose.formats.pictures import ABOUT, ABOUT_SHARE, PictureSource, of_cameras, open_pictures
+from mvpose.formats.pictures import ABOUT, ABOUT_SHARE, PictureSource, is_cut, of_cameras, open_pictures
 
 _SAME_SHAPE = 0.01  # relative difference of aspect ratios below which pictures are the calibrated ones, scaled
-
-_BLOCK = 16  # pixels, of the common video codecs
 
 
 def open_videos(paths: Sequence[Path]) -> list[PictureSource]:
@@ -79,12 +77,15 @@ def for_frames(
     found = []
     for camera, source in zip(cameras, sources, strict=True):
         across, down = (has / calibrated for has, calibrated in zip(source.size, camera.size, strict=True))
-        if abs(across / down - 1.0) > _SAME_SHAPE:
+        cut = is_cut(source.size, camera.size)
+        if cut:
+            _note_cut(camera, source)
+        elif abs(across / down - 1.0) > _SAME_SHAPE:
             raise ValueError(
                 f"{source.path}: pictures of {_text(source.size)} pixels, but camera {camera.name} has "
                 f"{_text(camera.size)}; expected the pictures of this recording. Give those, or leave out --pictures"
             )
-        if source.size != camera.size:
+        if source.size != camera.size and not cut:
             note(f"{source.path}: pictures of {_text(source.size)} pixels are scaled to {_text(camera.size)}")
         matched, remark = source.numbered_for(numbers)
         if remark:
@@ -105,8 +106,7 @@ def _slack(count: int) -> float:
 def check_sizes(cameras: Sequence[Camera], pictures: Sequence[PictureSource]) -> None:
     """Check that pictures have the size for which their cameras are calibrated, where the calibration states it.
 
-    Videos are coded in blocks of 16 pixels, and programs differ in whether they count the pixels that fill the last
-    blocks: pictures that lack fewer at the right and the bottom pass, with a note.
+    Pictures that are cut at the right and the bottom (:func:`~mvpose.formats.pictures.is_cut`) pass, with a note.
 
     Raises:
         ValueError: another size.
@@ -115,16 +115,20 @@ def check_sizes(cameras: Sequence[Camera], pictures: Sequence[PictureSource]) ->
     for camera, source in zip(cameras, pictures, strict=True):
         if camera.size in (UNKNOWN_SIZE, source.size):
             continue
-        text = f"{camera.name} {_text(source.size)} instead of {_text(camera.size)}"
-        if all(0 <= calibrated - has < _BLOCK for has, calibrated in zip(source.size, camera.size, strict=True)):
-            note(f"pictures of {text} pixels are taken as cut at the right and the bottom, as codecs do")
+        if is_cut(source.size, camera.size):
+            _note_cut(camera, source)
         else:
-            wrong.append(text)
+            wrong.append(f"{camera.name} {_text(source.size)} instead of {_text(camera.size)}")
     if wrong:
         raise ValueError(
             f"pictures are not of the calibrated size: {listed(wrong)} pixels; convert them to that size, or scale the "
             "intrinsics of the calibration to theirs"
         )
+
+
+def _note_cut(camera: Camera, source: PictureSource) -> None:
+    text = f"{camera.name} {_text(source.size)} instead of {_text(camera.size)}"
+    note(f"pictures of {text} pixels are taken as cut at the right and the bottom, as codecs do")
 
 
 def check_lengths(pictures: Sequence[PictureSource]) -> None:

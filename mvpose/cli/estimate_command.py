@@ -138,7 +138,7 @@ def estimate_into(
     inputs = read_inputs(calibration, detections, choices)
     views = None if sources is None else assigned(inputs.rig.cameras, sources)
     if views is not None and own:  # detections of another program, perhaps of other pictures
-        views = for_frames(inputs.rig.cameras, views, inputs.numbers.tolist(), whole=choices.frames is None)
+        views = for_frames(inputs.rig.cameras, views, inputs.numbers.tolist(), whole=inputs.whole)
     method = estimator(wanted.method, lag=wanted.lag, period=inputs.period)
     tracks = isinstance(method, SequenceEstimator)
     for each in _without_effect(wanted, choices, inputs, tracks=tracks, pictures=sources is not None):

@@ -50,6 +50,7 @@ class Inputs:
         period: time between frames, seconds.
         paths: file or folder with the detections of each camera, V.
         doubt: why the given upward axis may be wrong; "" where nothing speaks against it.
+        whole: whether these are all frames of the detections.
     """
 
     rig: "Rig"
@@ -58,6 +59,7 @@ class Inputs:
     period: float
     paths: tuple[Path, ...] = ()
     doubt: str = ""
+    whole: bool = True
 
     @property
     def skeleton(self) -> "mvpose.Skeleton":
@@ -134,6 +136,10 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     if skeleton is None:
         with _noted():
             skeleton, origin = project.skeleton()
+    if frames is None:
+        frames, place = project.frames()
+        if frames is not None:
+            note(f"frames {frames[0]} to {frames[1]}: {place}; --frames goes before it")
     rig = _read_rig(calibration, choices.only, examined=examined)
     names = [camera.name for camera in rig]
     with single_stage("read", len(rig)) as advance:
@@ -170,7 +176,7 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
         plausibility.check_up(rig)
     times, period = _times(choices, recorded.numbers, names, project)
     paths = tuple(source.path for source in recorded.assignment.sources)
-    return Inputs(rig, recorded.detections(times), recorded.numbers, period, paths, doubt)
+    return Inputs(rig, recorded.detections(times), recorded.numbers, period, paths, doubt, frames is None)
 
 
 def doubt_about(rig: "Rig", up: str) -> str:

@@ -117,18 +117,20 @@ def _write_page(
     left_out: "LeftOut",
 ) -> None:
     """Write the page, with pictures and films where there are any."""
+    from mvpose.formats.pictures import uncut
     from mvpose.report.recording_page import write_page
     from mvpose.report.reprojection import compared_frames
 
     missing = [0] * len(inputs.rig)
 
     def picture(frame: int, view: int) -> Any:
-        return None if views is None else views[view].picture(int(inputs.numbers[frame]))
+        found = None if views is None else views[view].picture(int(inputs.numbers[frame]))
+        return None if found is None else uncut(found, inputs.rig[view].size)
 
     def moving(view: int, frames: Any) -> Iterator[Any]:
         for each in () if views is None else views[view].some(inputs.numbers[frames].tolist()):
             missing[view] += each is None
-            yield each
+            yield None if each is None else uncut(each, inputs.rig[view].size)
 
     count = 0 if views is None or not films else len(views) * len(compared_frames(people.frames))
     with single_stage("films", count) as advance, failing("the page"):

@@ -20,6 +20,7 @@ VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm", ".mpg", ".mpeg", ".wm
 ABOUT, ABOUT_SHARE = 3, 0.02
 """Pictures, and share of them, by which headers of videos are often wrong."""
 
+_BLOCK = 16  # pixels, of the common video codecs
 _COMPLETE = 0.9  # of the frames that a video states: the number in its header is often somewhat wrong
 
 
@@ -114,6 +115,23 @@ class PictureSource:
             ValueError: a picture that cannot be read, or a video that ends long before its stated end.
         """
         return _of_folder(self.path, start) if self.path.is_dir() else _of_video(self, start)
+
+
+def is_cut(size: tuple[int, int], calibrated: tuple[int, int]) -> bool:
+    """Return whether pictures lack some pixels at the right and the bottom, as codecs cut them.
+
+    Videos are coded in blocks of 16 pixels, and programs differ in whether they count the pixels that fill the last
+    blocks: 1080 are coded as 1088 (ITU-T H.264, frame cropping).
+    """
+    return size != calibrated and all(0 <= whole - has < _BLOCK for has, whole in zip(size, calibrated, strict=True))
+
+
+def uncut(picture: NDArray[np.uint8], calibrated: tuple[int, int]) -> NDArray[np.uint8]:
+    """Return a picture (h, w, 3), one that is cut with black pixels at the right and the bottom."""
+    height, width = picture.shape[:2]
+    if not is_cut((width, height), calibrated):
+        return picture
+    return np.pad(picture, ((0, calibrated[1] - height), (0, calibrated[0] - width), (0, 0)))
 
 
 def of_cameras(paths: Sequence[Path]) -> list[Path]:

@@ -1,7 +1,8 @@
-"""Settings of Pose2Sim projects (``Config.toml``): the model of the poses, the frame rate, and the names of folders.
+"""Settings of Pose2Sim projects (``Config.toml``): the model of the poses, frame rate and range, names of folders.
 
 A trial takes what its own file does not state from those of the folders above it, as Pose2Sim does. Newer versions have
-``[pose] pose_model``, older ones ``[pose-2d]``; both have ``[project] frame_rate``. A model ``CUSTOM`` is a tree in it.
+``[pose] pose_model``, older ones ``[pose-2d]``; both have ``[project] frame_rate`` and ``frame_range``. A
+model ``CUSTOM`` is a tree in it.
 """
 
 from collections.abc import Iterable, Mapping
@@ -78,6 +79,14 @@ class ProjectSettings:
         rate, file = self.value(("project", "frame_rate"))
         known = isinstance(rate, int | float) and not isinstance(rate, bool) and 0 < rate < 1e6
         return (float(rate), f"frame_rate of {file}") if known else (None, "")
+
+    def frames(self) -> tuple[tuple[int, int] | None, str]:
+        """Return the first and the last frame, and where they are stated; None for all or where the range is "auto"."""
+        found, file = self.value(("project", "frame_range"))
+        if not isinstance(found, list) or len(found) != 2 or not all(type(each) is int for each in found):
+            return None, ""
+        first, end = found  # frame ``end`` is not among them, as in Python's range()
+        return ((first, end - 1), f"frame_range of {file}") if 0 <= first < end else (None, "")
 
 
 def project_tables(folder: Path) -> Mapping[str, Any]:

@@ -3,11 +3,13 @@
 import copy
 import itertools
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mvpose import Camera, Rig
+from mvpose.calibration.camera_findings import possible_errors
 from mvpose.calibration.findings import (
     ALARM,
     EXCLUDED,
@@ -122,3 +124,12 @@ def test_options_of_all_alarms_make_one_command():
     assert diagnosis(*found).repair == wanted  # mends in the order in which they were found
     assert joined_options([("--free", "focal"), ("--free", "extrinsics,focal")]) == ("--free", "focal,extrinsics")
     assert joined_options([]) == ()
+
+
+def test_an_error_that_is_excluded_is_beyond_nineteen_twentieths_of_the_draws():
+    pose, sigma = np.array([0.004, 0.0, 0.0, 0.0, 0.03, 0.0]), np.array([0.002] * 3 + [0.01] * 3)
+    fit = SimpleNamespace(freed=lambda view: (pose, np.diag(sigma**2)))
+    draws = pose + sigma * np.random.default_rng(0).standard_normal((20_000, 6))
+    high = possible_errors(fit, 0)
+    assert np.mean(np.degrees(draws[:, 0]) < high["degrees"]) == pytest.approx(0.95, abs=0.005)
+    assert np.mean(draws[:, 4] < high["metres"]) == pytest.approx(0.95, abs=0.005)

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from mvpose.cli.app import app
 from mvpose.formats.calibration import pose2sim
-from mvpose.formats.pictures import open_pictures
-from mvpose.report.film_file import FilmFile
+from mvpose.formats.pictures import is_cut, open_pictures, uncut
+from mvpose.report.film_file import FilmFile, film_suffix
 
 NAMES = ["cam0", "cam1", "cam2", "cam3"]
 FRAMES = 4
@@ -144,3 +144,21 @@ def test_pictures_of_other_cameras_are_refused_before_the_estimation(lab, tmp_pa
     last = result.stderr.splitlines()[-1]
     assert last.startswith("error: no pictures for the camera cam0, cam2, cam3")
     assert not (tmp_path / "out").exists()
+
+
+def test_pictures_that_codecs_cut_are_not_scaled(lab, tmp_path):
+    assert is_cut((1080, 1920), (1088, 1920))
+    assert not any(is_cut(size, (1088, 1920)) for size in ((1088, 1920), (1072, 1920), (1096, 1920), (544, 960)))
+    picture = np.random.default_rng(0).integers(0, 255, (40, 30, 3), np.uint8)
+    assert (uncut(picture, (32, 48))[:40, :30] == picture).all()
+    assert uncut(picture, (60, 80)) is picture
+    for name in NAMES:
+        (tmp_path / "cut" / name).mkdir(parents=True)
+        for frame in range(FRAMES):
+            cv2.imwrite(str(tmp_path / "cut" / name / f"{frame}.png"), np.full((946, 1280, 3), 200, np.uint8))
+    result = estimate(lab, tmp_path / "out", "--pictures", tmp_path / "cut", "--frames", "0:1")
+    assert result.exit_code == 0, result.output
+    assert "cam0 1280 x 946 instead of 1280 x 960 pixels are taken as cut at the right and the bottom" in result.stderr
+    film = next(open_pictures(tmp_path / "out" / "films" / f"cam0{film_suffix()}").pictures())
+    bright = np.median(film, axis=(1, 2)) > 100
+    assert abs(bright.sum() / len(film) - 946 / 960) < 2 / len(film)

@@ -215,6 +215,22 @@ class TestPose2Sim:
         (session / "trial" / "Config.toml").write_text("[project]\nframe_rate = 120\n")
         assert read_inputs(session, [session / "trial"], Choices()).period == pytest.approx(1 / 120)
 
+    @pytest.mark.parametrize(
+        ("stated", "option", "numbers"),
+        [
+            ("[2, 6]", None, [2, 3, 4, 5]),  # as Python's range(2, 6), by which Pose2Sim takes them
+            ("[2, 6]", "1:2", [1, 2]),
+            *((words, None, list(range(8))) for words in ("[]", "'auto'", "'all'")),
+        ],
+    )
+    def test_frames_are_those_of_its_range(self, session, capsys, stated, option, numbers):
+        (session / "trial" / "Config.toml").write_text(f"[project]\nframe_range = {stated}\n")
+        inputs = read_inputs(session, [session / "trial"], Choices(frames=option))
+        assert inputs.numbers.tolist() == numbers
+        assert inputs.whole == (len(numbers) == 8)
+        told = f"frames 2 to 5: frame_range of {session / 'trial' / 'Config.toml'}"
+        assert (told in capsys.readouterr().err) == (len(numbers) == 4)
+
     def test_a_model_that_does_not_fit_is_refused(self, session):
         text = (session / "Config.toml").read_text()
         (session / "Config.toml").write_text(text.replace("BODY_25B", "BODY_25"))
