@@ -15,6 +15,7 @@ import errno
 import functools
 import gc
 import hashlib
+import os
 import pickle
 import sys
 import uuid
@@ -166,7 +167,7 @@ class KernelCache:
             if entry is None:
                 return None
             key, file = entry
-            content = file.read_bytes()
+            content = _trusted_content(file)
             if hashlib.sha256(content[_CHECKSUM:]).digest() != content[:_CHECKSUM]:
                 return None
             stored, code = pickle.loads(content[_CHECKSUM:])
@@ -193,6 +194,7 @@ class KernelCache:
             part = file.with_name(f"{file.name}.{uuid.uuid4().hex[:8]}.part")
             try:
                 part.write_bytes(hashlib.sha256(content).digest() + content)
+                part.chmod(0o644)  # whatever the mask of the user: an entry that others may write to is not loaded
                 part.replace(file)
             finally:
                 part.unlink(missing_ok=True)
@@ -237,6 +239,19 @@ class KernelCache:
             except RuntimeError:
                 raise OSError(errno.EROFS, "no folder can be written; set NUMBA_CACHE_DIR to one that can") from None
         return self._storage
+
+
+def _trusted_content(file: Path) -> bytes:
+    """Return the content of an entry, from which code is loaded, so that nobody else may have written it.
+
+    Raises:
+        PermissionError: the entry belongs to another user than this one and root, or others may write to it.
+    """
+    with file.open("rb") as entry:
+        status = os.fstat(entry.fileno())
+        if hasattr(os, "geteuid") and (status.st_uid not in (0, os.geteuid()) or status.st_mode & 0o022):
+            raise PermissionError(errno.EPERM, f"others own entries in {file.parent}, or may write to them")
+        return entry.read()
 
 
 def _warn(error: Exception) -> None:

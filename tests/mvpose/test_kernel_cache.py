@@ -2,9 +2,11 @@
 
 import cProfile
 import gc
+import hashlib
 import importlib
 import json
 import os
+import pickle
 import pkgutil
 import shutil
 import subprocess
@@ -308,6 +310,36 @@ def test_a_damaged_entry_is_compiled_again(toy, damage):
     assert module.outer(5.0) == VALUE
     assert compiled(module.outer)
     assert not compiled_again(toy)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owner here")
+@pytest.mark.parametrize("distrusted", ["writable by others", "of another user"])
+def test_code_that_others_may_have_written_is_not_loaded(toy, tmp_path, distrusted):
+    """The entry has a right checksum and would create a file when it is loaded."""
+    toy.start().outer(5.0)
+    (entry,) = toy.entries
+    proof = tmp_path / "ran"
+
+    class Runs:
+        def __reduce__(self):
+            return Path.touch, (proof,)
+
+    content = pickle.dumps((Runs(), None))
+    entry.write_bytes(hashlib.sha256(content).digest() + content)
+    if distrusted == "of another user":
+        if os.geteuid():
+            pytest.skip("only root gives files away")
+        os.chown(entry, 12345, 12345)
+    else:
+        entry.chmod(0o666)
+    with pytest.warns(UserWarning, match="others own entries in .*, or may write to them"):
+        assert toy.start().outer(5.0) == VALUE
+    assert not proof.exists()
+    os.chown(entry, os.geteuid(), -1)
+    entry.write_bytes(hashlib.sha256(content).digest() + content)
+    entry.chmod(0o644)
+    toy.start().outer(5.0)
+    assert proof.exists()  # that is what the check keeps out
 
 
 def test_code_that_arrives_as_an_argument_is_not_kept(toy):
