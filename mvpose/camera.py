@@ -212,6 +212,7 @@ class Rig(Sealed):
     cameras: tuple[Camera, ...]
 
     _LARGEST = 200.0  # metres; real rigs are smaller, unless their calibration is in centimetres or millimetres
+    _SMALLEST = 0.02  # metres; two cameras of one housing are farther apart
 
     def __init__(self, cameras: Sequence[Camera]) -> None:
         if not isinstance(cameras, Iterable):
@@ -259,6 +260,13 @@ class Rig(Sealed):
             raise UnlikelyRigError(
                 f"all {len(self)} cameras of the rig stand in one point, {self.centers[0].tolist()}: nothing can be "
                 "triangulated; expected centres (-Rᵀ t, metres) that differ: check the t of each camera",
+                self.cameras,
+            )
+        if extent < self._SMALLEST:
+            raise UnlikelyRigError(
+                f"all {len(self)} cameras of the rig stand within {1000 * extent:.3g} mm, which cannot be metres (expected "
+                f"at least {1000 * self._SMALLEST:g} mm): the calibration is probably in kilometres, or was divided twice "
+                "to get metres; `mvpose doctor` says what it is, and what mends it",
                 self.cameras,
             )
 

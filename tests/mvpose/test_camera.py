@@ -210,6 +210,8 @@ def test_invalid_rigs_are_refused():
         Rig([GOOD, GOOD, turned])
     with pytest.raises(ValueError, match=r"stand up to 4004 apart, .* in millimetres"):
         Rig([GOOD, look_at([-4000, 0, 1000], [0, 0, 1000])])
+    with pytest.raises(ValueError, match=r"stand within 8 mm, .* probably in kilometres"):
+        Rig([look_at([0.004, 0, 1], [0, 9, 1]), look_at([-0.004, 0, 1], [0, 9, 1])])
     with pytest.raises(ValueError, match="cannot be metres"):
         Rig([GOOD, Camera(GOOD.K, GOOD.R, [1e9, -1e9, 1e9], size=(640, 480))])
     with pytest.raises(ValueError, match=r"t must have values of at most 1e\+09, got 1.7e\+308"):
