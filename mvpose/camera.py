@@ -264,9 +264,9 @@ class Rig(Sealed):
             )
         if extent < self._SMALLEST:
             raise UnlikelyRigError(
-                f"all {len(self)} cameras of the rig stand within {1000 * extent:.3g} mm, which cannot be metres (expected "
-                f"at least {1000 * self._SMALLEST:g} mm): the calibration is probably in kilometres, or was divided twice "
-                "to get metres; `mvpose doctor` says what it is, and what mends it",
+                f"all {len(self)} cameras of the rig stand within {1000 * extent:.3g} mm, which cannot be metres "
+                f"(expected at least {1000 * self._SMALLEST:g} mm): the calibration is probably in kilometres, or was "
+                "divided twice to get metres; `mvpose doctor` says what it is, and what mends it",
                 self.cameras,
             )
 

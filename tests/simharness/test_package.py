@@ -14,7 +14,7 @@ def test_every_public_name_can_be_imported():
 
 
 def test_public_names_are_listed_before_their_first_use():
-    code = "import simharness, mvpose; print(set(simharness.__all__ + mvpose.__all__) - {*dir(simharness), *dir(mvpose)})"
+    code = "import simharness, mvpose; print({*simharness.__all__, *mvpose.__all__} - {*dir(simharness), *dir(mvpose)})"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
 
 
