@@ -2,6 +2,7 @@
 
 import ast
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -24,11 +25,14 @@ def modules(package):
             yield file
 
 
-TREES = {
-    file.relative_to(ROOT).as_posix(): ast.parse(file.read_text(encoding="utf-8"))
-    for package in PACKAGES
-    for file in modules(package)
-}
+@cache
+def trees():
+    """Return the syntax tree of each module by file."""
+    return {
+        file.relative_to(ROOT).as_posix(): ast.parse(file.read_text(encoding="utf-8"))
+        for package in PACKAGES
+        for file in modules(package)
+    }
 
 
 def parameters(function):
@@ -39,12 +43,12 @@ def parameters(function):
 
 
 def test_there_is_something_to_read():
-    assert len(TREES) > 400
+    assert len(trees()) > 400
 
 
 def test_public_class_names_are_unique():
     homes = defaultdict(list)
-    for file, tree in TREES.items():
+    for file, tree in trees().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 homes[node.name].append(file)
@@ -54,7 +58,7 @@ def test_public_class_names_are_unique():
 @pytest.mark.parametrize("package", PACKAGES)
 def test_file_names_are_unique(package):
     homes = defaultdict(list)
-    for file in TREES:
+    for file in trees():
         if file.startswith(f"{package}/"):
             homes[Path(file).stem].append(file)
     twice = {name: files for name, files in homes.items() if len(files) > 1 and not name.startswith("__")}
@@ -65,7 +69,7 @@ def test_file_names_are_unique(package):
 def test_a_name_is_defined_once_in_its_module(package):
     """A second assignment would silently change what functions above it read."""
     twice = []
-    for file, tree in TREES.items():
+    for file, tree in trees().items():
         names = []
         for node in tree.body if file.startswith(f"{package}/") else []:
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -89,7 +93,7 @@ def test_a_name_is_defined_once_in_its_module(package):
 def test_signatures_are_short():
     long = {
         f"{file}:{node.name}"
-        for file, tree in TREES.items()
+        for file, tree in trees().items()
         for node in ast.walk(tree)
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and parameters(node) > LONGEST
     }

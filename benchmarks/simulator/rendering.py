@@ -51,7 +51,7 @@ class Measurement:
 
 def measure(*, quick: bool = False) -> list[Measurement]:
     """Time the rasteriser, posing and skinning."""
-    frames, rounds = (3, 2) if quick else (12, 6)
+    frames, rounds = (1, 1) if quick else (12, 6)
     staged = scenario()
     scene = build(staged, build_rig(staged.cameras))
     playback = Playback(scene)

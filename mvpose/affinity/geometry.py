@@ -129,8 +129,13 @@ def misfit(view, distance):
                 if column_least[near[a]] == row_least[a] < np.inf:
                     distances[count] = row_least[a]
                     count += 1
-    rank = int(_QUANTILE * count)
-    return np.partition(distances[:count], rank)[rank] if count >= _LEAST_PAIRS else 0.0
+    for n in range(1, count):  # insertion sort: that of NumPy takes seconds to compile
+        value, place = distances[n], n
+        while place > 0 and distances[place - 1] > value:
+            distances[place] = distances[place - 1]
+            place -= 1
+        distances[place] = value
+    return distances[int(_QUANTILE * count)] if count >= _LEAST_PAIRS else 0.0
 
 
 @njit(cache=True)

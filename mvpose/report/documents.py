@@ -1,6 +1,7 @@
 """HTML pages from templates."""
 
 import importlib.metadata
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +19,19 @@ def fill_template(template: str, /, *, folder: Path = TEMPLATES, **values: Any) 
         folder: folder of the template; the files that it extends or includes are there or in :data:`TEMPLATES`.
         values: values by the names that the template uses; a missing name is an error.
     """
-    environment = jinja2.Environment(
+    return _templates(folder).get_template(template).render(values)
+
+
+@cache
+def _templates(folder: Path) -> jinja2.Environment:
+    """Return the templates of a folder, of which each is compiled once."""
+    return jinja2.Environment(
         loader=jinja2.FileSystemLoader([folder, TEMPLATES]),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(template).render(values)
 
 
 def program_version() -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from doc_pages import ROOT, toml_file
 from easy_suite import EASY
+from suites import remember_scenes
 
 
 @pytest.fixture
@@ -20,6 +21,7 @@ def workplace(tmp_path, monkeypatch):
 @pytest.fixture
 def easy_workplace(tmp_path, monkeypatch):
     """Return a folder like that of a checkout, with an easy suite."""
+    remember_scenes(monkeypatch)
     (tmp_path / "ci.toml").write_text(EASY)  # a file in the working directory goes before a shipped scenario
     monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -349,14 +349,18 @@ def _text(content, draw):
 
 
 def _huge(content, draw):
+    """Make the content a thousand times as long: a reader whose time grows with the square takes more than its limit.
+
+    Readers take all of their time for these, so they are no longer than that.
+    """
     how = draw.choice(("times", "string", "number", "lines", "zeros", "key"))
     changed = {
-        "times": content * max(1, 2_000_000 // max(1, len(content))),
-        "string": content.replace(b'"', b'"' + b"x" * 1_500_000, 1),
-        "number": re.sub(rb"\d+", b"7" * 500_000, content, count=1),
-        "lines": content + b"\n" * 3_000_000,
-        "zeros": content + bytes(5_000_000),
-        "key": content + b"\n" + b"k" * 1_000_000 + b" = 1",
+        "times": content * max(1, 500_000 // max(1, len(content))),
+        "string": content.replace(b'"', b'"' + b"x" * 400_000, 1),
+        "number": re.sub(rb"\d+", b"7" * 150_000, content, count=1),
+        "lines": content + b"\n" * 750_000,
+        "zeros": content + bytes(1_250_000),
+        "key": content + b"\n" + b"k" * 250_000 + b" = 1",
     }[how]
     return changed, how
 

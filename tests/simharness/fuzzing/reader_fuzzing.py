@@ -15,7 +15,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-LONGEST = 5.0  # seconds of processor time that a reader may take for a file
+LONGEST = 2.0  # seconds of processor time that a reader may take for a file
 _PATIENCE = 60.0  # seconds of waiting for an answer, on a machine with other work
 _HELPERS = (".", "mvpose/formats", *(f"simharness/{name}" for name in ("trial", "study", "outputs", "world/motion")))
 _SHOWN = 12  # problems of a reader that the table lists

@@ -202,23 +202,30 @@ class TestMarkdown:
 
 
 @pytest.mark.parametrize(
-    ("check", "passed", "verdict"),
+    ("changes", "passed", "verdict"),
     [
-        (made(), True, "no regression"),
-        (made(better), True, "no regression"),
-        (made(much_better), False, "8 unexpected improvements"),
-        (replace(made(much_better), accept_better=True), True, "no regression, 8 unexpected improvements accepted"),
-        (made(slower), False, "4 regressions"),  # over the whole suite, and in each case
+        ({}, True, "no regression"),
+        ({"change": better}, True, "no regression"),
+        ({"change": much_better}, False, "8 unexpected improvements"),
+        ({"change": much_better, "accept_better": True}, True, "no regression, 8 unexpected improvements accepted"),
+        ({"change": slower}, False, "4 regressions"),  # over the whole suite, and in each case
         (
-            made(worse_parts, seeds=5),
+            {"change": worse_parts, "seeds": 5},
             True,
             "no regression, but 2 losses beyond tolerance that 5 seeds are too few to judge",
         ),
-        (made(failed=[FailedCase("base", 0, "no")]), False, "1 of 36 trials could not be run"),
-        (made(slower, failed=[FailedCase("base", 0, "no")]), False, "4 regressions, 1 of 36 trials could not be run"),
+        ({"failed": [FailedCase("base", 0, "no")]}, False, "1 of 36 trials could not be run"),
+        (
+            {"change": slower, "failed": [FailedCase("base", 0, "no")]},
+            False,
+            "4 regressions, 1 of 36 trials could not be run",
+        ),
     ],
 )
-def test_the_verdict(check, passed, verdict):
+def test_the_verdict(changes, passed, verdict):
+    options = dict(changes)
+    accept_better = options.pop("accept_better", False)
+    check = replace(made(**options), accept_better=accept_better)
     assert (check.passed, check.verdict) == (passed, verdict)
 
 
