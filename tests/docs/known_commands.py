@@ -77,10 +77,8 @@ READ_BY_A_NETWORK = {
     "simharness run pixels": "--set duration=0.4 --set rate=5 --set cameras.count=3",
     "simharness profile-network movenet --check": "--scenes pixels --other-scenes pixels --set duration=0.4 "
     "--set rate=5 --set people.count=2 --set cameras.count=3 --set cameras.size=[320,240]",
-    "simharness study sensor": "--set duration=0.2 --set rate=5 --set cameras.count=2 "
-    "--set sweep.sensor.read_noise=[0.0] --set sweep.sensor.shutter=[0.0] --set sweep.sensor.softness=[0.0] "
-    "--set sweep.sensor.exposure=[0.0] --set sweep.cameras.radius=[3.7] --set sweep.cameras.size=[[320,240]] "
-    "--set sweep.sensor.jpeg=[0,5] --seeds 1 --variant fast --workers 1",
+    "simharness study sensor": "--set duration=0.2 --set rate=5 --set cameras.count=2 --set cameras.size=[320,240] "
+    "--set 'sweep={one_at_a_time=true, sensor={jpeg=[92,5]}}' --seeds 1 --variant fast --workers 1",
 }
 REHEARSE = (  # run by tests/simharness/planning
     "simharness rehearse",
