@@ -8,6 +8,7 @@ SMALL_SCENE = "--set people.count=2 --set duration=0.4 --set rate=5"
 FASTEST = (
     "--set duration=0.4 --set rate=5 --set cameras.size=[160,120] --set rendering.renderer=rays --set room.walls=false"
 )
+ONE_WORKER = f"{FASTEST} --workers 1"
 RAYS = f"{FASTEST} --set people.count=2 --set cameras.count=3"
 PICTURES = f"{SMALL_SCENE} --set cameras.count=2 --set cameras.size=[160,120] --set clutter.shelves=0"
 LAB = f"{RAYS} --set sweep.cameras.height=[1.7] --set sweep.people.count=[2] --variant fast --workers 1"
@@ -15,7 +16,7 @@ ALONE = {
     "simharness blame quickstart --seeds 10 --workers 2": f"{RAYS} --seeds 1 --workers 1 --cause swaps --cause noise",
     "simharness run quickstart": RAYS,
     "simharness run quickstart --set detector.skeleton=halpe26": RAYS,
-    "simharness run quickstart --set people.count=6 --set cameras.count=3 --seed 1 --workers 2": f"{FASTEST} --workers 1",
+    "simharness run quickstart --set people.count=6 --set cameras.count=3 --seed 1 --workers 2": ONE_WORKER,
     "simharness export gathering benchmark": f"{PICTURES} --every 2",
     "simharness render gathering --video --overlay truth,detections,estimates": PICTURES,
     "simharness render gathering --set sensor.profile=webcam --set sensor.jpeg=60": PICTURES,

@@ -39,6 +39,7 @@ name = "tiny"
 duration = 0.2
 rate = 10.0
 variants = ["fast"]
+room.walls = false
 [people]
 count = 1
 [rendering]

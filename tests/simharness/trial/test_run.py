@@ -18,7 +18,7 @@ from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.method_section import MethodSection
 from simharness.scenario.sections.people_section import PeopleSection
-from simharness.scenario.sections.room_section import ClutterSection
+from simharness.scenario.sections.room_section import ClutterSection, RoomSection
 from simharness.scenario.sections.scenario import RenderingSection, Scenario
 from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.score_summary import VariantScores
@@ -37,6 +37,7 @@ def tiny(**sections) -> Scenario:
         "people": PeopleSection(count=2, activities=("wave", "talk")),
         "cameras": CamerasSection(count=2, size=(160, 120)),
         "clutter": ClutterSection(boxes=1),
+        "room": RoomSection(walls=False),
         "detector": read_profile("typical"),
         "method": MethodSection(variants=("full", "no-3dps")),
     }
@@ -163,7 +164,7 @@ class TestPrepare:
         ("scenario", "message"),
         [
             (tiny(cameras=CamerasSection(count=1)), "expected at least 2"),
-            (tiny(cameras=CamerasSection(count=2, radius=4.0)), "cam0.*wall"),
+            (tiny(cameras=CamerasSection(count=2, radius=4.0), room=RoomSection()), "cam0.*wall"),
             (tiny(method=MethodSection(variants=("full", "best"))), "method.variants: .*'best'"),
         ],
     )
