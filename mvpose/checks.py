@@ -41,6 +41,28 @@ def as_array(
     return array
 
 
+def set_arrays(
+    owner: object, prefix: str = "", **shapes: tuple[int | str, ...] | tuple[tuple[int | str, ...], type[np.generic]]
+) -> None:
+    """Replace fields of a frozen dataclass by what :func:`as_array` makes of them.
+
+    Args:
+        owner: the dataclass.
+        prefix: text before the names of the fields in messages.
+        shapes: shape of each field, and its type if that is not float. The size that a string stands for is that of
+            the first field which has it.
+
+    Raises:
+        ValueError: as of :func:`as_array`.
+    """
+    sizes: dict[int | str, int | str] = {}
+    for name, given in shapes.items():
+        shape, dtype = given if isinstance(given[0], tuple) else (given, np.float64)
+        array = as_array(getattr(owner, name), tuple(sizes.get(each, each) for each in shape), prefix + name, dtype)
+        sizes |= {each: size for each, size in zip(shape, array.shape, strict=True) if isinstance(each, str)}
+        object.__setattr__(owner, name, array)
+
+
 def _short(error: Exception, most: int = 100) -> str:
     """Return the message of an error of NumPy, which may repeat a text of any length."""
     text = str(error)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import fdtri, gammaincinv
 
-from mvpose.checks import Sealed, as_array
+from mvpose.checks import Sealed, as_array, set_arrays
 from mvpose.skeleton import COCO17, Skeleton
 
 
@@ -34,7 +34,7 @@ class Matching(Sealed):
     converged: bool = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "labels", as_array(self.labels, ("m",), "labels", np.int64))
+        set_arrays(self, labels=(("m",), np.int64))
 
     @property
     def people(self) -> int:
@@ -83,20 +83,13 @@ class Estimate(Sealed):
     time: float | None = None
 
     def __post_init__(self) -> None:
-        joints = as_array(self.joints, ("n", "J", 3), "joints")
-        object.__setattr__(self, "joints", joints)
-        object.__setattr__(self, "scores", as_array(self.scores, joints.shape[:2], "scores"))
-        if self.covariance is not None:
-            object.__setattr__(self, "covariance", as_array(self.covariance, (*joints.shape, 3), "covariance"))
-        if self.freedom is not None:
-            freedom = as_array(self.freedom, joints.shape[:2], "freedom")
-            if (freedom <= 2.0).any():
-                raise ValueError(
-                    f"degrees of freedom must be above 2, else there is no covariance; got {np.nanmin(freedom):.6g}"
-                )
-            object.__setattr__(self, "freedom", freedom)
-        if self.ids is not None:
-            object.__setattr__(self, "ids", as_array(self.ids, (len(joints),), "ids", np.int64))
+        optional = {"covariance": ("n", "J", 3, 3), "freedom": ("n", "J"), "ids": (("n",), np.int64)}
+        given = {name: shape for name, shape in optional.items() if getattr(self, name) is not None}
+        set_arrays(self, joints=("n", "J", 3), scores=("n", "J"), **given)
+        if self.freedom is not None and (self.freedom <= 2.0).any():
+            raise ValueError(
+                f"degrees of freedom must be above 2, else there is no covariance; got {np.nanmin(self.freedom):.6g}"
+            )
 
     @classmethod
     def of_joints(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose import SHELF14, Detections, Rig
 from mvpose.arrays import Floats
-from mvpose.checks import as_array
+from mvpose.checks import as_array, set_arrays
 from mvpose.heatmaps import Heatmaps
 
 DetectorKind = Literal["bottom-up", "top-down"]
@@ -47,8 +47,7 @@ class AnnotatedRecording:
     kind: DetectorKind = "bottom-up"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "frames", as_array(self.frames, ("F",), "frames", np.int64))
-        object.__setattr__(self, "truth", as_array(self.truth, (len(self.frames), "A", len(SHELF14), 3), "truth"))
+        set_arrays(self, frames=(("F",), np.int64), truth=("F", "A", len(SHELF14), 3))
         object.__setattr__(self, "detections", tuple(self.detections))
         if len(self.detections) != len(self.frames):
             raise ValueError(f"expected detections of {len(self.frames)} frames, got {len(self.detections)}")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mvpose import Detections
 from mvpose.arrays import Floats
-from mvpose.checks import as_array
+from mvpose.checks import set_arrays
 from mvpose.skeleton import Skeleton
 from mvpose.wholebody.estimator import rows_of
 
@@ -28,9 +28,7 @@ class OuterViews:
     visibility: NDArray[np.int8]
 
     def __post_init__(self) -> None:
-        pixels = as_array(self.pixels, ("T", "V", "P", "E", 2), "pixels")
-        object.__setattr__(self, "pixels", pixels)
-        object.__setattr__(self, "visibility", as_array(self.visibility, pixels.shape[:4], "visibility", np.int8))
+        set_arrays(self, pixels=("T", "V", "P", "E", 2), visibility=(("T", "V", "P", "E"), np.int8))
 
     @classmethod
     def concatenate(cls, parts: Many[Self]) -> Self:
@@ -70,8 +68,7 @@ class WholeFrame:
     joints: Floats
 
     def __post_init__(self) -> None:
-        shape = ("P", len(self.detections.skeleton), 3)
-        object.__setattr__(self, "joints", as_array(self.joints, shape, "joints"))
+        set_arrays(self, joints=("P", len(self.detections.skeleton), 3))
 
 
 def whole_joints(body: Floats, outer: Floats, skeleton: Skeleton) -> Floats:

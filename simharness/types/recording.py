@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mvpose import COCO17, Detections, Estimate, Rig
 from mvpose.arrays import Floats
-from mvpose.checks import as_array
+from mvpose.checks import set_arrays
 from simharness.types.truth import Truth
 
 _SAME_TIME = 1e-6  # seconds: nobody moves a hundredth of a millimetre in it
@@ -38,7 +38,7 @@ class Recording:
     def __post_init__(self) -> None:
         for key in ("detections", "truth"):
             object.__setattr__(self, key, tuple(getattr(self, key)))
-        object.__setattr__(self, "time", as_array(self.time, ("T",), "time"))
+        set_arrays(self, time=("T",))
         lengths = {"time": len(self.time), "detections": len(self.detections), "truth": len(self.truth)}
         if len(set(lengths.values())) > 1 or not len(self.time):
             got = ", ".join(f"{count} of {key}" for key, count in lengths.items())

@@ -6,7 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.checks import as_array
+from mvpose.checks import set_arrays
 
 
 class KeypointError(IntEnum):
@@ -51,15 +51,12 @@ class Truth:
         return np.asarray(np.isfinite(self.joints).all(axis=-1).any(axis=-1))
 
     def __post_init__(self) -> None:
-        joints = as_array(self.joints, ("P", "J", 3), "joints")
-        pixels = as_array(self.pixels, ("V", *joints.shape[:2], 2), "pixels")
-        person = as_array(self.person, ("m",), "person", np.int64)
-        for key, value in (
-            ("joints", joints),
-            ("pixels", pixels),
-            ("visibility", as_array(self.visibility, pixels.shape[:3], "visibility", np.int8)),
-            ("boxes", as_array(self.boxes, (*pixels.shape[:2], 4), "boxes")),
-            ("person", person),
-            ("error", as_array(self.error, (len(person), joints.shape[1]), "error", np.int8)),
-        ):
-            object.__setattr__(self, key, value)
+        set_arrays(
+            self,
+            joints=("P", "J", 3),
+            pixels=("V", "P", "J", 2),
+            visibility=(("V", "P", "J"), np.int8),
+            boxes=("V", "P", 4),
+            person=(("m",), np.int64),
+            error=(("m", "J"), np.int8),
+        )

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.checks import as_array
+from mvpose.checks import set_arrays
 
 
 class Visibility(IntEnum):
@@ -37,10 +37,8 @@ class LookalikeViews:
     visible: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0, 0, 17), bool))
 
     def __post_init__(self) -> None:
-        pixels = as_array(self.pixels, ("T", "V", len(self.names), "J", 2), "lookalike pixels")
-        object.__setattr__(self, "pixels", pixels)
-        visible = as_array(self.visible, pixels.shape[:4], "lookalike visible", np.bool_)
-        object.__setattr__(self, "visible", visible)
+        count = len(self.names)
+        set_arrays(self, "lookalike ", pixels=("T", "V", count, "J", 2), visible=(("T", "V", count, "J"), np.bool_))
 
     @classmethod
     def nothing(cls, frames: int, views: int, names: tuple[str, ...] = (), joints: int = 17) -> Self:
@@ -77,16 +75,15 @@ class Views:
     lookalikes: LookalikeViews = field(default_factory=LookalikeViews)
 
     def __post_init__(self) -> None:
-        pixels = as_array(self.pixels, ("T", "V", "P", "J", 2), "pixels")
-        shape = pixels.shape[:4]
-        for key, value in (
-            ("pixels", pixels),
-            ("visibility", as_array(self.visibility, shape, "visibility", np.int8)),
-            ("boxes", as_array(self.boxes, (*shape[:3], 4), "boxes")),
-            ("area_visible", as_array(self.area_visible, shape[:3], "area_visible", np.int64)),
-            ("source", as_array(self.source, shape[:2], "source", np.int64)),
-        ):
-            object.__setattr__(self, key, value)
+        set_arrays(
+            self,
+            pixels=("T", "V", "P", "J", 2),
+            visibility=(("T", "V", "P", "J"), np.int8),
+            boxes=("T", "V", "P", 4),
+            area_visible=(("T", "V", "P"), np.int64),
+            source=(("T", "V"), np.int64),
+        )
+        shape = self.visibility.shape
         if not self.lookalikes.names:
             object.__setattr__(self, "lookalikes", LookalikeViews.nothing(shape[0], shape[1], joints=shape[3]))
         if self.lookalikes.pixels.shape[:2] != shape[:2]:

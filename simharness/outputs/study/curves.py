@@ -7,7 +7,8 @@ a sentence, and by cause in the worst setting.
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from functools import cache
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from pydantic import BaseModel
 
 from mvpose.arrays import Floats
 from mvpose.commands.progress import Reporter
+from mvpose.files.input_files import parse_toml
 from simharness.runtime.number_text import fixed
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.catalogue import SCORES, ScoreInfo
@@ -199,44 +201,11 @@ def factor_breaking_points(
     return points
 
 
-NAMES: Mapping[str, str] = MappingProxyType(
-    {
-        "cameras.count": "cameras",
-        "cameras.preset": "rig",
-        "cameras.radius": "distance of the cameras from the middle",
-        "cameras.size": "size of the pictures",
-        "cameras.spread": "angle from the first camera to the last",
-        "clutter.coverage": "share of hidden joints",
-        "detector.keypoints.quality": "factor of the profile's keypoint errors",
-        "detector.phantoms.life": "mean lifetime of a phantom",
-        "detector.phantoms.rate": "phantoms per view and frame",
-        "detector.profile": "detector profile",
-        "faults.center": "error of principal points",
-        "faults.clock_jitter": "error of each picture's time",
-        "faults.clock_offset": "error of each camera's clock",
-        "faults.dropped": "probability that a picture is lost",
-        "faults.focal": "error of focal lengths",
-        "faults.rolling_shutter": "time from the first row to the last",
-        "faults.rotation": "error of camera orientations",
-        "faults.rotation_drift": "drift of camera orientations",
-        "faults.translation": "error of camera positions",
-        "faults.translation_drift": "drift of camera positions",
-        "people.camouflage": "clothes in the colour of the walls",
-        "people.count": "people",
-        "people.hidden": "time hidden from all cameras",
-        "people.look_alike": "similarity of clothes, 1: one uniform",
-        "people.passing": "distance between people who pass",
-        "room.light": "light",
-        "room.size": "size of the room",
-        "sensor.exposure": "spread of the cameras' exposure",
-        "sensor.jpeg": "quality of JPEG, 0: none",
-        "sensor.profile": "quality of the pictures",
-        "sensor.read_noise": "noise of the readout, of white",
-        "sensor.shutter": "exposure time",
-        "sensor.softness": "blur by lens and pixels",
-    }
-)
-"""Names of the keys that the studies of this project sweep: the descriptions of keys are too long for an axis."""
+@cache
+def axis_names() -> Mapping[str, str]:
+    """Return the names of the keys that the studies of this project sweep."""
+    return parse_toml((Path(__file__).parents[1] / "data" / "axis_names.toml").read_text(encoding="utf-8"))
+
 
 _UNITS = (  # patterns in descriptions of keys, and the unit of each; the first match counts
     (r"degrees per minute", "degrees per minute"),
@@ -253,9 +222,10 @@ _UNITS = (  # patterns in descriptions of keys, and the unit of each; the first 
 
 
 def axis_label(key: str) -> str:
-    """Return the axis label of a key: its name in :data:`NAMES`, else the key itself, with the unit of its values."""
+    """Return the axis label of a key: its name in :func:`axis_names`, else itself, with the unit of its values."""
     unit = unit_of(key)
-    return f"{NAMES.get(key, key)}, {unit}" if unit else NAMES.get(key, key)
+    name = axis_names().get(key, key)
+    return f"{name}, {unit}" if unit else name
 
 
 def unit_of(key: str) -> str:

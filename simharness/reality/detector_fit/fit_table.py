@@ -1,7 +1,8 @@
 """Tables of a measured detector for the terminal, every value with its interval; and a plot of its values."""
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mvpose.files.atomic_files import write_atomic
+from mvpose.files.input_files import parse_toml
 from simharness.reality.annotation_errors import AnnotationFit
 from simharness.reality.detector_fit.detector_measurement import MeasuredDetector, MeasuredValue, agreement
 from simharness.reality.detector_fit.frame_sums import TERCILES
@@ -24,44 +26,11 @@ from simharness.scenario.sections.detector_section import BEARINGS, KINDS
 
 _WIDE = 130  # columns of a terminal that has room for all intervals
 _OCCLUSIONS = ("visible", "self_occluded", "occluded")
-_OTHERS = {
-    "Correlation of errors": (
-        ("correlation.life", "mean life of an error, s"),
-        ("correlation.views", "shared by all views"),
-        ("correlation.gross_views", "gross errors, shared by all views"),
-        ("correlation.limb", "shared within the limb"),
-        ("correlation.scatter_life", "correlation time of scatter, s"),
-        ("correlation.scatter_noise", "share of scatter drawn anew in each frame"),
-        ("correlation.scatter_near", "correlation of the scatter of neighbouring joints"),
-        ("correlation.scatter_views", "share of scatter that views have in common"),
-        ("keypoints.border", "reach beyond the border of the image, units"),
-        ("keypoints.stray.elbows", "share of misses of limbs anywhere on the box"),
-    ),
-    "Scores": (
-        ("scores.good", "good"),
-        ("scores.jitter", "jitter"),
-        ("scores.miss", "miss"),
-        ("scores.inversion", "inversion"),
-        ("scores.swap", "swap"),
-        ("scores.hidden.good", "factor of good ones, not visible"),
-        ("scores.hidden.miss", "factor of misses, not visible"),
-        ("scores.deviation", "deviation, logit"),
-        ("scores.overconfident", "overconfident misses, share"),
-        ("scores.underconfident", "underconfident good keypoints, share"),
-    ),
-    "People": (
-        ("boxes.missed", "missed, share in a view"),
-        ("boxes.missed_hidden.2", "missed with half of the joints hidden, share"),
-        ("boxes.missed_hidden.4", "missed with all joints hidden, share"),
-        ("boxes.missed_views", "missed, shared by all views"),
-        ("boxes.life", "mean life of a miss, s"),
-        ("boxes.duplicates", "duplicates, share"),
-        ("phantoms.rate", "false positives per view and frame, at most"),
-        ("phantoms.life", "mean life of false positives, s"),
-        ("phantoms.score", "score of their keypoints"),
-        ("size.fragments", "fragments per view and frame"),
-    ),
-}
+
+
+@cache
+def _labels() -> Mapping[str, Any]:
+    return parse_toml((Path(__file__).parent / "data" / "labels.toml").read_text(encoding="utf-8"))
 
 
 def print_measurement(measurement: MeasuredDetector, console: Console) -> None:
@@ -86,7 +55,7 @@ def print_measurement(measurement: MeasuredDetector, console: Console) -> None:
         _face(measurement),
         _sizes(measurement),
     ]
-    blocks += [_list(title, rows, measurement) for title, rows in _OTHERS.items()]
+    blocks += [_list(title, rows, measurement) for title, rows in _labels()["lists"].items()]
     console.print(Group(*(Padding(block, (0, 0, 1, 0)) for block in [*blocks, notes])))
 
 
@@ -171,9 +140,9 @@ def _sizes(measurement: MeasuredDetector) -> Table:
     return table
 
 
-def _list(title: str, rows: tuple[tuple[str, str], ...], measurement: MeasuredDetector) -> Table:
+def _list(title: str, rows: Mapping[str, str], measurement: MeasuredDetector) -> Table:
     table = _table(title, "", "measured")
-    for key, label in rows:
+    for key, label in rows.items():
         if key in measurement.values:  # parameters differ with the kind of the detector
             table.add_row(label, _cell(measurement[key], 2))
     return table
@@ -223,36 +192,6 @@ _STYLE: dict[Any, Any] = {
 }
 _MIN_COUNT = 100  # joints, people or detections behind a value: with fewer, its interval is too wide to plot
 _BINS = tuple(map(str, range(len(BEARINGS))))
-_PANELS: tuple[tuple[str, str, tuple[str, ...], float], ...] = (
-    ("keypoints.drop.visible", "not reported, of visible joints, %", KINDS, 100),
-    ("keypoints.drop.self_occluded", "not reported, self-occluded, %", KINDS, 100),
-    ("keypoints.drop.occluded", "not reported, occluded, %", KINDS, 100),
-    ("keypoints.jitter", "jitter, of visible joints, %", KINDS, 100),
-    ("keypoints.miss", "miss, of visible joints, %", KINDS, 100),
-    ("keypoints.inversion", "inversion, %", KINDS, 100),
-    ("keypoints.swap", "swap, %", KINDS, 100),
-    ("keypoints.jitter_mean", "mean distance of jitters, % of the way from 1.14 to 2.35 units", KINDS, 100),
-    ("keypoints.scatter", "scatter of good keypoints, units", KINDS, 1),
-    ("keypoints.scatter_hidden", "factor of scatter, not visible", KINDS, 1),
-    ("keypoints.self_occluded", "factor of misses and jitter, self-occluded", KINDS, 1),
-    ("keypoints.occluded", "factor of misses and jitter, occluded", KINDS, 1),
-    ("keypoints.face.ears", "ears not reported, by bearing of the camera to their side, %", _BINS, 100),
-    ("keypoints.face.nose", "nose not reported, by bearing of the camera, %", _BINS, 100),
-    ("scores.joint", "score, relative to elbows", KINDS, 1),
-)
-_REST: tuple[tuple[str, str], ...] = (
-    ("correlation.life", "life, s"),
-    ("correlation.views", "views"),
-    ("correlation.gross_views", "gross,\nviews"),
-    ("correlation.limb", "limb"),
-    ("correlation.scatter_life", "scatter\nlife, s"),
-    ("correlation.scatter_near", "scatter\nnear"),
-    ("scores.good", "score\ngood"),
-    ("scores.miss", "score\nmiss"),
-    ("boxes.missed", "missed"),
-    ("boxes.missed_hidden.4", "missed,\nhidden"),
-    ("phantoms.rate", "false"),
-)
 
 
 def plot_comparison(measurements: Sequence[MeasuredDetector], path: str | Path) -> None:
@@ -264,14 +203,16 @@ def plot_comparison(measurements: Sequence[MeasuredDetector], path: str | Path) 
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(19, 10), layout="constrained", dpi=110)
         axes = figure.subplots(4, 4).ravel()
-        for ax, (key, title, kinds, scale) in zip(axes, _PANELS, strict=False):
+        for ax, (key, title, by, scale) in zip(axes, _labels()["plot"]["panels"], strict=False):
+            kinds = KINDS if by == "kinds" else _BINS
             _draw(ax, measurements, [f"{key}.{kind}" for kind in kinds], scale=scale)
             ax.set_title(title)
             labels = [f"{bearing}°" for bearing in BEARINGS] if kinds == _BINS else kinds
             ax.set_xticks(range(len(kinds)), labels, fontsize=7.5)
-        _draw(axes[-1], measurements, [key for key, _ in _REST])
+        others = _labels()["plot"]["others"]
+        _draw(axes[-1], measurements, list(others))
         axes[-1].set_title("correlation, scores, people")
-        axes[-1].set_xticks(range(len(_REST)), [label for _, label in _REST], fontsize=7)
+        axes[-1].set_xticks(range(len(others)), list(others.values()), fontsize=7)
         handles, names = axes[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside upper left", ncols=2, fontsize=10)
         figure.supxlabel(

@@ -2,11 +2,13 @@
 
 import textwrap
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mvpose.arrays import Floats
+from mvpose.files.input_files import parse_toml
 from simharness.reality.detector_fit.detector_measurement import MeasuredDetector
 from simharness.scenario.sections.detector_section import KINDS, LARGEST_MULTIPLE, DetectorSection
 
@@ -25,36 +27,6 @@ _MOST = {
     "phantoms.rate": 20.0,
 }
 """Largest value that a profile may hold, by the beginning of the keys."""
-
-_NOTES: Mapping[str, str] = {
-    "keypoints": (
-        "Shares of the visible joints that the classes before left, against the consensus of the other views. "
-        "Visibility is that of bodies that re-enact the people; joints hidden by furniture count as visible. "
-        "miss_some, miss_few and swap_crowded: not measured, as the rates without them. small and truncated: not "
-        "measured. reach: by definition; misses well beyond it are in stray. jitter_mean: as a share of the way from "
-        "1.14 to 2.35 units. Scatter, jitter, misses and their factors are calibrated: with these values simulated "
-        "detections measure as the recorded ones."
-    ),
-    "keypoints.drop": "Shares of the joints in the picture that are not reported; bottom-up: whose parent is reported.",
-    "keypoints.face": "Shares not reported at bearings of 0, 30, ..., 330 degrees from straight ahead to their side.",
-    "bias": (
-        "Metres forward, outward and up in the body's frame: what all actors share of the offset of the consensus from "
-        "the annotated joints."
-    ),
-    "correlation": (
-        "Tetrachoric correlations over views (gross errors apart) and within limbs; lives from autocorrelations up to "
-        "two seconds; scatter_views from the lengths of bones, which single views' noise does not explain."
-    ),
-    "scores": "Medians, of visible joints where visibility matters; deviation on the logit scale; face as reported.",
-    "boxes": (
-        "missed: share of people with at least half of their limb joints in the picture. The detector reports neither "
-        "boxes nor box scores: jitter, merged, split, score and deviation are not measured."
-    ),
-    "phantoms": (
-        "Detections that show no annotated person and agree with no other view: an upper bound of false positives. "
-        "views: 0 by this definition. parts and plausible: not measured."
-    ),
-}
 
 
 def settings(measurement: MeasuredDetector, *, name: str, bias: Floats | None = None) -> dict[str, Any]:
@@ -91,7 +63,7 @@ def as_toml(
     name: str,
     bias: Floats | None = None,
     command: str = "",
-    notes: Mapping[str, str] = _NOTES,
+    notes: str = "recording",
     of: str = "annotated people",
 ) -> str:
     """Return the profile as a file: every value with its interval and count, and notes on what was not measured.
@@ -101,7 +73,7 @@ def as_toml(
         name: name of the profile.
         bias: as of :func:`settings`.
         command: command that made it.
-        notes: notes by section.
+        notes: name of the notes, in ``data/notes.toml``.
         of: who the people are.
     """
     tree = settings(measurement, name=name, bias=bias)
@@ -111,13 +83,14 @@ def as_toml(
         f"{measurement.people:.2f} {of} a frame. Behind each value: its 95 % interval (bootstrap of blocks of time or "
         f"of scenes) and the number n of joints, people or detections."
     )
+    all_notes = parse_toml((Path(__file__).parent / "data" / "notes.toml").read_text(encoding="utf-8"))
     lines = [*_wrapped(head)]
     if command:
         lines.append(f"# Made by: {command}")
     lines += [f'name = "{tree["name"]}"', f'kind = "{tree["kind"]}"']
     for section in ("keypoints", "bias", "correlation", "scores", "boxes", "phantoms", "decoys"):
         if section in tree or section != "decoys":
-            lines += _section(section, tree.get(section, {}), measurement, notes)
+            lines += _section(section, tree.get(section, {}), measurement, all_notes[notes])
     return "\n".join(lines) + "\n"
 
 

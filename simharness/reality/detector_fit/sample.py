@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mvpose import COCO17, Detections, Rig
 from mvpose.arrays import Bools, Floats
-from mvpose.checks import as_array
+from mvpose.checks import set_arrays
 from mvpose.recording import People
 from simharness.detector.viewing_conditions import Conditions
 from simharness.reality.annotated_recording import AnnotatedRecording, DetectorKind
@@ -49,14 +49,11 @@ class Sample:
     measured: Bools | None = None
 
     def __post_init__(self) -> None:
-        time = as_array(self.time, ("T",), "time")
-        reference = as_array(self.reference, (len(time), "P", len(COCO17), 3), "reference")
-        object.__setattr__(self, "time", time)
-        object.__setattr__(self, "reference", reference)
+        set_arrays(self, time=("T",), reference=("T", "P", len(COCO17), 3))
         object.__setattr__(self, "detections", tuple(self.detections))
-        if len(self.detections) != len(time):
-            raise ValueError(f"expected detections of {len(time)} frames, got {len(self.detections)}")
-        limbs = np.isfinite(reference[:, :, LIMB_JOINTS]).all(axis=-1)
+        if len(self.detections) != len(self.time):
+            raise ValueError(f"expected detections of {len(self.time)} frames, got {len(self.detections)}")
+        limbs = np.isfinite(self.reference[:, :, LIMB_JOINTS]).all(axis=-1)
         if (limbs.any(axis=-1) != limbs.all(axis=-1)).any():
             frame, person = np.argwhere(limbs.any(axis=-1) != limbs.all(axis=-1))[0]
             raise ValueError(

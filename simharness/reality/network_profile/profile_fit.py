@@ -60,15 +60,6 @@ _FACTORS = (
     *("correlation.life", "boxes.life", "boxes.jitter", "phantoms.rate", "phantoms.life"),
     *("keypoints.truncated", "keypoints.small", "keypoints.guess.scatter"),
 )
-_NOTES: Mapping[str, str] = {
-    "keypoints": (
-        "Shares of the joints that the classes before left, against exact truth; at these values a simulated detector "
-        "in the same scenes is measured as the network is. miss_some, miss_few and swap_crowded: as without them."
-    ),
-    "bias": "Metres forward, outward and up in the body's frame: the network's joints from the anatomical ones.",
-    "boxes": "Of people with at least half of their limb joints in the picture.",
-    "phantoms": "Detections that show neither a person nor a decoy. views: 0 by this definition.",
-}
 
 
 @dataclass(frozen=True)
@@ -153,7 +144,7 @@ def fit_network(
     )
     calibrated = measured.with_values({**fitted, **rare})
     detector = DetectorSection.model_validate(settings(calibrated, name=name, bias=bias))
-    text = as_toml(calibrated, name=name, bias=bias, command=command, notes=_NOTES, of="people whose truth is exact")
+    text = as_toml(calibrated, name=name, bias=bias, command=command, notes="network", of="people whose truth is exact")
     simulated = label_scenes(scenes, [scene.simulated(detector) for scene in scenes], kind=kind, bias=bias)
     return NetworkProfile(name, tuple(scenes), bias, measured, labels, simulated, detector, text)
 

@@ -15,11 +15,13 @@ Children: WHO growth reference for 5 to 19 years, de Onis et al., Bulletin of th
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from types import MappingProxyType
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mvpose.arrays import Floats
+from mvpose.files.input_files import parse_toml
 from mvpose.skeleton import COCO17
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import body_model
@@ -37,68 +39,39 @@ class Spread:
     correlation: float = 0.0
 
 
-# Correlations with stature are rounded from ANSUR (Cheverud et al., NATICK/TR-90/031, 1990), between 0.6 and 0.9;
-# those of differences of two heights are lower.
-ADULTS: Mapping[str, Mapping[str, Spread]] = MappingProxyType(
-    {
-        "male": {
-            "stature": Spread(1.756, 0.0686, 1.0),
-            "bmi": Spread(27.7, 4.0),
-            "upper_arm": Spread(0.3352 * _UPPER_ARM, 0.0175 * _UPPER_ARM, 0.75),
-            "forearm": Spread(0.2679, 0.0154, 0.75),
-            "thigh": Spread(0.4093, 0.0284, 0.65),
-            "knee": Spread(0.4917, 0.0266, 0.85),
-        },
-        "female": {
-            "stature": Spread(1.6285, 0.0642, 1.0),
-            "bmi": Spread(25.5, 3.6),
-            "upper_arm": Spread(0.3112 * _UPPER_ARM, 0.0172 * _UPPER_ARM, 0.75),
-            "forearm": Spread(0.2413, 0.0152, 0.75),
-            "thigh": Spread(0.3794, 0.0240, 0.65),
-            "knee": Spread(0.4659, 0.0271, 0.85),
-        },
-    }
-)
-"""Measures of adults by sex, in metres, bmi in kg/m2. "knee" is the height of the knee joint over the sole."""
-
 YEARS = (5.0, 12.0)
 """Least and greatest age of children, years."""
-_KNOTS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)  # years
-# LMS parameters at the knots. Stature: median in metres and coefficient of variation S (the power L is 1).
-# Body mass index: L, median in kg/m2, S.
-_STATURE = {
-    "male": (
-        (1.0973, 1.1595, 1.2173, 1.2727, 1.3257, 1.3778, 1.4311, 1.4908),
-        (0.0416, 0.0425, 0.0434, 0.0444, 0.0454, 0.0463, 0.0470, 0.0475),
-    ),
-    "female": (
-        (1.0907, 1.1512, 1.2081, 1.2656, 1.3249, 1.3864, 1.4499, 1.5123),
-        (0.0435, 0.0445, 0.0453, 0.0458, 0.0461, 0.0461, 0.0458, 0.0452),
-    ),
-}
-_MASS_INDEX = {
-    "male": (
-        (-0.72, -0.99, -1.25, -1.46, -1.63, -1.74, -1.79, -1.78),
-        (15.27, 15.31, 15.48, 15.74, 16.05, 16.44, 16.94, 17.53),
-        (0.084, 0.087, 0.091, 0.095, 0.100, 0.106, 0.111, 0.115),
-    ),
-    "female": (
-        (-0.87, -1.08, -1.26, -1.39, -1.47, -1.49, -1.46, -1.40),
-        (15.25, 15.27, 15.40, 15.68, 16.10, 16.61, 17.25, 18.00),
-        (0.096, 0.102, 0.107, 0.113, 0.118, 0.123, 0.127, 0.131),
-    ),
-}
+
+_KNOTS = np.linspace(*YEARS, 8)  # years, of the measures of children
+
+
+@cache
+def _tables() -> dict[str, Any]:
+    return parse_toml((Path(__file__).parent / "data" / "anthropometry.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def adult_spreads() -> Mapping[str, Mapping[str, Spread]]:
+    """Return the measures of adults by sex, in metres, bmi in kg/m2; "knee" is the height of the knee over the sole."""
+    scales = {"upper_arm": _UPPER_ARM}
+    return {
+        sex: {
+            name: Spread(mean * scales.get(name, 1.0), deviation * scales.get(name, 1.0), correlation)
+            for name, (mean, deviation, correlation) in measures.items()
+        }
+        for sex, measures in _tables()["adults"].items()
+    }
 
 
 def child_stature(sex: str, years: float) -> Spread:
     """Return the distribution of stature of children: ``sex`` "male" or "female", age 5 to 12 years."""
-    median, variation = (float(np.interp(years, _KNOTS, row)) for row in _STATURE[sex])
+    median, variation = (float(np.interp(years, _KNOTS, row)) for row in _tables()["children"][sex]["stature"])
     return Spread(median, median * variation, 1.0)
 
 
 def child_mass_index(sex: str, years: float, score: float) -> float:
     """Return the body mass index, kg/m2, at ``score`` standard deviations from the median of a sex and age."""
-    power, median, variation = (float(np.interp(years, _KNOTS, row)) for row in _MASS_INDEX[sex])
+    power, median, variation = (float(np.interp(years, _KNOTS, row)) for row in _tables()["children"][sex]["bmi"])
     return float(median * (1 + power * variation * score) ** (1 / power))
 
 
@@ -172,7 +145,7 @@ def draw_shape(rng: np.random.Generator, *, child: bool = False) -> Shape:
 
 
 def _adult_measures(sex: str, score: Floats) -> dict[str, float]:
-    """Return measures of an adult from standard normal scores, in the order of ``ADULTS``.
+    """Return measures of an adult from standard normal scores, in the order of :func:`adult_spreads`.
 
     The first score is that of stature; each other score is the part of its measure that is independent of stature.
     """
@@ -180,13 +153,13 @@ def _adult_measures(sex: str, score: Floats) -> dict[str, float]:
         name: float(
             spread.mean + spread.deviation * (spread.correlation * score[0] + np.sqrt(1 - spread.correlation**2) * each)
         )
-        for each, (name, spread) in zip(score, ADULTS[sex].items(), strict=False)
+        for each, (name, spread) in zip(score, adult_spreads()[sex].items(), strict=False)
     }
 
 
 def _child_measures(sex: str, age: float, score: Floats) -> dict[str, float]:
     """Return measures of a child from the standard normal scores of stature and body mass index."""
-    spread, adult = child_stature(sex, age), ADULTS[sex]
+    spread, adult = child_stature(sex, age), adult_spreads()[sex]
     stature = float(spread.mean + spread.deviation * score[0])
     arms = {limb: adult[limb].mean * stature / adult["stature"].mean for limb in ("upper_arm", "forearm")}
     return {"stature": stature, "bmi": child_mass_index(sex, age, float(score[1]))} | arms

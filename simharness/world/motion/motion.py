@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Bools, Floats
-from mvpose.checks import as_array
+from mvpose.checks import set_arrays
 from simharness.world.humans.anatomy import DOFS
 
 RATE = 60.0  # Hz: planning rate of motions, which are read at any time: frames and cameras have separate clocks
@@ -47,12 +47,9 @@ class Trajectory:
     pose: Floats
 
     def __post_init__(self) -> None:
-        time = as_array(self.time, ("N",), "trajectory time")
-        pose = as_array(self.pose, (len(time), 7), "trajectory pose")
-        check_times(time, "trajectory")
-        check_poses(pose, "trajectory pose")
-        object.__setattr__(self, "time", time)
-        object.__setattr__(self, "pose", pose)
+        set_arrays(self, "trajectory ", time=("N",), pose=("N", 7))
+        check_times(self.time, "trajectory")
+        check_poses(self.pose, "trajectory pose")
 
     def __len__(self) -> int:
         return len(self.time)
@@ -131,10 +128,9 @@ class Presence:
     intervals: Floats
 
     def __post_init__(self) -> None:
-        intervals = as_array(self.intervals, ("n", 2), "presence intervals")
-        if np.isnan(intervals).any() or (np.diff(intervals.ravel()) < 0).any():
-            raise ValueError(f"presence intervals must be ascending seconds, got {intervals.tolist()}")
-        object.__setattr__(self, "intervals", intervals)
+        set_arrays(self, "presence ", intervals=("n", 2))
+        if np.isnan(self.intervals).any() or (np.diff(self.intervals.ravel()) < 0).any():
+            raise ValueError(f"presence intervals must be ascending seconds, got {self.intervals.tolist()}")
 
     @property
     def always(self) -> bool:
@@ -195,16 +191,12 @@ class Motion:
     angles: Floats
 
     def __post_init__(self) -> None:
-        time = as_array(self.time, ("T",), "motion time")
-        root = as_array(self.root, (len(time), 7), "motion root")
-        angles = as_array(self.angles, (len(time), len(DOFS)), "motion angles")
-        check_times(time, "motion")
-        check_poses(root, "motion root")
-        if not np.isfinite(angles).all():
-            bad = int(np.flatnonzero(~np.isfinite(angles).all(axis=1))[0])
+        set_arrays(self, "motion ", time=("T",), root=("T", 7), angles=("T", len(DOFS)))
+        check_times(self.time, "motion")
+        check_poses(self.root, "motion root")
+        if not np.isfinite(self.angles).all():
+            bad = int(np.flatnonzero(~np.isfinite(self.angles).all(axis=1))[0])
             raise ValueError(f"motion angles must be finite; those at index {bad} are not")
-        for key, value in (("time", time), ("root", root), ("angles", angles)):
-            object.__setattr__(self, key, value)
 
     def __len__(self) -> int:
         return len(self.root)

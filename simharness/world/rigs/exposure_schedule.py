@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Camera, Rig
-from mvpose.checks import as_array
+from mvpose.checks import as_array, set_arrays
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,32 +52,27 @@ class ExposureSchedule:
         views = len(self.believed_rig)
         if len(self.true_cameras) != views:
             raise ValueError(f"expected as many true cameras as believed ones, {views}, got {len(self.true_cameras)}")
-        time = as_array(self.time, ("T", views), "time")
-        source = as_array(self.source, (len(time), views), "source", np.int64)
-        known_time = as_array(self.known_time, time.shape, "known_time")
-        camera_of_view = as_array(self.camera_of_view, (views,), "camera_of_view", np.int64)
-        rotation_rate = as_array(self.rotation_rate, (views, 3), "rotation_rate")
-        velocity = as_array(self.velocity, (views, 3), "velocity")
-        for name, values in (("time", time), ("rotation_rate", rotation_rate), ("velocity", velocity)):
-            if not np.isfinite(values).all():
+        set_arrays(
+            self,
+            time=("T", views),
+            source=(("T", views), np.int64),
+            known_time=("T", views),
+            camera_of_view=((views,), np.int64),
+            rotation_rate=(views, 3),
+            velocity=(views, 3),
+        )
+        for name in ("time", "rotation_rate", "velocity"):
+            if not np.isfinite(getattr(self, name)).all():
                 raise ValueError(f"{name} must be finite, but has values that are not")
-        if (source < -1).any() or (source > np.arange(len(time))[:, None]).any():
+        if (self.source < -1).any() or (self.source > np.arange(len(self.time))[:, None]).any():
             raise ValueError("source must be -1 or a frame that is not later than the frame of its row")
-        if not np.array_equal(np.isfinite(known_time), source >= 0):
+        if not np.array_equal(np.isfinite(self.known_time), self.source >= 0):
             raise ValueError("known_time must be finite where a picture arrives, and NaN elsewhere")
-        if sorted(camera_of_view) != list(range(views)):
-            raise ValueError(f"camera_of_view must name each of {views} cameras once, got {camera_of_view.tolist()}")
+        if sorted(self.camera_of_view) != list(range(views)):
+            got = self.camera_of_view.tolist()
+            raise ValueError(f"camera_of_view must name each of {views} cameras once, got {got}")
         if not 0.0 <= self.readout < np.inf:
             raise ValueError(f"readout must be finite and not negative, got {self.readout}")
-        for name, array in (
-            ("time", time),
-            ("source", source),
-            ("known_time", known_time),
-            ("camera_of_view", camera_of_view),
-            ("rotation_rate", rotation_rate),
-            ("velocity", velocity),
-        ):
-            object.__setattr__(self, name, array)
 
     @classmethod
     def ideal(cls, rig: Rig, time: ArrayLike) -> "ExposureSchedule":

@@ -20,15 +20,7 @@ _TEMPO = (1.5, 1.8)  # beats per second at pace 1
 
 @solo_activity("dance", clearance=0.2)
 def dance(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
-    """Step to one side, bring the other foot along, and back, bouncing on every beat.
-
-    Args:
-        kinematics: body.
-        spot: position and facing direction.
-        time: times in seconds, (T,).
-        rng: random generator for tempo and manner.
-        pace: speed relative to the usual one.
-    """
+    """Step to one side, bring the other foot along, and back, bouncing on every beat."""
     tempo, offset, wide, bouncy, twisty, broad, first = rng.uniform(size=7)
     beat = pace * (_TEMPO[0] + (_TEMPO[1] - _TEMPO[0]) * tempo)
     count = beat * time + _BAR * offset

@@ -45,15 +45,7 @@ _SAMPLES = 240
 
 @solo_activity("run", track=Loop, froude=(0.6, 0.95))
 def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Generator, pace: float = 1.0) -> Motion:
-    """Run round the loop at its speed.
-
-    Args:
-        kinematics: body.
-        loop: path and speed.
-        time: times in seconds, (T,).
-        rng: random generator for phase and manner.
-        pace: cadence relative to the usual one.
-    """
+    """Run round the loop at its speed."""
     stride = make_stride(kinematics, speed=loop.speed, pace=pace)
     offset, swing, upright, droop = rng.uniform(size=4)
     vigour = min(stride.vigour, 1.1)

@@ -26,13 +26,6 @@ def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gen
 
     Feet are planted: a footprint lies where the pelvis passes over it, and the foot rolls over it without slipping
     from heel strike to toe-off, so that neither a bend nor the sway of the pelvis drags a foot.
-
-    Args:
-        kinematics: body.
-        loop: path and speed.
-        time: times in seconds, (T,).
-        rng: random generator for phase and manner (arm swing, lean of the trunk).
-        pace: as for ``make_gait``.
     """
     gait = make_gait(kinematics, speed=loop.speed, pace=pace)
     offset, swing, manner, droop = rng.uniform(size=4)

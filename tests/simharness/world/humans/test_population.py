@@ -6,7 +6,7 @@ import pytest
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import (
-    ADULTS,
+    adult_spreads,
     child_mass_index,
     child_stature,
     draw_shape,
@@ -59,12 +59,12 @@ def test_an_impossible_shape_is_refused(field, value):
         Shape(**{field: value})
 
 
-@pytest.mark.parametrize("sex", ADULTS)
+@pytest.mark.parametrize("sex", adult_spreads())
 @pytest.mark.parametrize("measure", ["stature", "bmi", "upper_arm", "forearm", "thigh", "knee"])
 def test_drawn_adults_are_spread_as_published(adults, sex, measure):
     """Means and deviations agree within three standard errors; clipped tails allow another 10 % of the deviation."""
     values = np.array([m[measure] for s, m in zip(*adults, strict=True) if (s.gender > 0.5) == (sex == "female")])
-    spread, count = ADULTS[sex][measure], len(values)
+    spread, count = adult_spreads()[sex][measure], len(values)
     assert 55 <= count <= 105
     assert values.mean() == pytest.approx(spread.mean, abs=3 * spread.deviation / np.sqrt(count))
     assert values.std(ddof=1) == pytest.approx(spread.deviation, rel=3 / np.sqrt(2 * count) + 0.1)
@@ -80,11 +80,11 @@ def test_arms_agree_with_another_source(adults, sex, upper_arm, forearm):
 
 def test_limbs_correlate_with_stature_as_published(adults):
     """Within a sex limbs and stature are correlated, but not completely: sitting people differ less than standing."""
-    for sex in ADULTS:
+    for sex in adult_spreads():
         same_sex = [m for s, m in zip(*adults, strict=True) if (s.gender > 0.5) == (sex == "female")]
         for limb in ("upper_arm", "forearm", "thigh", "knee"):
             correlation = np.corrcoef([m["stature"] for m in same_sex], [m[limb] for m in same_sex])[0, 1]
-            assert correlation == pytest.approx(ADULTS[sex][limb].correlation, abs=0.2)
+            assert correlation == pytest.approx(adult_spreads()[sex][limb].correlation, abs=0.2)
 
 
 def test_hips_are_as_high_as_published(adults):
@@ -98,7 +98,7 @@ def test_hips_are_as_high_as_published(adults):
 
 def test_drawn_children_follow_the_who_reference_in_stature_and_mass_index(children):
     shapes, measured = children
-    for sex in ADULTS:
+    for sex in adult_spreads():
         same_sex = [(s, m) for s, m in zip(shapes, measured, strict=True) if (s.gender > 0.5) == (sex == "female")]
         years = np.array([4 + 7 * (s.age - 0.215) / 0.2 for s, _ in same_sex])
         assert 5 <= years.min() <= years.max() <= 12
