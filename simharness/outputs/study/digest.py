@@ -18,9 +18,9 @@ from mvpose.report.svg_plots import plot_sheet
 from mvpose.report.tables import markdown_table
 from simharness.outputs.study import plots, tables
 from simharness.outputs.study.curves import (
-    NAMES,
     Factor,
     axis_label,
+    axis_names,
     cases_of,
     factor_breaking_points,
     factors,
@@ -288,7 +288,7 @@ def _means_text(digest: Mapping[str, Any]) -> Iterator[str]:
 def _factor_text(key: str, parts: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> Iterator[str]:
     """Return the tables of one factor, for each case separately."""
     by_case = {case: factor for case, part in parts.items() for factor in part["factors"] if factor["key"] == key}
-    yield f"\n## Against `{key}`" + (f": {axis_label(key)}" if key in NAMES else "")
+    yield f"\n## Against `{key}`" + (f": {axis_label(key)}" if key in axis_names() else "")
     for case, factor in by_case.items():
         where = f"`{key}`{f', case {case}' if case else ''}"
         notes = [f"together with {', '.join(f'`{other}`' for other in factor['along'])}"] if factor["along"] else []
