@@ -19,6 +19,7 @@ from scipy.special import ndtr, ndtri
 
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
+from simharness.detector.circumstances import inversion_factors, swap_factors
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import ErrorDraws, KeyedDraws, logistic
 from simharness.detector.error_classes import MIRROR, PAIRED, jitter_distance
@@ -157,6 +158,7 @@ class _KeypointErrors:
         some = config.miss_some or config.miss
         self._miss = np.array([shares.by_joint() for shares in (config.miss, some, config.miss_few or some)])
         self._inversion = np.where(PAIRED, config.inversion.by_joint(), 0.0)
+        self._inversion_factor = inversion_factors(joints, rig, config.inversion_bearing)
         self._swap = np.array([shares.by_joint() for shares in (config.swap, config.swap_crowded or config.swap)])
 
     def find(self, person: int) -> tuple[Floats, NDArray[np.int8], Bools, Floats]:
@@ -186,7 +188,8 @@ class _KeypointErrors:
             if stray.any():
                 found[stray] = self._anywhere(person)[stray]
 
-        inverted = self._errors.occurs("inversion", person, config.quality * self._inversion)
+        share = config.quality * self._inversion_factor[:, :, person, None] * self._inversion
+        inverted = self._errors.occurs("inversion", person, share)
         other = true[:, :, MIRROR]
         inverted &= np.isfinite(other[..., 0])
         swapped, neighbour = self._swaps(person)
@@ -249,6 +252,10 @@ class _KeypointErrors:
         crowded = conditions.crowded[:, :, person].astype(int)
         share = self._config.quality * self._swap[crowded]
         possible = shown & (neighbour >= 0)[..., None]
+        if self._config.swap_reach and share.any():
+            height = self._boxes[:, :, person, 3]
+            target = self._target[:, :, person]
+            share = share * swap_factors(target, of_neighbour, height, self._config.swap_reach)
         return possible & self._errors.occurs("swap", person, np.where(possible, share, 0.0)), of_neighbour
 
     def _labels(self, found: Floats, person: int, inverted: Bools, swapped: Bools) -> NDArray[np.int8]:

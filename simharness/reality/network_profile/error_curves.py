@@ -58,11 +58,7 @@ def error_curves(labels: LabelledJoints) -> dict[str, ErrorCurve]:
     expected, missed = labels.expected, labels.expected & ~labels.association.detected
     hidden = ((labels.occlusion == OCCLUDED) | ~labels.inside).mean(axis=-1)
     height = labels.boxes[..., 3]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        apart, near = (
-            np.linalg.norm(labels.target - other, axis=-1) / height[..., None]
-            for other in (labels.target[..., MIRROR, :], _neighbours(labels))
-        )
+    apart, near = _apart(labels, labels.target[..., MIRROR, :]), neighbour_distance(labels)
     kinds = np.broadcast_to(np.array(KIND_OF_JOINT), judged.shape)
     bearing = np.broadcast_to(labels.bearing[..., None], judged.shape)
     distance = np.linalg.norm(labels.residual, axis=-1)
@@ -152,6 +148,17 @@ def part_counts(labels: LabelledJoints) -> Mapping[str, Trials]:
         "miss": by_kind(labels.risk["miss"], labels.taken["miss"]),
         "gross": by_kind(judged, gross),
     }
+
+
+def neighbour_distance(labels: LabelledJoints) -> Floats:
+    """Return the distance of each joint from that of the nearest other person, heights of the box, (T, V, P, 17)."""
+    return _apart(labels, _neighbours(labels))
+
+
+def _apart(labels: LabelledJoints, other: Floats) -> Floats:
+    """Return the distance of joints from other places, heights of the box, (T, V, P, 17); NaN where unknown."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.linalg.norm(labels.target - other, axis=-1) / labels.boxes[..., 3:])
 
 
 def _neighbours(labels: LabelledJoints) -> Floats:

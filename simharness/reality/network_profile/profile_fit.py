@@ -26,6 +26,7 @@ from simharness.reality.detector_fit.detector_measurement import (
 from simharness.reality.detector_fit.fit import FACTORS, SHARES, calibrate
 from simharness.reality.detector_fit.joint_labels import LabelledJoints
 from simharness.reality.detector_fit.profile import as_toml, settings
+from simharness.reality.network_profile.error_curves import error_curves, neighbour_distance
 from simharness.reality.network_profile.exact_labels import (
     Results,
     decoy_hits,
@@ -36,7 +37,7 @@ from simharness.reality.network_profile.exact_labels import (
 )
 from simharness.reality.network_profile.profiled_scenes import ProfiledScene
 from simharness.reality.people_tracks import LIMB_JOINTS
-from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
+from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOINT, KINDS, DetectorSection
 from simharness.types.random_streams import stream
 from simharness.types.truth import MISS_FROM
 
@@ -47,6 +48,7 @@ DRAWS = 2
 _FEWEST = 60  # joints or people behind a value that is calibrated
 _FARTHEST = 2.0  # of a logit or a logarithm: guesses are right where misses are counted
 _RESAMPLES = 200
+_PRIOR = 100.0  # joints of each bearing that count as usual
 _SMALL = 64.0  # pixels, sqrt(area) of a person, as in the error model
 _SHARES = (
     *SHARES,
@@ -172,6 +174,8 @@ def _more(scenes: Sequence[ProfiledScene], results: Results, labels: LabelledJoi
     return {
         "correlation.scatter_views": (shared_scatter(labels), int(labels.risk["jitter"].sum())),
         **_guess_scatter(labels),
+        **_inversion_bearing(labels),
+        **_swap_reach(labels),
         **_size_and_border(scenes, labels),
         **_boxes(scenes, results),
         **_decoys(scenes, results),
@@ -194,6 +198,34 @@ def _guess_scatter(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
         value = float(np.median(of_kind)) if len(of_kind) >= _FEWEST else pooled
         result[f"keypoints.guess.scatter.{kind}"] = value, max(len(of_kind), min(int(hidden.sum()), _FEWEST))
     return result
+
+
+def _inversion_bearing(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
+    """Return by how much more frequent inversions of limbs are at each bearing than on average."""
+    curve = error_curves(labels)["inversion by bearing"].counts
+    side = np.minimum(np.arange(len(BEARINGS)), len(BEARINGS) - np.arange(len(BEARINGS)))
+    n, k = (np.bincount(side, each) for each in curve)
+    usual = k.sum() / max(n.sum(), 1.0)
+    share = (k + _PRIOR * usual) / (n + _PRIOR)
+    factor = share * n.sum() / max((share * n).sum(), 1e-9) if usual else np.ones(len(n))
+    return {
+        f"keypoints.inversion_bearing.{index}": (float(each), int(count))
+        for index, (each, count) in enumerate(zip(factor, n, strict=True))
+    }
+
+
+def _swap_reach(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
+    """Return the distance of the neighbour's joint at which swaps are 1 / e as frequent, from their mean distance."""
+    risk, taken = labels.risk["swap"], labels.taken["swap"]
+    near = neighbour_distance(labels)
+    known = risk & np.isfinite(near)
+    if (taken & known).sum() < _FEWEST:
+        return {}
+    # The mean distance of swaps rises with the reach, from near joints alone to that of all joints.
+    far, mean = near[known], float(near[taken & known].mean())
+    reaches = np.geomspace(0.02, 5.0, 80)
+    means = [float(np.average(far, weights=np.exp(-far / reach))) for reach in reaches]
+    return {"keypoints.swap_reach": (float(np.interp(mean, means, reaches)), int(known.sum()))}
 
 
 def _size_and_border(scenes: Sequence[ProfiledScene], labels: LabelledJoints) -> dict[str, tuple[float, int]]:

@@ -24,11 +24,17 @@ KIND_OF_JOINT = (0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8)
 BEARINGS = tuple(range(0, 360, 30))
 """Bearings at which the shares of :class:`FaceSection` are given, degrees."""
 
+FACTOR_BEARINGS = tuple(range(0, 181, 30))
+"""Bearings at which the factors of ``keypoints.inversion_bearing`` are given, degrees, to both sides."""
+
 LARGEST_MULTIPLE = 1000.0
 """Largest factor of hidden joints: hidden hips of a real detector err a few hundred times as often as visible ones."""
 
 Multiple = Annotated[float, Field(ge=0.0, le=LARGEST_MULTIPLE)]
 ByBearing = Annotated[tuple[Share, ...], Field(min_length=len(BEARINGS), max_length=len(BEARINGS))]
+FactorsByBearing = Annotated[
+    tuple[Multiple, ...], Field(min_length=len(FACTOR_BEARINGS), max_length=len(FACTOR_BEARINGS))
+]
 ByHiddenShare = Annotated[tuple[Share, ...], Field(min_length=5, max_length=5)]
 Metres = Annotated[float, Field(ge=-1.0, le=1.0)]  # in the frame of a body
 Offset = Annotated[tuple[Metres, Metres, Metres], Elements(("forward", "outward", "up"))]
@@ -169,8 +175,18 @@ class KeypointsSection(Section):
     miss_some: Shares | None = None  # the same for people with 6 to 10 visible joints; absent: as miss
     miss_few: Shares | None = None  # the same for at most 5 visible joints; absent: as miss_some
     inversion: Shares = Shares()  # at the left-right counterpart
+    inversion_bearing: FactorsByBearing | None = Field(
+        None,
+        description="factors on inversion where the camera is 0, 30, ..., 180 degrees from straight ahead of the head, "
+        "with linear interpolation; absent: alike from all sides",
+    )
     swap: Shares = Shares()  # at the same joint of another person whose box overlaps
     swap_crowded: Shares | None = None  # the same in a crowd (PoseFix); absent: as swap
+    swap_reach: Factor = Field(
+        0.0,
+        description="distance of the other person's joint at which swaps are 1 / e of those at no distance, heights of "
+        "the box; 0: equally frequent at all distances",
+    )
     drop: DropSection = DropSection()
     face: FaceSection = FaceSection()
     guess: GuessSection = GuessSection()
