@@ -39,6 +39,7 @@ from simharness.types.views import Views
 
 MODULES = (
     "keypoints",
+    "score_distance",
     "boxes",
     "phantoms",
     "false_positives",

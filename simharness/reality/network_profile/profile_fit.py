@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import count, islice, pairwise
 from typing import Any
 
 import numpy as np
 
 from mvpose.arrays import Floats
+from simharness.detector.score_distance import USUAL
 from simharness.detector.viewing_conditions import BOX_SHARE, VISIBLE, Conditions
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.detector_measurement import (
@@ -39,7 +40,7 @@ from simharness.reality.network_profile.profiled_scenes import ProfiledScene
 from simharness.reality.people_tracks import LIMB_JOINTS
 from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOINT, KINDS, DetectorSection
 from simharness.types.random_streams import stream
-from simharness.types.truth import MISS_FROM
+from simharness.types.truth import MISS_FROM, KeypointError
 
 ROUNDS = 8
 DRAWS = 2
@@ -49,18 +50,21 @@ _FEWEST = 60  # joints or people behind a value that is calibrated
 _FARTHEST = 2.0  # of a logit or a logarithm: guesses are right where misses are counted
 _RESAMPLES = 200
 _PRIOR = 100.0  # joints of each bearing that count as usual
+_WITHIN = 0.75  # share of misses that are not stray
 _SMALL = 64.0  # pixels, sqrt(area) of a person, as in the error model
 _SHARES = (
     *SHARES,
-    *("keypoints.swap", "keypoints.inversion", "keypoints.drop", "keypoints.stray"),
+    *("keypoints.swap.", "keypoints.inversion.", "keypoints.drop", "keypoints.stray"),
     *("correlation.views", "correlation.gross_views", "correlation.limb", "correlation.scatter_views"),
     *("boxes.missed", "boxes.duplicates", "boxes.score", "decoys.share", "decoys.consistent"),
     *("scores.good", "scores.jitter", "scores.miss", "scores.inversion", "scores.swap", "scores.guess"),
+    "scores.hidden",
 )
 _FACTORS = (
     *FACTORS,
     *("correlation.life", "boxes.life", "boxes.jitter", "phantoms.rate", "phantoms.life"),
     *("keypoints.truncated", "keypoints.small", "keypoints.guess.scatter"),
+    *("keypoints.inversion_bearing", "keypoints.swap_reach", "scores.deviation", "scores.slope"),
 )
 
 
@@ -127,9 +131,11 @@ def fit_network(
     }
     measured = replace(measured, values={**measured.values, **more})
 
+    draws = count()
+
     def measure(values: Mapping[str, float]) -> list[dict[str, float]]:
         detector = DetectorSection.model_validate(settings(measured.with_values(values), name=name, bias=bias))
-        results = [_simulated_values(scenes, detector, draw, kind=kind, bias=bias) for draw in range(DRAWS)]
+        results = [_simulated_values(scenes, detector, draw, kind=kind, bias=bias) for draw in islice(draws, DRAWS)]
         progress(1)
         return results
 
@@ -176,6 +182,9 @@ def _more(scenes: Sequence[ProfiledScene], results: Results, labels: LabelledJoi
         **_guess_scatter(labels),
         **_inversion_bearing(labels),
         **_swap_reach(labels),
+        **_score_slope(labels),
+        **_class_scores(labels),
+        **_miss_reach(labels),
         **_size_and_border(scenes, labels),
         **_boxes(scenes, results),
         **_decoys(scenes, results),
@@ -226,6 +235,49 @@ def _swap_reach(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
     reaches = np.geomspace(0.02, 5.0, 80)
     means = [float(np.average(far, weights=np.exp(-far / reach))) for reach in reaches]
     return {"keypoints.swap_reach": (float(np.interp(mean, means, reaches)), int(known.sum()))}
+
+
+def _score_slope(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
+    """Return the fall of the logits of scores with ln(1 + distance) within class, kind and visibility of joints."""
+    used = np.isin(labels.error, tuple(USUAL)) & np.isfinite(labels.residual[..., 0])
+    used[..., : LIMB_JOINTS[0]] = False
+    kinds = np.broadcast_to(np.array(KIND_OF_JOINT), used.shape)[used]
+    cell = (labels.error[used] * 4 + labels.occlusion[used]) * len(KINDS) + kinds
+    score = np.clip(labels.association.scores[used], 1e-3, 1 - 1e-3)
+    values = np.stack([np.log(score / (1 - score)), np.log1p(np.linalg.norm(labels.residual[used], axis=-1))])
+    count = np.maximum(np.bincount(cell), 1)
+    logit, far = (each - (np.bincount(cell, each) / count)[cell] for each in values)
+    square = float((far**2).sum())
+    return {"scores.slope": (max(float(-(far * logit).sum() / square), 0.0) if square else np.nan, int(used.sum()))}
+
+
+def _class_scores(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
+    """Return the median scores of visible limb joints by class, and the factors of those that are not visible.
+
+    Misses with the scores of good keypoints are told from others by the slope, not as a share.
+    """
+    error, seen = labels.error[..., LIMB_JOINTS], (labels.occlusion == VISIBLE)[..., LIMB_JOINTS]
+    known = np.isfinite(labels.residual[..., LIMB_JOINTS, 0])
+    scores = labels.association.scores[..., LIMB_JOINTS]
+    result = {"scores.overconfident": (0.0, 0), "scores.underconfident": (0.0, 0)}
+    for kind in KeypointError:
+        shown, hidden = (scores[known & (error == kind) & where] for where in (seen, ~seen))
+        if kind != KeypointError.ABSENT and len(shown):
+            name, usual = kind.name.lower(), float(np.median(shown))
+            result[f"scores.{name}"] = usual, len(shown)
+            if len(hidden):
+                factor = min(float(np.median(hidden)) / max(usual, 1e-6), 1.0)
+                result[f"scores.hidden.{name}"] = factor, len(hidden)
+    return result
+
+
+def _miss_reach(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
+    """Return the distance within which most misses of visible limbs are, units; those beyond are stray."""
+    miss = (labels.taken["miss"] & (labels.occlusion == VISIBLE))[..., LIMB_JOINTS]
+    far = np.linalg.norm(labels.residual[..., LIMB_JOINTS, :][miss], axis=-1)
+    if len(far) < _FEWEST:
+        return {}
+    return {"keypoints.reach": (float(np.clip(np.quantile(far, _WITHIN), MISS_FROM, 20.0)), len(far))}
 
 
 def _size_and_border(scenes: Sequence[ProfiledScene], labels: LabelledJoints) -> dict[str, tuple[float, int]]:

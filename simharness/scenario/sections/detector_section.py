@@ -250,6 +250,11 @@ class ScoresSection(Section):
     guess: Shares = Shares.model_validate(1.0)  # median score of guessed joints; hidden and joint do not apply
     outside: Share = key(1.0, "factor on the median score of joints that are guessed outside the image")
     deviation: Logits = key(0.0, "standard deviation of scores, on the logit scale")
+    slope: Logits = key(
+        0.0,
+        "by how much the score's logit falls with ln(1 + distance in units) within good keypoints, jitters, misses and "
+        "guesses; 0: scores of a class do not depend on the distance",
+    )
     overconfident: Share = key(0.0, "share of misses and guessed joints with the score of a good keypoint")
     underconfident: Share = key(0.0, "share of good keypoints with the score of a miss")
     joint: Amounts = Amounts.model_validate(1.0)  # factor on the median scores
