@@ -81,18 +81,20 @@ def opposite_hits(keypoints: Floats, target: Floats, place: Floats, unit: Floats
     return distance(keypoints, 2 * target - place, unit) < GOOD_BELOW
 
 
-def jitter_distance(share: Floats, mean: Floats) -> Floats:
+def jitter_distance(share: Floats, mean: Floats, *, nearest: float = GOOD_BELOW, farthest: float = MISS_FROM) -> Floats:
     """Return the distances, units, of jitters below which the given shares of all jitters lie.
 
     Args:
         share: shares, 0 to 1, (n,).
-        mean: mean distances as shares of the way from 1.14 to 2.35, (n,); 0.5: uniform.
+        mean: mean distances as shares of the way from the nearest to the farthest, (n,); 0.5: uniform.
+        nearest: least distance; 1.14 of jitters.
+        farthest: largest distance; 2.35 of jitters.
     """
     way = share.copy()
     for each in np.unique(mean[mean != 0.5]):
         rate, chosen = _rate(float(each)), mean == each
         way[chosen] = -np.log(1 - share[chosen] + share[chosen] * np.exp(-rate)) / rate
-    return np.asarray(GOOD_BELOW + (MISS_FROM - GOOD_BELOW) * way)
+    return np.asarray(nearest + (farthest - nearest) * way)
 
 
 @cache

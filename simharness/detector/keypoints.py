@@ -151,6 +151,7 @@ class _KeypointErrors:
         self._scatter = Scatter(config, correlation, draws)
         self._jitter = np.array(config.jitter.by_joint())
         self._jitter_mean = np.array(config.jitter_mean.by_joint())
+        self._miss_mean = np.array(config.miss_mean.by_joint())
         self._by_occlusion = np.ones((4, len(self._jitter)))
         self._by_occlusion[SELF_OCCLUDED] = config.self_occluded.by_joint()
         self._by_occlusion[OCCLUDED] = config.occluded.by_joint()
@@ -181,8 +182,9 @@ class _KeypointErrors:
         off = jitter | miss
         if off.any():
             direction, far = self._places(person, off)
-            mean = self._jitter_mean[np.nonzero(off)[-1]]
-            reach = np.where(miss[off], MISS_FROM + (config.reach - MISS_FROM) * far, jitter_distance(far, mean))
+            jitter_mean, miss_mean = (means[np.nonzero(off)[-1]] for means in (self._jitter_mean, self._miss_mean))
+            of_miss = jitter_distance(far, miss_mean, nearest=MISS_FROM, farthest=config.reach)
+            reach = np.where(miss[off], of_miss, jitter_distance(far, jitter_mean))
             found[off] = true[off] + (unit[off] * reach)[:, None] * direction
             stray = miss & self._errors.occurs("stray", person, self._stray)
             if stray.any():

@@ -50,10 +50,10 @@ _FEWEST = 60  # joints or people behind a value that is calibrated
 _FARTHEST = 2.0  # of a logit or a logarithm: guesses are right where misses are counted
 _RESAMPLES = 200
 _PRIOR = 100.0  # joints of each bearing that count as usual
-_WITHIN = 0.75  # share of misses that are not stray
+_WITHIN = 0.9  # share of misses that are not stray
 _SMALL = 64.0  # pixels, sqrt(area) of a person, as in the error model
 _SHARES = (
-    *SHARES,
+    *SHARES,  # "keypoints.miss" with its means
     *("keypoints.swap.", "keypoints.inversion.", "keypoints.drop", "keypoints.stray"),
     *("correlation.views", "correlation.gross_views", "correlation.limb", "correlation.scatter_views"),
     *("boxes.missed", "boxes.duplicates", "boxes.score", "decoys.share", "decoys.consistent"),
@@ -272,12 +272,21 @@ def _class_scores(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
 
 
 def _miss_reach(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
-    """Return the distance within which most misses of visible limbs are, units; those beyond are stray."""
+    """Return the distance within which most misses of visible limbs are, units, and their mean on the way by kind."""
     miss = (labels.taken["miss"] & (labels.occlusion == VISIBLE))[..., LIMB_JOINTS]
     far = np.linalg.norm(labels.residual[..., LIMB_JOINTS, :][miss], axis=-1)
     if len(far) < _FEWEST:
         return {}
-    return {"keypoints.reach": (float(np.clip(np.quantile(far, _WITHIN), MISS_FROM, 20.0)), len(far))}
+    reach = float(np.clip(np.quantile(far, _WITHIN), 1.5 * MISS_FROM, 20.0))
+    kinds = np.broadcast_to(np.array(KIND_OF_JOINT)[LIMB_JOINTS], miss.shape)[miss]
+    result = {"keypoints.reach": (reach, len(far))}
+    way = np.clip((far - MISS_FROM) / (reach - MISS_FROM), 0.0, 1.0)
+    usual = float(way.mean())
+    for index in np.unique(kinds):
+        of_kind = way[kinds == index]
+        value = (of_kind.sum() + _FEWEST * usual) / (len(of_kind) + _FEWEST)
+        result[f"keypoints.miss_mean.{KINDS[index]}"] = float(value), len(of_kind) + _FEWEST
+    return result
 
 
 def _size_and_border(scenes: Sequence[ProfiledScene], labels: LabelledJoints) -> dict[str, tuple[float, int]]:

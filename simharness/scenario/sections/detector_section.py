@@ -172,6 +172,7 @@ class KeypointsSection(Section):
     jitter: Shares = Shares()  # 1.14 to 2.35 units off
     jitter_mean: Means = Means()  # mean distance of jitters, as a share of the way from 1.14 to 2.35
     miss: Shares = Shares()  # 2.35 to `reach` units off
+    miss_mean: Means = Means()  # mean distance of misses, as a share of the way from 2.35 to `reach`
     miss_some: Shares | None = None  # the same for people with 6 to 10 visible joints; absent: as miss
     miss_few: Shares | None = None  # the same for at most 5 visible joints; absent: as miss_some
     inversion: Shares = Shares()  # at the left-right counterpart

@@ -45,3 +45,10 @@ def test_each_joint_has_its_own_mean():
     mean = np.array([0.2, 0.5, 0.8, 0.2])
     found = jitter_distance(np.full(4, 0.5), mean)
     assert found[0] == found[3] < found[1] < found[2]
+
+
+@given(mean=st.floats(0.05, 0.95), farthest=st.floats(4.0, 20.0))
+def test_misses_have_their_mean_on_the_way_to_their_reach(mean, farthest):
+    found = jitter_distance(SHARES, np.full(len(SHARES), mean), nearest=MISS_FROM, farthest=farthest)
+    assert MISS_FROM <= found.min() < found.max() <= farthest
+    assert (found.mean() - MISS_FROM) / (farthest - MISS_FROM) == pytest.approx(mean, abs=2e-3)
