@@ -273,12 +273,13 @@ def _class_scores(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
 
 def _miss_reach(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
     """Return the distance within which most misses of visible limbs are, units, and their mean on the way by kind."""
-    miss = (labels.taken["miss"] & (labels.occlusion == VISIBLE))[..., LIMB_JOINTS]
-    far = np.linalg.norm(labels.residual[..., LIMB_JOINTS, :][miss], axis=-1)
-    if len(far) < _FEWEST:
+    miss = labels.taken["miss"] & (labels.occlusion == VISIBLE)
+    far = np.linalg.norm(labels.residual[miss], axis=-1)
+    kinds = np.broadcast_to(np.array(KIND_OF_JOINT), miss.shape)[miss]
+    limbs = far[kinds >= KIND_OF_JOINT[LIMB_JOINTS[0]]]
+    if len(limbs) < _FEWEST:
         return {}
-    reach = float(np.clip(np.quantile(far, _WITHIN), 1.5 * MISS_FROM, 20.0))
-    kinds = np.broadcast_to(np.array(KIND_OF_JOINT)[LIMB_JOINTS], miss.shape)[miss]
+    reach = float(np.clip(np.quantile(limbs, _WITHIN), 1.5 * MISS_FROM, 20.0))
     result = {"keypoints.reach": (reach, len(far))}
     way = np.clip((far - MISS_FROM) / (reach - MISS_FROM), 0.0, 1.0)
     usual = float(way.mean())
