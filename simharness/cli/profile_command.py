@@ -95,7 +95,7 @@ def profile_network(
             with bars.stage("read pictures", designed.trials) as advance:
                 read = read_scenes(designed, **where, progress=advance)
             with failing(), bars.stage("fit", ROUNDS) as advance:
-                profile = fit_network(read, name=stem, command=PROGRAM.command_line() or "", progress=advance)
+                profile = fit_network(read, name=stem, command=f"simharness profile-network {stem}", progress=advance)
             write_text(profile.text, place / f"{stem}.toml")
             checked = None
             if other is not None:

@@ -123,7 +123,10 @@ def condition_curves(scenes: Sequence[ProfiledScene], labels: LabelledJoints) ->
 
     def by_case(n: NDArray, k: NDArray) -> Trials:
         return Trials(
-            *(np.bincount(case, each.reshape(len(case), -1).sum(axis=1), len(cases)) + 0.0 for each in (n, k))
+            *(
+                np.bincount(case, each.reshape(len(case), -1).sum(axis=1), len(cases)).astype(np.float64)
+                for each in (n, k)
+            )
         )
 
     false = labels.association.false

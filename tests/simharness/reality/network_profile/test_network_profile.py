@@ -18,10 +18,11 @@ from simharness.reality.network_profile.profile_check import CheckedFigure, chec
 from simharness.reality.network_profile.profile_fit import fit_network
 from simharness.reality.network_profile.profiled_scenes import ProfiledScene, read_scenes
 from simharness.scenario.load import load, load_study
-from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
+from simharness.scenario.sections.detector_section import KINDS, DetectorSection
 from simharness.statistics.intervals import Interval
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import capture_trial
+from simharness.types.truth import KeypointError
 
 NO_BIAS = np.zeros((len(KINDS), 3))
 KNOWN = {
@@ -155,24 +156,30 @@ def test_curves_count_what_was_drawn(filmed):
 
 @pytest.mark.slow
 def test_a_fitted_profile_errs_as_the_detector(filmed):
-    """Guesses at hidden joints are measured by their gross errors alone; the calibration finds how many there are."""
+    """Parameters of visible joints are found; of hidden ones how often they are gross, guessed or not, within a third.
+
+    One factor of hidden joints holds for jitters and misses: where guesses make many jitters, misses are too many.
+    """
     true = {**KNOWN, "keypoints": {**KNOWN["keypoints"], "guess": {"outside": 1.0, "occluded": 0.7, "scatter": 1.0}}}
-    scenes = found_by(filmed, **true)
-    profile = fit_network(scenes, name="known")
-    section = profile.detector
-    assert DetectorSection.model_validate(section.model_dump()) == section
-    hidden = [kind for kind in KINDS[3:] if _hidden(scenes, kind) > 150]
-    assert len(hidden) >= 2
-    assert np.mean([getattr(section.keypoints.guess.occluded, kind) for kind in hidden]) == pytest.approx(0.7, abs=0.2)
-    real, simulated = (part_counts(each)["gross"] for each in (profile.labels, profile.simulated))
-    assert simulated.k[3:].sum() / simulated.n[3:].sum() == pytest.approx(real.k[3:].sum() / real.n[3:].sum(), rel=0.12)
+    profile = fit_network(found_by(filmed, **true), name="known")
+    fitted = profile.detector.keypoints
+    assert DetectorSection.model_validate(profile.detector.model_dump()) == profile.detector
+    for key, value in (("scatter", 0.4), ("jitter", 0.1), ("miss", 0.06)):
+        assert np.mean([getattr(getattr(fitted, key), kind) for kind in KINDS[3:]]) == pytest.approx(value, rel=0.2), (
+            key
+        )
+    assert fitted.inversion.wrists == pytest.approx(0.08, abs=0.03)
+    assert np.mean(fitted.inversion_bearing) == pytest.approx(1.0, abs=0.2)
+    hidden = [_gross_hidden(each) for each in (profile.labels, profile.simulated)]
+    assert hidden[0] > 0.2
+    assert hidden[1] == pytest.approx(hidden[0], rel=0.35)
 
 
-def _hidden(scenes, kind):
-    labels = labels_of(scenes)
-    return (labels.risk["miss"] & (labels.occlusion == OCCLUDED))[
-        ..., np.array(KIND_OF_JOINT) == KINDS.index(kind)
-    ].sum()
+def _gross_hidden(labels):
+    """Return the share of hidden limb joints that are gross errors."""
+    judged = (labels.risk["miss"] | labels.taken["inversion"] | labels.taken["swap"]) & (labels.occlusion == OCCLUDED)
+    judged[..., :5] = False
+    return (judged & ~np.isin(labels.error, (KeypointError.GOOD, KeypointError.JITTER))).sum() / judged.sum()
 
 
 def test_a_profile_is_read_back(known, tmp_path, monkeypatch):
