@@ -176,16 +176,16 @@ class KeypointsSection(Section):
     miss_some: Shares | None = None  # the same for people with 6 to 10 visible joints; absent: as miss
     miss_few: Shares | None = None  # the same for at most 5 visible joints; absent: as miss_some
     inversion: Shares = Shares()  # at the left-right counterpart
-    inversion_bearing: FactorsByBearing | None = Field(
+    inversion_bearing: FactorsByBearing | None = key(
         None,
-        description="factors on inversion where the camera is 0, 30, ..., 180 degrees from straight ahead of the head, "
+        "factors on inversion where the camera is 0, 30, ..., 180 degrees from straight ahead of the head, "
         "with linear interpolation; absent: alike from all sides",
     )
     swap: Shares = Shares()  # at the same joint of another person whose box overlaps
     swap_crowded: Shares | None = None  # the same in a crowd (PoseFix); absent: as swap
-    swap_reach: Factor = Field(
+    swap_reach: Factor = key(
         0.0,
-        description="distance of the other person's joint at which swaps are 1 / e of those at no distance, heights of "
+        "distance of the other person's joint at which swaps are 1 / e of those at no distance, heights of "
         "the box; 0: equally frequent at all distances",
     )
     drop: DropSection = DropSection()
