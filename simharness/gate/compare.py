@@ -29,40 +29,26 @@ class Allowed:
 
 
 @dataclass(frozen=True)
-class Change:
-    """Change of one score of one variant.
+class Change(Tested):
+    """Judged change of one score of one variant.
+
+    Its ``p`` is corrected for other tests, 1 where no test was made; its ``loss`` is in tolerances.
 
     Attributes:
         score: key of the score in the catalogue, or ``TIME``.
         variant: variant of the method.
         case: case; None for the whole suite.
-        before, after: means over the seeds; for ``TIME``, geometric means of the middle half.
-        difference: after - before; for ``TIME``, after / before.
-        low, high: ends of the 95 % interval of the difference.
-        n: number of seeds.
-        p: p-value after correction; 1 where no test was made.
-        loss: size of the loss in tolerances; negative for a gain.
         verdict: worse, unexpected, better or same.
         undecided: larger than its tolerance, but could not be significant even if all seeds agreed.
         allowed: largest changes that fail nothing.
-        worst: trial with the largest loss.
     """
 
     score: str
     variant: str
     case: str | None
-    before: float
-    after: float
-    difference: float
-    low: float
-    high: float
-    n: int
-    p: float
-    loss: float
     verdict: Verdict
     undecided: bool
     allowed: Allowed
-    worst: TrialKey
 
 
 @dataclass(frozen=True)
@@ -163,21 +149,13 @@ def _change(pairs: Pairs, tested: Tested, allowed: Allowed, p: float, least: flo
         elif loss < -1:
             verdict = "better"
     return Change(
+        **{**vars(tested), "p": p, "loss": loss},
         score=pairs.score,
         variant=pairs.variant,
         case=pairs.case,
-        before=tested.before,
-        after=tested.after,
-        difference=tested.difference,
-        low=tested.low,
-        high=tested.high,
-        n=tested.n,
-        p=p,
-        loss=loss,
         verdict=verdict,
         undecided=abs(loss) > 1 and verdict == "same" and least > level,
         allowed=allowed,
-        worst=tested.worst,
     )
 
 
