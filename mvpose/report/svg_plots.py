@@ -36,7 +36,7 @@ STAGE_COLORS: Mapping[str, Color] = {
 }
 VARIANT_COLORS: tuple[Color, ...] = ("#3b82c4", "#d9643a", "#2e9e6b", "#8a63c9", "#d9a514", "#c2568f")
 
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",  # text stays text: in the page's font, and found by the browser's search
     "figure.facecolor": "none",
     "axes.facecolor": "none",
@@ -58,6 +58,7 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 8.5,
 }
+"""Settings of Matplotlib for all plots."""
 
 
 @contextmanager
@@ -69,7 +70,7 @@ def svg_plot(name: str, *, size: tuple[float, float] = SIZE) -> Iterator[tuple[A
         size: width and height in inches of 72 px.
     """
     written: list[str] = []
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": name}):
+    with mpl.rc_context({**STYLE, "svg.hashsalt": name}):
         figure = Figure(figsize=size, layout="constrained")
         axes = figure.add_subplot()
         axes.set_axisbelow(True)

@@ -19,6 +19,7 @@ from rich.text import Text
 
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import parse_toml
+from mvpose.report.svg_plots import STYLE
 from simharness.reality.annotation_errors import AnnotationFit
 from simharness.reality.detector_fit.detector_measurement import MeasuredDetector, MeasuredValue, agreement
 from simharness.reality.detector_fit.frame_sums import TERCILES
@@ -172,23 +173,14 @@ def _cell(measured: MeasuredValue, digits: int, *, scale: float = 1.0, interval:
 
 
 _COLORS = ("#3b82c4", "#d9643a")
+_DARK, _GREY, _PALE = "#1f2430", "#5d6574", "#c9ced6"
 _STYLE: dict[Any, Any] = {
-    "font.size": 8.5,
-    "axes.titlesize": 9.5,
-    "axes.titlelocation": "left",
-    "text.color": "#1f2430",
-    "axes.labelcolor": "#5d6574",
-    "axes.edgecolor": "#c9ced6",
-    "xtick.color": "#c9ced6",
-    "ytick.color": "#c9ced6",
-    "xtick.labelcolor": "#1f2430",
-    "ytick.labelcolor": "#5d6574",
-    "grid.color": "#e4e7ec",
-    "grid.linewidth": 0.6,
-    "axes.linewidth": 0.8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
+    **STYLE,
+    **dict.fromkeys(("figure.facecolor", "axes.facecolor"), "white"),
+    **dict.fromkeys(("text.color", "xtick.labelcolor"), _DARK),
+    **dict.fromkeys(("axes.labelcolor", "ytick.labelcolor"), _GREY),
+    **dict.fromkeys(("axes.edgecolor", "xtick.color", "ytick.color"), _PALE),
+    **{"grid.color": "#e4e7ec", "font.size": 8.5, "axes.titlesize": 9.5, "axes.titlelocation": "left"},
 }
 _MIN_COUNT = 100  # joints, people or detections behind a value: with fewer, its interval is too wide to plot
 _BINS = tuple(map(str, range(len(BEARINGS))))
