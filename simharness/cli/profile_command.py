@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,6 +12,7 @@ from rich.console import Console
 
 from mvpose.commands.errors import failing
 from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
+from mvpose.commands.programs import note
 from simharness.cli.program import PROGRAM, Overrides, Workers
 
 if TYPE_CHECKING:
@@ -72,6 +74,8 @@ def profile_network(
     """
     with PROGRAM.exit_on_error():
         start = perf_counter()
+        if not check and other_scenes != Path(_OTHER):
+            raise ValueError("--other-scenes: are those of --check; add it, or remove --other-scenes")
         stem = Path(name).stem
         place = out or Path("results/profiles") / stem
         check_place(place / "profile.html", option="--out", mark=HTML)
@@ -83,13 +87,15 @@ def profile_network(
         from simharness.reality.network_profile.profile_fit import ROUNDS, fit_network
         from simharness.reality.network_profile.profiled_scenes import read_scenes
         from simharness.scenario.load import load
+        from simharness.study.trial_store import Store
         from simharness.trial.identity import provenance
         from simharness.trial.stages.networks import people_finder
 
-        designed = _study(scenes, name, head, overrides, seeds=1 if quick else None)
-        other = _study(other_scenes, name, head, overrides, seeds=2 if quick else None) if check else None
-        people_finder(designed.base)  # a wrong name is told before any scene is built
+        designed, other = _studies((scenes, other_scenes) if check else (scenes,), name, head, overrides, quick)
         kept = store or place / "store"
+        if kept.is_dir():
+            Store(kept)  # another folder is told before any scene is built, and so is a wrong name
+        people_finder(designed.base)
         where: dict[str, Any] = {"store": kept, "workers": workers}
         with reporter() as bars:
             with bars.stage("read pictures", designed.trials) as advance:
@@ -133,6 +139,19 @@ def profile_network(
             highlight=False,
             markup=False,
         )
+
+
+def _studies(
+    files: Sequence[Path], name: str, head: str | None, overrides: list[str] | None, quick: bool
+) -> tuple[Study, Study | None]:
+    """Return the scenes of a fit, and those of its check where there are any."""
+    studies = [_study(file, name, head, overrides, seeds=None) for file in files]
+    if quick:
+        whole = [each.trials for each in studies]
+        studies = [_study(file, name, head, overrides, seeds=count) for count, file in enumerate(files, start=1)]
+        if whole == [each.trials for each in studies]:
+            note("--quick has no effect: the scenes have so few seeds anyway")
+    return studies[0], studies[1] if len(studies) > 1 else None
 
 
 def _study(scenes: Path, name: str, head: str | None, overrides: list[str] | None, *, seeds: int | None) -> Study:

@@ -72,6 +72,7 @@ BASES = {
     "fit-detector": "{lab}/hall.toml",
     "validate": "{lab}/hall.toml --out {out}",
     "rehearse": "ring5 --out {out}",
+    "profile-network": "movenet --scenes pixels --out {out}",
     "plan": "lab --out {out}",
     "evaluate recording": "{lab}/hall.toml",
     "evaluate poses": "{lab}/hall.toml {lab}/people",
@@ -154,6 +155,17 @@ ROWS = {
         "seed": Row("--seed 3"),
         "out": RESULT["out"],
     },
+    "profile-network": WORKERS
+    | {
+        "head": Row("--head posenet"),
+        "check": Row("--check"),
+        "quick": Row("--quick", base="movenet --scenes profile --out {out}"),
+        "scenes": Row("--scenes profile"),
+        "other_scenes": Row("--other-scenes pixels", "--check"),
+        "overrides": Row("--set duration=0.4"),
+        "out": RESULT["out"],
+        "store": Row("--store {out}/elsewhere"),
+    },
     "plan": WORKERS
     | {
         "cameras": Row("--cameras 4"),
@@ -208,6 +220,7 @@ NO_EFFECT = [
     (f"report {BASES['report'].replace('study', 'single')}", "--threshold pcp=80"),
     ("rehearse {lab}/three.toml --out {out}", "--subsets"),
     (f"plan {BASES['plan']} --scenes 0", "--workers 3"),
+    (f"profile-network {BASES['profile-network']}", "--quick"),
 ]
 """Combinations in which an option has nothing to act on."""
 
@@ -241,6 +254,8 @@ def _stand_ins(study):
     figures = SimpleNamespace(summary=dict)
     fitted = SimpleNamespace(real=figures, annotation=figures)
     printed = ("plot_comparison", "print_agreement", "print_annotation", "print_measurement")
+    profile = SimpleNamespace(text="", measured=figures, bias=np.zeros(1), detector=None, kind="")
+    checked_profile = SimpleNamespace(summary=dict, scenes=(), detectors=(), variants=(), verdicts={})
     compared = SimpleNamespace(summary=dict, seeds=(), real={})
     return {
         "simharness.outputs.run.result_folder": {"run": None},
@@ -266,6 +281,11 @@ def _stand_ins(study):
         "simharness.planning.rehearse_rig": {"rehearse_rig": rehearsed},
         "simharness.outputs.planning.rehearsal_page": {"render_rehearsal": "<!doctype html>"},
         "simharness.planning.plan_rig": {"plan_rig": None},
+        "simharness.trial.stages.networks": {"people_finder": ()},
+        "simharness.reality.network_profile.profiled_scenes": {"read_scenes": ()},
+        "simharness.reality.network_profile.profile_fit": {"fit_network": profile},
+        "simharness.reality.network_profile.profile_check": {"check_profile": checked_profile},
+        "simharness.outputs.network_profile.page": {"render_profile": "<!doctype html>"},
     }  # fmt: skip
 
 
@@ -334,7 +354,7 @@ CASES = [(command, name) for command, rows in ROWS.items() for name in rows]
 def test_every_option_of_every_command_has_a_row():
     known = {command: set(rows) for command, rows in ROWS.items()} | {"scenarios": set()}
     assert {command: set(options) for command, options in parameters(app).items()} == known
-    assert len(CASES) >= 97
+    assert len(CASES) >= 106
 
 
 @pytest.mark.parametrize("command", BASES)

@@ -50,6 +50,8 @@ FOLDERS = {
     "simharness study --store": ("simharness study quickstart --out new --store {}", ""),
     "simharness merge --into": ("simharness merge store --into {}", ""),
     "simharness plan --out": ("simharness plan lab --out {}", "lab"),
+    "simharness profile-network --out": ("simharness profile-network movenet --out {}", ""),
+    "simharness profile-network --store": ("simharness profile-network movenet --out new --store {}", ""),
     "simharness rehearse --out": ("simharness rehearse ring5 --volume 4x3 --out {}", ""),
     "simharness validate --out": ("simharness validate shelf --out {}", ""),
 }
@@ -60,7 +62,7 @@ ELSEWHERE = {"simharness report --digest"}
 
 READ = {
     "calibration", "detections", "videos", "folder", "recording", "fit_on", "scenario", "suite", "file", "study",
-    "stores", "room", "poses", "pictures", "times", "detector", "pose", "skeleton", "package",
+    "stores", "room", "scenes", "other_scenes", "poses", "pictures", "times", "detector", "pose", "skeleton", "package",
 }  # fmt: skip
 """Parameters whose files are read alone."""
 
@@ -123,7 +125,7 @@ def test_a_folder_of_the_user_is_never_replaced(call, tmp_path, option):
     folder = tmp_path / "mine" / inside.replace("HASH", fingerprint(load(Path("quickstart"))))
     folder.mkdir(parents=True)
     Store(tmp_path / "store")  # that merge can read
-    names = ["ik.mot", "rehearsal.html", "validation.html"]
+    names = ["ik.mot", "rehearsal.html", "validation.html", "profile.html"]
     for name in names:
         (folder / name).write_text(MINE)
     result = call(line, "mine")
