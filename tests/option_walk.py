@@ -69,7 +69,7 @@ class Walk:
         app: the program.
         out: folder into which commands write; it is removed before each run.
         places: what ``{name}`` stands for in words.
-        timed: pattern of printed durations, which are no results.
+        timed: pattern of what is printed about durations, which are no results.
     """
 
     def __init__(self, app: typer.Typer, out: Path, places: dict[str, object], *, timed: str = "^$") -> None:

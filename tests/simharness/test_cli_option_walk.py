@@ -320,7 +320,7 @@ def lab(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def made_walk(lab):
-    return Walk(app, lab / "results", {"lab": lab}, timed=r"\d+\.\d\d \(\d+\.\d\d\)")
+    return Walk(app, lab / "results", {"lab": lab}, timed=r"(?s)Time per frame.*?PCP: part")
 
 
 @pytest.fixture

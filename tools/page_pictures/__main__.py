@@ -34,7 +34,7 @@ from simharness.world.scene.playback import Playback
 
 _SCENE = ("duration=10.0", "rate=25.0", "rendering.renderer='rays'")
 _MOVED, _TURN, _SHIFT = 2, np.radians([0.9, -1.0, 0.6]), np.array([0.05, -0.03, 0.03])  # view; rad; metres
-_WIDTH, _HEIGHTS = 1280, {"recording": 3900, "doctor": 3500}  # pixels of the window
+_WIDTH, _HEIGHTS = 1280, {"recording": 3900, "doctor": 4200}  # pixels of the window
 _COLORS = 256  # of the pictures in the guide, which keeps them small
 _EMPTY = 40  # rows of one colour that are kept at the end
 
