@@ -132,7 +132,9 @@ def condition_curves(scenes: Sequence[ProfiledScene], labels: LabelledJoints) ->
     false = labels.association.false
     return {
         "missed": ErrorCurve("people missed", "", tuple(cases), by_case(labels.expected, missed)),
-        "false": ErrorCurve("false detections a picture", "", tuple(cases), by_case(np.ones(false.shape), false)),
+        "false": ErrorCurve(
+            "false detections per 100 pictures", "", tuple(cases), by_case(np.ones(false.shape), false)
+        ),
         "gross": ErrorCurve("gross errors of limbs", "", tuple(cases), by_case(judged, judged & wrong)),
     }
 
