@@ -3,6 +3,8 @@
 Commands that simulate for minutes run up to the function that does it, which prints what it is called with.
 """
 
+import importlib
+import pkgutil
 import re
 import sys
 from dataclasses import dataclass
@@ -20,6 +22,7 @@ from described_recording import describe
 from made_study import make_study
 from turning_people import joints_of, walkers
 
+import simharness
 from mvpose.formats.calibration.voxelpose import write_calibration
 from mvpose.formats.people.people_formats import write_people
 from mvpose.recording import People
@@ -320,6 +323,9 @@ def lab(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def made_walk(lab):
+    for module in pkgutil.walk_packages(simharness.__path__, "simharness."):  # one imported later would keep stand-ins
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
     return Walk(app, lab / "results", {"lab": lab}, timed=r"(?s)Time per frame.*?PCP: part")
 
 
