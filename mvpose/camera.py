@@ -28,28 +28,26 @@ _FARTHEST = 1e6  # focal lengths from the principal point; beyond it the ray is 
 class Camera(Sealed):
     """Pinhole camera with Brown distortion.
 
-    Attributes:
-        K: intrinsics, (3, 3), pixels: ``[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]``.
-        R: rotation from world to camera, (3, 3).
-        t: translation from world to camera, (3,), metres.
-        distortion: k1, k2, p1, p2, k3 in the order of OpenCV, (5,); zeros for a pinhole.
-        size: width and height of the image in pixels.
-        name: name of the camera in reports and messages.
-        readout: seconds from the exposure of the first row to that of the last, 0 for a global shutter; the time of a
-            picture is that of its middle row.
-
     Raises:
         ValueError: a wrong shape, a value that is not finite or exceeds 1e9, an invalid intrinsic matrix K, an R that
             is not a rotation, or an image size that is not two positive whole numbers.
     """
 
     K: Floats
+    """Intrinsics, (3, 3), pixels: ``[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]``."""
     R: Floats
+    """Rotation from world to camera, (3, 3)."""
     t: Floats
+    """Translation from world to camera, (3,), metres."""
     distortion: Floats = field(default_factory=lambda: np.zeros(5))
+    """K1, k2, p1, p2, k3 in the order of OpenCV, (5,); zeros for a pinhole."""
     size: tuple[int, int] = (0, 0)
+    """Width and height of the image in pixels."""
     name: str = ""
+    """Name of the camera in reports and messages."""
     readout: float = 0.0
+    """Seconds from the exposure of the first row to that of the last, 0 for a global shutter; the time of a picture is
+    that of its middle row."""
 
     def __post_init__(self) -> None:
         camera = f"camera {self.name!r}"

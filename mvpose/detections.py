@@ -27,32 +27,30 @@ class Detections(Sealed):
     coordinate is infinite or beyond 1e9 pixels, and where the score is NaN or below 1e-6. A detection without any
     keypoint is allowed and ignored by every stage.
 
-    Attributes:
-        view: index of the camera of each detection, (m,).
-        keypoints: pixels, (m, J, 2).
-        scores: confidence of each keypoint, 0 to 1, (m, J).
-        boxes: x, y, width, height in pixels, (m, 4).
-        box_scores: confidence of each box, 0 to 1, (m,).
-        skeleton: the J joints.
-        descriptors: appearance descriptors, (m, D), or None. A row with a value that is not finite becomes NaN, which
-            means no descriptor.
-        likelihoods: heat maps from which the keypoints were read, or None.
-        time: time of each camera's picture, (V,), seconds; NaN for a camera without a picture in this frame. None: all
-            cameras gave a picture at one time.
-
     Raises:
         ValueError: a wrong shape or skeleton, a negative view, scores outside 0..1, or an invalid box.
     """
 
     view: NDArray[np.int64]
+    """Index of the camera of each detection, (m,)."""
     keypoints: Floats
+    """Pixels, (m, J, 2)."""
     scores: Floats
+    """Confidence of each keypoint, 0 to 1, (m, J)."""
     boxes: Floats
+    """x, y, width, height in pixels, (m, 4)."""
     box_scores: Floats
+    """Confidence of each box, 0 to 1, (m,)."""
     skeleton: Skeleton = COCO17
+    """The J joints."""
     descriptors: Floats | None = None
+    """Appearance descriptors, (m, D), or None. A row with a value that is not finite becomes NaN, which means no
+    descriptor."""
     likelihoods: Heatmaps | None = None
+    """Heat maps from which the keypoints were read, or None."""
     time: Floats | None = None
+    """Time of each camera's picture, (V,), seconds; NaN for a camera without a picture in this frame. None: all cameras
+    gave a picture at one time."""
 
     def __post_init__(self) -> None:
         view = as_array(self.view, ("m",), "view", np.int64)

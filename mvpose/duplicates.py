@@ -31,17 +31,15 @@ class Duplicates:
     joints as 0 (the ranking of Xiao et al.). So the second report of a face, with few but confident joints, does not
     outrank the whole person.
 
-    Attributes:
-        threshold: OKS above which two poses of one view show one person.
-        least_joints: least number of shared detected joints; poses that share fewer are not compared, unless one
-            repeats the other exactly.
-
     Raises:
         ValueError: ``threshold`` outside 0..1, or ``least_joints`` below 1.
     """
 
     threshold: float = 0.9
+    """OKS above which two poses of one view show one person."""
     least_joints: int = 3
+    """Least number of shared detected joints; poses that share fewer are not compared, unless one repeats the other
+    exactly."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.threshold <= 1:

@@ -14,24 +14,21 @@ from mvpose.skeleton import COCO17, Skeleton
 
 @dataclass(frozen=True)
 class Matching(Sealed):
-    """Detections grouped into people, with at most one detection per view and person.
-
-    Attributes:
-        labels: person of each detection, 0 to n - 1, or -1 for a detection that matches no other, (m,). Empty if a
-            method does not report which detections belong to its people.
-        P: relaxed permutation matrix, (m, m), where the method has one.
-        iterations: number of iterations of the solver.
-        residuals: primal and dual residual at the end.
-        objective: final value of the objective (see :mod:`mvpose.matching`).
-        converged: whether both residuals fell below the tolerance within the iteration limit.
-    """
+    """Detections grouped into people, with at most one detection per view and person."""
 
     labels: NDArray[np.int64]
+    """Person of each detection, 0 to n - 1, or -1 for a detection that matches no other, (m,). Empty if a method does
+    not report which detections belong to its people."""
     P: NDArray[np.float64] | None = None
+    """Relaxed permutation matrix, (m, m), where the method has one."""
     iterations: int = 0
+    """Number of iterations of the solver."""
     residuals: tuple[float, float] = (0.0, 0.0)
+    """Primal and dual residual at the end."""
     objective: float = 0.0
+    """Final value of the objective (see :mod:`mvpose.matching`)."""
     converged: bool = True
+    """Whether both residuals fell below the tolerance within the iteration limit."""
 
     def __post_init__(self) -> None:
         set_arrays(self, labels=(("m",), np.int64))
@@ -58,29 +55,26 @@ class Matching(Sealed):
 
 @dataclass(frozen=True)
 class Estimate(Sealed):
-    """People of one frame in 3D.
-
-    Attributes:
-        joints: positions in metres, (n, J, 3); NaN for a joint that could not be placed.
-        scores: confidence, 0 to 1, (n, J); 0 for a joint that could not be placed.
-        covariance: covariance of the error of each joint, (n, J, 3, 3), square metres, or None.
-        matching: groups of detections from which the people come; person i has label i.
-        timings: time in seconds by stage ("affinity", "matching", "reconstruction", "total").
-        freedom: degrees of freedom of the error of each joint, (n, J), above 2; NaN for a joint that could not be
-            placed. The error is a multivariate t with this covariance, because its scale is itself estimated: its tail
-            is heavier than that of a Gaussian. None: the error is Gaussian. See :meth:`ellipsoids`.
-        ids: identity of each person, (n,), the same in all frames of a tracker; None where people are not tracked.
-        time: time to which the joints belong, seconds, where it is known.
-    """
+    """People of one frame in 3D."""
 
     joints: NDArray[np.float64]
+    """Positions in metres, (n, J, 3); NaN for a joint that could not be placed."""
     scores: NDArray[np.float64]
+    """Confidence, 0 to 1, (n, J); 0 for a joint that could not be placed."""
     matching: Matching
+    """Groups of detections from which the people come; person i has label i."""
     covariance: NDArray[np.float64] | None = None
+    """Covariance of the error of each joint, (n, J, 3, 3), square metres, or None."""
     timings: dict[str, float] = field(default_factory=dict)
+    """Time in seconds by stage ("affinity", "matching", "reconstruction", "total")."""
     freedom: NDArray[np.float64] | None = None
+    """Degrees of freedom of the error of each joint, (n, J), above 2; NaN for a joint that could not be placed. The
+    error is a multivariate t with this covariance, because its scale is itself estimated: its tail is heavier than that
+    of a Gaussian. None: the error is Gaussian. See :meth:`ellipsoids`."""
     ids: NDArray[np.int64] | None = None
+    """Identity of each person, (n,), the same in all frames of a tracker; None where people are not tracked."""
     time: float | None = None
+    """Time to which the joints belong, seconds, where it is known."""
 
     def __post_init__(self) -> None:
         optional = {"covariance": ("n", "J", 3, 3), "freedom": ("n", "J"), "ids": (("n",), np.int64)}

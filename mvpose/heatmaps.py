@@ -21,19 +21,17 @@ _LEAST_SHARE = 0.05  # lower limit of neighbour over peak, because the logarithm
 class Heatmaps(Sealed):
     """Heat maps of m detections, one for each of J joints.
 
-    Attributes:
-        values: likelihood of the joint in each cell, (m, J, h, w), float32, from 0 to about 1 at a confident peak.
-        origin: pixel of the centre of cell (0, 0), x and y, (m, 2).
-        stride: pixels between neighbouring cells, in x and y, (m, 2).
-
     Raises:
         ValueError: a wrong shape, a value that is negative, not finite or far above 1, an origin that is not finite,
             or a stride that is not positive.
     """
 
     values: NDArray[np.float32]
+    """Likelihood of the joint in each cell, (m, J, h, w), float32, from 0 to about 1 at a confident peak."""
     origin: Floats
+    """Pixel of the centre of cell (0, 0), x and y, (m, 2)."""
     stride: Floats
+    """Pixels between neighbouring cells, in x and y, (m, 2)."""
 
     def __post_init__(self) -> None:
         values = as_array(self.values, ("m", "J", "h", "w"), "heat map values", np.float32)

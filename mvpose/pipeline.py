@@ -26,20 +26,18 @@ class Pipeline:
 
     Every stage gets the detections in the canonical order (:mod:`mvpose.ordering`), without blank ones and repeats, so
     that the people and their order depend neither on the order of detections and cameras nor on the world frame.
-
-    Attributes:
-        affinity: affinity between detections, that is, the likelihood that two detections show one person.
-        matching: function from affinities (m, m) and views (m,) to people, over all views at once. Views are numbered
-            in the order of their first detections.
-        reconstruction: function from the rays of all detections, labels (m,) and the skeleton to 3D poses.
-        duplicates: function that returns a mask (m,) of the detections to keep; the others repeat a more confident
-            detection of their view.
     """
 
     affinity: Affinity = FusedAffinity()
+    """Affinity between detections, that is, the likelihood that two detections show one person."""
     matching: Callable[[NDArray[np.float64], NDArray[np.int64]], Matching] = Matcher()
+    """Function from affinities (m, m) and views (m,) to people, over all views at once. Views are numbered in the order
+    of their first detections."""
     reconstruction: Callable[[Rays, NDArray[np.int64], Skeleton], Poses] = PictorialStructure()
+    """Function from the rays of all detections, labels (m,) and the skeleton to 3D poses."""
     duplicates: Callable[[Detections], NDArray[np.bool_]] = Duplicates()
+    """Function that returns a mask (m,) of the detections to keep; the others repeat a more confident detection of
+    their view."""
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Estimate the people of one frame.
@@ -67,15 +65,12 @@ class Pipeline:
 
 @dataclass(frozen=True)
 class UnmatchedPipeline:
-    """Estimation without matching (the paper's "No matching"): the pictorial structure also groups the detections.
-
-    Attributes:
-        reconstruction: function from the rays of all detections and the skeleton to 3D poses and labels.
-        duplicates: as in :class:`Pipeline`.
-    """
+    """Estimation without matching (the paper's "No matching"): the pictorial structure also groups the detections."""
 
     reconstruction: Callable[[Rays, Skeleton], tuple[Poses, NDArray[np.int64]]] = UnmatchedPictorialStructure()
+    """Function from the rays of all detections and the skeleton to 3D poses and labels."""
     duplicates: Callable[[Detections], NDArray[np.bool_]] = Duplicates()
+    """As in :class:`Pipeline`."""
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Estimate the people of one frame; see :meth:`Pipeline.estimate`. Only reconstruction takes time."""

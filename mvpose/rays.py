@@ -23,23 +23,20 @@ _MODES = 3  # modes read per heat map: the joint, its left-right counterpart, an
 
 @dataclass(frozen=True, slots=True)
 class Modes:
-    """Modes of the heat maps of m detections as rays, and the maps with the cameras needed to sample them.
-
-    Attributes:
-        directions: unit vectors to the modes of each map, strongest first, (m, J, K, 3); zeros where there are fewer.
-        weights: heights of the modes, at most 1, (m, J, K); 0 where there are fewer.
-        row: row of each detection in ``values``, (m,).
-        values: heat maps of all detections of the frame, (M, J, h, w).
-        grid: origin and stride of the maps of each detection, x and y, pixels, (m, 4).
-        cameras: camera of each detection, as :attr:`mvpose.camera.Rig.packed`, (m, 22).
-    """
+    """Modes of the heat maps of m detections as rays, and the maps with the cameras needed to sample them."""
 
     directions: Floats
+    """Unit vectors to the modes of each map, strongest first, (m, J, K, 3); zeros where there are fewer."""
     weights: Floats
+    """Heights of the modes, at most 1, (m, J, K); 0 where there are fewer."""
     row: Integers
+    """Row of each detection in ``values``, (m,)."""
     values: NDArray[np.float32]
+    """Heat maps of all detections of the frame, (M, J, h, w)."""
     grid: Floats
+    """Origin and stride of the maps of each detection, x and y, pixels, (m, 4)."""
     cameras: Floats
+    """Camera of each detection, as :attr:`mvpose.camera.Rig.packed`, (m, 22)."""
 
     def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> "Modes":
         """Return the modes of some detections; all maps stay where they are, because copies would take long."""
@@ -49,23 +46,20 @@ class Modes:
 
 @dataclass(frozen=True, slots=True)
 class Rays:
-    """Viewing rays of m detections with J joints.
-
-    Attributes:
-        view: camera of each detection, (m,).
-        origins: optical centres, (m, 3), metres.
-        directions: unit vectors, (m, J, 3); zeros where the keypoint is missing.
-        weights: scores of the keypoints, (m, J); 0 where missing.
-        pixel: angle of one pixel at the image centre, (m,), radians.
-        modes: modes of the heat maps, or None.
-    """
+    """Viewing rays of m detections with J joints."""
 
     view: NDArray[np.int64]
+    """Camera of each detection, (m,)."""
     origins: Floats
+    """Optical centres, (m, 3), metres."""
     directions: Floats
+    """Unit vectors, (m, J, 3); zeros where the keypoint is missing."""
     weights: Floats
+    """Scores of the keypoints, (m, J); 0 where missing."""
     pixel: Floats
+    """Angle of one pixel at the image centre, (m,), radians."""
     modes: Modes | None = None
+    """Modes of the heat maps, or None."""
 
     def __len__(self) -> int:
         return len(self.view)

@@ -30,29 +30,27 @@ class People(Sealed):
     A joint that was not estimated is NaN in all three coordinates and has score 0. Both are set where either is given,
     and its covariance becomes NaN.
 
-    Attributes:
-        times: time of each frame, (T,), seconds, increasing.
-        ids: identity of each person, (n,), all different.
-        joints: (T, n, J, 3), metres, z up; NaN where absent.
-        scores: confidence, 0 to 1, (T, n, J), or one for all joints; 0 where absent.
-        covariance: covariance of the error of each joint, (T, n, J, 3, 3), square metres, or None.
-        skeleton: the J joints.
-        freedom: degrees of freedom of the error of each joint as in :class:`mvpose.Estimate`, (T, n, J); NaN where not
-            known. None: known of no joint.
-        numbers: number of each frame in the recording, (T,), increasing; empty: they count from 0.
-
     Raises:
         ValueError: a wrong shape, times or numbers that do not increase, repeated ids, or scores outside 0..1.
     """
 
     times: Floats
+    """Time of each frame, (T,), seconds, increasing."""
     ids: Integers
+    """Identity of each person, (n,), all different."""
     joints: Floats
+    """(T, n, J, 3), metres, z up; NaN where absent."""
     scores: Floats = field(default_factory=lambda: np.ones(()))
+    """Confidence, 0 to 1, (T, n, J), or one for all joints; 0 where absent."""
     covariance: Floats | None = None
+    """Covariance of the error of each joint, (T, n, J, 3, 3), square metres, or None."""
     skeleton: Skeleton = COCO17
+    """The J joints."""
     freedom: Floats | None = None
+    """Degrees of freedom of the error of each joint as in :class:`mvpose.Estimate`, (T, n, J); NaN where not known.
+    None: known of no joint."""
     numbers: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Number of each frame in the recording, (T,), increasing; empty: they count from 0."""
 
     def __post_init__(self) -> None:
         times, ids = as_array(self.times, ("T",), "times"), as_array(self.ids, ("n",), "ids", np.int64)

@@ -20,23 +20,21 @@ HeadMapping = Literal["voxelpose", "2019"]
 class Skeleton:
     """Set of joints with a kinematic tree.
 
-    Attributes:
-        name: name of the skeleton in files and messages.
-        joints: names of the J joints.
-        parents: index of each joint's parent in the tree, -1 for the root, (J,); a parent may come after its child.
-        mirror: index of each joint's left-right counterpart, or of the joint itself on the midline, (J,).
-        sigmas: OKS standard deviations, (J,), as fractions of the square root of the person's area.
-
     Raises:
         ValueError: repeated or no joint names, a field of another length, parents that do not form one tree, mirror
             indices that are not pairs, or a sigma that is not positive.
     """
 
     name: str
+    """Name of the skeleton in files and messages."""
     joints: tuple[str, ...]
+    """Names of the J joints."""
     parents: tuple[int, ...]
+    """Index of each joint's parent in the tree, -1 for the root, (J,); a parent may come after its child."""
     mirror: tuple[int, ...]
+    """Index of each joint's left-right counterpart, or of the joint itself on the midline, (J,)."""
     sigmas: tuple[float, ...]
+    """OKS standard deviations, (J,), as fractions of the square root of the person's area."""
 
     def __post_init__(self) -> None:
         for key in ("joints", "parents", "mirror", "sigmas"):

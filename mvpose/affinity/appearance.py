@@ -26,17 +26,15 @@ class AppearanceAffinity:
     It is 1.1 or more for different people where similar clothes, or a rectifier as the last layer of the network, give
     a cosine of 0.4.
 
-    Attributes:
-        midpoint: distance at affinity 1/2; the default of 1 is a cosine of 1/2.
-        slope: distance over which the affinity falls from 1/2 to 1/(1 + e). At 0.1 the same person gets 0.9 or more,
-            different people 0.27 or less, orthogonal descriptors 0.02.
-
     Raises:
         ValueError: ``midpoint`` or ``slope`` not above 0.
     """
 
     midpoint: float = 1.0
+    """Distance at affinity 1/2; the default of 1 is a cosine of 1/2."""
     slope: float = 0.1
+    """Distance over which the affinity falls from 1/2 to 1/(1 + e). At 0.1 the same person gets 0.9 or more, different
+    people 0.27 or less, orthogonal descriptors 0.02."""
 
     def __post_init__(self) -> None:
         check_numbers(self, "the appearance affinity", positive=("midpoint", "slope"))

@@ -29,31 +29,28 @@ class EpipolarAffinity:
     and a joint whose ray this camera cannot see at all has distance ``saturation``. So poses do not match through
     lines that meet behind a camera. For two cameras at the same point the line is the vanishing point of the ray.
 
-    Attributes:
-        midpoint: distance at affinity 1/2, pixels. A person typically fills 300 of the 1000 pixels; keypoints then
-            have a standard deviation of 10 pixels in each axis (OKS sigmas of the limbs) and lie 12 pixels from their
-            lines on average. These are the scales of :class:`mvpose.affinity.GeometricAffinity` at 175 pixels per
-            metre.
-        slope: distance over which the affinity falls from 1/2 to 1/(1 + e), pixels.
-        threshold: ``th`` of the paper: distance beyond which the affinity is 0, pixels.
-        saturation: greatest distance that one joint contributes in each direction, pixels.
-        least_joints: least number of shared joints; the affinity of poses that share fewer is 0.
-        nearest: start of a viewing ray, metres from the optical centre.
-        epipole: distance from the epipole below which a joint is treated as missing, pixels. With the accuracy of
-            keypoints its epipolar line has no defined direction there.
-
     Raises:
         ValueError: ``midpoint``, ``slope``, ``threshold`` or ``saturation`` not above 0, ``nearest`` or ``epipole``
             below 0.
     """
 
     midpoint: float = 26.0
+    """Distance at affinity 1/2, pixels. A person typically fills 300 of the 1000 pixels; keypoints then have a standard
+    deviation of 10 pixels in each axis (OKS sigmas of the limbs) and lie 12 pixels from their lines on average. These
+    are the scales of :class:`mvpose.affinity.GeometricAffinity` at 175 pixels per metre."""
     slope: float = 7.0
+    """Distance over which the affinity falls from 1/2 to 1/(1 + e), pixels."""
     threshold: float = 44.0
+    """``th`` of the paper: distance beyond which the affinity is 0, pixels."""
     saturation: float = 88.0
+    """Greatest distance that one joint contributes in each direction, pixels."""
     least_joints: int = 3
+    """Least number of shared joints; the affinity of poses that share fewer is 0."""
     nearest: float = 0.5
+    """Start of a viewing ray, metres from the optical centre."""
     epipole: float = 10.0
+    """Distance from the epipole below which a joint is treated as missing, pixels. With the accuracy of keypoints its
+    epipolar line has no defined direction there."""
 
     def __post_init__(self) -> None:
         check_numbers(

@@ -27,35 +27,32 @@ _PARALLEL = 1e-9  # squared sine; rays this close to parallel diverge by 0.3 mm 
 class GeometricAffinity:
     """Affinity from the mean distance between the viewing rays of corresponding joints of two poses.
 
-    Attributes:
-        midpoint: distance at affinity 1/2, metres. Keypoints have a standard deviation of about 0.06 m across the ray
-            (OKS sigmas of the limbs on an adult), so rays of one joint pass each other at 0.07 m on average. Two
-            people who do not touch differ by 0.3 m or more unless they share an epipolar plane.
-        slope: distance over which the affinity falls from 1/2 to 1/(1 + e), metres.
-        threshold: ``th`` of the paper: distance beyond which the affinity is 0, metres.
-        saturation: greatest distance that one joint contributes, metres, so that one wrong limb cannot separate two
-            otherwise equal poses.
-        least_joints: least number of shared detected joints; the affinity of poses that share fewer is 0.
-        nearest: start of a viewing ray, metres from the optical centre; a nearer body does not fit in the picture.
-            Without it, all rays of two cameras side by side would pass each other closely in front of the lenses,
-            whichever person they show.
-        widest: greatest factor by which midpoint, slope and threshold grow together in a frame where all rays meet
-            badly because the calibration or the clocks are off. The factor is the ratio of ``misfit`` to the value
-            that keypoint errors explain, at least 1; ``widest=1`` turns this off. Beyond 2, two people who do not
-            touch would match.
-
     Raises:
         ValueError: ``midpoint``, ``slope``, ``threshold`` or ``saturation`` not above 0, ``nearest`` below 0,
             ``widest`` below 1.
     """
 
     midpoint: float = 0.15
+    """Distance at affinity 1/2, metres. Keypoints have a standard deviation of about 0.06 m across the ray (OKS sigmas
+    of the limbs on an adult), so rays of one joint pass each other at 0.07 m on average. Two people who do not touch
+    differ by 0.3 m or more unless they share an epipolar plane."""
     slope: float = 0.04
+    """Distance over which the affinity falls from 1/2 to 1/(1 + e), metres."""
     threshold: float = 0.25
+    """``th`` of the paper: distance beyond which the affinity is 0, metres."""
     saturation: float = 0.5
+    """Greatest distance that one joint contributes, metres, so that one wrong limb cannot separate two otherwise equal
+    poses."""
     least_joints: int = 3
+    """Least number of shared detected joints; the affinity of poses that share fewer is 0."""
     nearest: float = 0.5
+    """Start of a viewing ray, metres from the optical centre; a nearer body does not fit in the picture. Without it,
+    all rays of two cameras side by side would pass each other closely in front of the lenses, whichever person they
+    show."""
     widest: float = 2.0
+    """Greatest factor by which midpoint, slope and threshold grow together in a frame where all rays meet badly because
+    the calibration or the clocks are off. The factor is the ratio of ``misfit`` to the value that keypoint errors
+    explain, at least 1; ``widest=1`` turns this off. Beyond 2, two people who do not touch would match."""
 
     def __post_init__(self) -> None:
         check_numbers(

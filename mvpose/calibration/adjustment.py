@@ -56,25 +56,22 @@ _FEWEST = 10  # people in frames from which it is measured
 
 @dataclass(frozen=True)
 class Adjustment:
-    """Result of a bundle adjustment.
-
-    Attributes:
-        rig: adjusted cameras.
-        parameters: changes of the believed cameras, (V, 11); see :mod:`mvpose.calibration.normal_equations`.
-        covariance: of the parameters, (11 V, 11 V); 0 for those that were held.
-        joints: the sightings used.
-        rows: row of each of them in the sightings that were given, (k,).
-        equations: normal equations at the solution.
-        converged: whether the last step was small.
-    """
+    """Result of a bundle adjustment."""
 
     rig: Rig
+    """Adjusted cameras."""
     parameters: Floats
+    """Changes of the believed cameras, (V, 11); see :mod:`mvpose.calibration.normal_equations`."""
     covariance: Floats
+    """Of the parameters, (11 V, 11 V); 0 for those that were held."""
     joints: JointViews
+    """The sightings used."""
     rows: Integers
+    """Row of each of them in the sightings that were given, (k,)."""
     equations: NormalEquations
+    """Normal equations at the solution."""
     converged: bool
+    """Whether the last step was small."""
 
 
 def adjust(

@@ -28,22 +28,20 @@ class Prior:
 
     Rotations and positions after calibration with a board are off by 0.2 degrees and 5 to 19 mm, focal lengths by 0.3
     to 1.3 % (caliscope).
-
-    Attributes:
-        rotation: radians.
-        translation: metres.
-        clock: seconds.
-        focal: relative.
-        center: pixels.
-        k1: of the lens.
     """
 
     rotation: float = float(np.radians(0.2))
+    """Radians."""
     translation: float = 0.02
+    """Metres."""
     clock: float = 0.01
+    """Seconds."""
     focal: float = 0.005
+    """Relative."""
     center: float = 5.0
+    """Pixels."""
     k1: float = 0.02
+    """Of the lens."""
 
     def sigmas(self) -> Floats:
         """Return the standard deviation of each parameter of a camera, (11,)."""
@@ -55,15 +53,12 @@ class Prior:
 
 @dataclass(frozen=True)
 class PriorWeights:
-    """Gaussian that stands for the prior near a solution.
-
-    Attributes:
-        width: of the errors, relative to the prior, (11,).
-        information: of each parameter, (V, 11).
-    """
+    """Gaussian that stands for the prior near a solution."""
 
     width: Floats
+    """Of the errors, relative to the prior, (11,)."""
     information: Floats
+    """Of each parameter, (V, 11)."""
 
     @classmethod
     def wide(cls, prior: Prior, views: int) -> "PriorWeights":

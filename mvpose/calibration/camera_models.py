@@ -32,19 +32,16 @@ _FEWEST_BATCHES = 5
 
 @dataclass(frozen=True)
 class Model:
-    """Errors that a fault may have.
-
-    Attributes:
-        kind: kind of finding.
-        prior: probability that a camera has it, before any data.
-        index: parameters of the camera that it frees.
-        sigma: their standard deviations.
-    """
+    """Errors that a fault may have."""
 
     kind: str
+    """Kind of finding."""
     prior: float
+    """Probability that a camera has it, before any data."""
     index: tuple[int, ...]
+    """Parameters of the camera that it frees."""
     sigma: tuple[float, ...]
+    """Their standard deviations."""
 
 
 def _moved(degrees: float, metres: float) -> Model:
@@ -75,19 +72,16 @@ _NOTHING = 1.0 - sum(each.prior for each in MODELS)
 
 @dataclass(frozen=True)
 class FaultHypothesis:
-    """A model of one camera, with its course over time.
-
-    Attributes:
-        model: what is wrong.
-        view: the camera.
-        course: ``"always"``, ``"since"`` (from some time on) or ``"growing"`` (from 0 at the start).
-        profile: share of the error in each block of time, (B,).
-    """
+    """A model of one camera, with its course over time."""
 
     model: Model
+    """What is wrong."""
     view: int
+    """The camera."""
     course: str
+    """``"always"``, ``"since"`` (from some time on) or ``"growing"`` (from 0 at the start)."""
     profile: Floats
+    """Share of the error in each block of time, (B,)."""
 
     @property
     def index(self) -> Integers:
@@ -120,17 +114,14 @@ def candidates(blocks: int, view: int) -> list[tuple[FaultHypothesis, float]]:
 
 @dataclass(frozen=True)
 class Quadratic:
-    """Log likelihood of the errors of all cameras in each block: ``-0.5 xᵀ H x + bᵀ x`` of errors x.
-
-    Attributes:
-        H: (B, 11 V, 11 V), tempered.
-        b: (B, 11 V), tempered.
-        temper: keypoints that count as one.
-    """
+    """Log likelihood of the errors of all cameras in each block: ``-0.5 xᵀ H x + bᵀ x`` of errors x."""
 
     H: Floats
+    """(B, 11 V, 11 V), tempered."""
     b: Floats
+    """(B, 11 V), tempered."""
     temper: float
+    """Keypoints that count as one."""
 
     @cached_property
     def total(self) -> tuple[Floats, Floats]:

@@ -53,45 +53,38 @@ camera had moved (Shelf, 38 draws apart from those of the benchmark)."""
 
 @dataclass(frozen=True)
 class CameraFault:
-    """A fault that was found.
-
-    Attributes:
-        fault: model, camera and course.
-        probability: posterior probability that this camera has a fault.
-        kind_probability: probability of this kind among those of the camera.
-        change: correction of the parameters at the end of the recording, (11,).
-        covariance: its covariance, (11, 11).
-        gain: log posterior odds of a fault of this camera.
-        since: block of time of the change, and the first and last block of 90 % of its probability; None for other
-            courses.
-    """
+    """A fault that was found."""
 
     fault: FaultHypothesis
+    """Model, camera and course."""
     probability: float
+    """Posterior probability that this camera has a fault."""
     kind_probability: float
+    """Probability of this kind among those of the camera."""
     change: Floats
+    """Correction of the parameters at the end of the recording, (11,)."""
     covariance: Floats
+    """Its covariance, (11, 11)."""
     gain: float
+    """Log posterior odds of a fault of this camera."""
     since: tuple[int, int, int] | None
+    """Block of time of the change, and the first and last block of 90 % of its probability; None for other courses."""
 
 
 @dataclass(frozen=True)
 class CameraFit:
-    """Result of the search.
-
-    Attributes:
-        faults: faults found, the clearest first.
-        change: correction of all cameras at the end of the recording, (V, 11), healthy ones among them.
-        covariance: covariance of each camera's correction, (V, 11, 11).
-        equations: normal equations at the solution.
-        quadratic: log likelihood of all errors around it.
-    """
+    """Result of the search."""
 
     faults: tuple[CameraFault, ...]
+    """Faults found, the clearest first."""
     change: Floats
+    """Correction of all cameras at the end of the recording, (V, 11), healthy ones among them."""
     covariance: Floats
+    """Covariance of each camera's correction, (V, 11, 11)."""
     equations: NormalEquations
+    """Normal equations at the solution."""
     quadratic: Quadratic
+    """Log likelihood of all errors around it."""
 
     def freed(self, view: int) -> tuple[Floats, Floats]:
         """Return correction (6,) and covariance (6, 6) of the pose of a camera whose calibration is not believed.

@@ -40,28 +40,25 @@ _NEAREST = 0.2  # m: least depth of a joint
 
 @dataclass(frozen=True)
 class ClockAdjustment:
-    """Solution of the least squares.
-
-    Attributes:
-        offsets: true time minus given time of the pictures of each camera, (V,), seconds; only differences count.
-        deviations: what each person in each second changes in the offsets, (B, V), seconds: the sum of their products
-            is the covariance.
-        motion: share of the motion in each view that is not noise of the keypoints, (V,), 0 to 1.
-        times: instants, (K,), seconds.
-        scores: information of each instant about each offset, (K, V): gradient of half the squared error, 1/s.
-        curvatures: its curvature, (K, V), 1/s²: score / curvature is how much later the clock is at that instant.
-        spread: standard deviation of residuals, in that of the sightings.
-        settled: whether the rounds ended because nothing changed any more.
-    """
+    """Solution of the least squares."""
 
     offsets: Floats
+    """True time minus given time of the pictures of each camera, (V,), seconds; only differences count."""
     deviations: Floats
+    """What each person in each second changes in the offsets, (B, V), seconds: the sum of their products is the
+    covariance."""
     motion: Floats
+    """Share of the motion in each view that is not noise of the keypoints, (V,), 0 to 1."""
     times: Floats
+    """Instants, (K,), seconds."""
     scores: Floats
+    """Information of each instant about each offset, (K, V): gradient of half the squared error, 1/s."""
     curvatures: Floats
+    """Its curvature, (K, V), 1/s²: score / curvature is how much later the clock is at that instant."""
     spread: float
+    """Standard deviation of residuals, in that of the sightings."""
     settled: bool = True
+    """Whether the rounds ended because nothing changed any more."""
 
 
 def adjust(rig: Rig, tracks: ImageTracks, start: Floats) -> ClockAdjustment:
@@ -112,23 +109,20 @@ def _instants(tracks: ImageTracks) -> Floats:
 
 @dataclass(frozen=True)
 class _Terms:
-    """Terms of the equations of G tracks at K times in V views, by standard deviations; 0 where not seen.
-
-    Attributes:
-        residual: what is seen minus what is expected, (G, K, V, 2).
-        to_joint: change of the projection with the joint, (G, K, V, 2, 3).
-        to_camera: change with the seven parameters of the camera, (G, K, V, 2, 7).
-        noise: velocity in the picture minus that of the joint, (G, K, V, 2), 1/s.
-        seen: whether a view sees the joint, (G, K, V); nowhere, where fewer than two do.
-        spread: standard deviation of residuals, in that of the sightings.
-    """
+    """Terms of the equations of G tracks at K times in V views, by standard deviations; 0 where not seen."""
 
     residual: Floats
+    """What is seen minus what is expected, (G, K, V, 2)."""
     to_joint: Floats
+    """Change of the projection with the joint, (G, K, V, 2, 3)."""
     to_camera: Floats
+    """Change with the seven parameters of the camera, (G, K, V, 2, 7)."""
     noise: Floats
+    """Velocity in the picture minus that of the joint, (G, K, V, 2), 1/s."""
     seen: Bools
+    """Whether a view sees the joint, (G, K, V); nowhere, where fewer than two do."""
     spread: float
+    """Standard deviation of residuals, in that of the sightings."""
 
     def reduced(self, track: int) -> tuple[Floats, Floats]:
         """Return residuals (K, V, 2) and derivatives (K, V, 2, 7 V) of one track without what a joint explains."""
@@ -146,25 +140,22 @@ class _Terms:
 
 @dataclass(frozen=True)
 class _Equations:
-    """Normal equations of the cameras, with joints eliminated and the correlation of errors in time taken out.
-
-    Attributes:
-        hessian: (7V, 7V).
-        gradient: (7V,).
-        blocks: Hessian (7V, 7V) and gradient (7V,) of each person and second.
-        scores: as in :class:`ClockAdjustment`.
-        curvatures: as in :class:`ClockAdjustment`.
-        motion: as in :class:`ClockAdjustment`.
-        memory: correlation of a residual with the one before.
-    """
+    """Normal equations of the cameras, with joints eliminated and the correlation of errors in time taken out."""
 
     hessian: Floats
+    """(7V, 7V)."""
     gradient: Floats
+    """(7V,)."""
     blocks: Mapping[tuple[int, int], tuple[Floats, Floats]]
+    """Hessian (7V, 7V) and gradient (7V,) of each person and second."""
     scores: Floats
+    """As in :class:`ClockAdjustment`."""
     curvatures: Floats
+    """As in :class:`ClockAdjustment`."""
     motion: Floats
+    """As in :class:`ClockAdjustment`."""
     memory: float
+    """Correlation of a residual with the one before."""
 
 
 def _equations(tracks: ImageTracks, terms: _Terms, instants: Floats, memory: float) -> _Equations:

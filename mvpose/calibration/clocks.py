@@ -43,33 +43,30 @@ _FEWEST = 40  # joints at times that two views share
 
 @dataclass(frozen=True)
 class Clocks(Sealed):
-    """Clocks of V cameras over F frames.
-
-    Attributes:
-        offsets: true time minus given time of each camera's pictures, (V,), seconds, against the reference; 0 where it
-            is not determined.
-        interval: lowest and highest value of 90 % of the probability, (V, 2), seconds; infinite where nothing is known.
-        covariance: of the offsets, (V, V), s²; infinite where nothing is known.
-        determined: whether the recording determines each clock, to 20 ms or a fifth of a frame, (V,).
-        reference: indices of the cameras whose mean time is taken as right.
-        steps: whole frames by which a clock is later from a frame on, because pictures were lost.
-        repeated: pictures that repeat the one before, (F, V).
-        times: corrected times of the pictures, (F, V), seconds; of a repeated picture, when it was first delivered; NaN
-            without a picture.
-        names: names of the cameras.
-        period: time between frames, seconds.
-    """
+    """Clocks of V cameras over F frames."""
 
     offsets: Floats
+    """True time minus given time of each camera's pictures, (V,), seconds, against the reference; 0 where it is not
+    determined."""
     interval: Floats
+    """Lowest and highest value of 90 % of the probability, (V, 2), seconds; infinite where nothing is known."""
     covariance: Floats
+    """Of the offsets, (V, V), s²; infinite where nothing is known."""
     determined: Bools
+    """Whether the recording determines each clock, to 20 ms or a fifth of a frame, (V,)."""
     reference: tuple[int, ...]
+    """Indices of the cameras whose mean time is taken as right."""
     steps: tuple[ClockStep, ...]
+    """Whole frames by which a clock is later from a frame on, because pictures were lost."""
     repeated: Bools
+    """Pictures that repeat the one before, (F, V)."""
     times: Floats
+    """Corrected times of the pictures, (F, V), seconds; of a repeated picture, when it was first delivered; NaN without
+    a picture."""
     names: tuple[str, ...]
+    """Names of the cameras."""
     period: float
+    """Time between frames, seconds."""
 
     def corrected(self, frames: Iterable[Detections]) -> tuple[Detections, ...]:
         """Return the frames with the corrected times of their pictures; detections stay as they are.

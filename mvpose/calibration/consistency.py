@@ -31,18 +31,14 @@ _NEGLIGIBLE = 40.0  # exponent from which e^-x is nothing beside WRONG
 
 @dataclass(frozen=True)
 class Reading:
-    """One way to read the files of a rig and its detections.
-
-    Attributes:
-        cameras: intrinsics, rotation, centre and distortion of each camera as :attr:`mvpose.Rig.packed` has them,
-            (V, 22).
-        pixels: affine map from detected pixels to those that the camera is calibrated for, (V, 2, 3).
-        exchanged: whether left and right joints of a view have each other's names, (V,).
-    """
+    """One way to read the files of a rig and its detections."""
 
     cameras: Floats
+    """Intrinsics, rotation, centre and distortion of each camera as :attr:`mvpose.Rig.packed` has them, (V, 22)."""
     pixels: Floats
+    """Affine map from detected pixels to those that the camera is calibrated for, (V, 2, 3)."""
     exchanged: Bools
+    """Whether left and right joints of a view have each other's names, (V,)."""
 
     @classmethod
     def as_given(cls, cameras: Floats) -> Self:

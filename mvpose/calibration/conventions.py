@@ -41,19 +41,16 @@ _NOTHING = 0.8  # prior probability that the files are right
 
 @dataclass(frozen=True)
 class FoundMistake:
-    """A mistake found.
-
-    Attributes:
-        mistake: the mistake and its views.
-        probability: posterior probability among all hypotheses.
-        gain: log likelihood ratio to the reading without it, tempered.
-        whole: whether it concerns all cameras.
-    """
+    """A mistake found."""
 
     mistake: Mistake
+    """The mistake and its views."""
     probability: float
+    """Posterior probability among all hypotheses."""
     gain: float
+    """Log likelihood ratio to the reading without it, tempered."""
     whole: bool
+    """Whether it concerns all cameras."""
 
 
 def search(
@@ -126,19 +123,16 @@ def _best(
 
 @dataclass(frozen=True)
 class _Moved:
-    """A reading with corrected poses of its cameras.
-
-    Attributes:
-        reading: the reading with corrected cameras.
-        evidence: log likelihood ratio of one world to chance.
-        unlikely: half the squared sizes of all moves in standard deviations (:data:`_OFF`).
-        largest: largest turn, radians.
-    """
+    """A reading with corrected poses of its cameras."""
 
     reading: Reading
+    """The reading with corrected cameras."""
     evidence: float
+    """Log likelihood ratio of one world to chance."""
     unlikely: float
+    """Half the squared sizes of all moves in standard deviations (:data:`_OFF`)."""
     largest: float
+    """Largest turn, radians."""
 
     @classmethod
     def corrected(cls, consistency: Consistency, reading: Reading, correction: Callable[[Reading], Reading]) -> Self:

@@ -127,19 +127,16 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
 
 @dataclass(frozen=True)
 class ExaminedFiles:
-    """What the files of a rig say.
-
-    Attributes:
-        reading: the files as they should be read.
-        findings: the mistakes in them, in the order in which they are mended.
-        turned: cameras that are turned far from their calibration.
-        size: how many times as large as adults people are, before the unit was mended, and from how many bones.
-    """
+    """What the files of a rig say."""
 
     reading: Reading
+    """The files as they should be read."""
     findings: list[Finding]
+    """The mistakes in them, in the order in which they are mended."""
     turned: set[int]
+    """Cameras that are turned far from their calibration."""
     size: tuple[float, int]
+    """How many times as large as adults people are, before the unit was mended, and from how many bones."""
 
 
 def _examine_files(rig: Rig, tracklets: Tracklets, consistency: Consistency, names: Sequence[str]) -> ExaminedFiles:

@@ -24,28 +24,25 @@ from mvpose.calibration.reading_changes import (
 
 @dataclass(frozen=True)
 class Mistake:
-    """A mistake that may be in the files.
-
-    Attributes:
-        kind: kind of finding (:data:`mvpose.calibration.findings.KINDS`).
-        prior: how often users make it, relative to the others.
-        text: what the user reads; ``{who}`` is the camera, or "all cameras".
-        mend: name and values of the change of the calibration that mends it (:mod:`.mends`); empty where none does.
-        advice: what to do where no change of the calibration mends it.
-        views: the cameras that it concerns; empty before it is applied.
-        size: size of the mistake, names with units.
-        of_all: whether it changes the agreement of the views if all cameras have it; another scale and other axes of
-            the world do not.
-    """
+    """A mistake that may be in the files."""
 
     kind: str
+    """Kind of finding (:data:`mvpose.calibration.findings.KINDS`)."""
     prior: float
+    """How often users make it, relative to the others."""
     text: str
+    """What the user reads; ``{who}`` is the camera, or "all cameras"."""
     mend: str
+    """Name and values of the change of the calibration that mends it (:mod:`.mends`); empty where none does."""
     advice: str = ""
+    """What to do where no change of the calibration mends it."""
     views: tuple[int, ...] = ()
+    """The cameras that it concerns; empty before it is applied."""
     size: tuple[tuple[str, float], ...] = ()
+    """Size of the mistake, names with units."""
     of_all: bool = True
+    """Whether it changes the agreement of the views if all cameras have it; another scale and other axes of the world
+    do not."""
 
 
 _GL = np.diag([1.0, -1.0, -1.0])  # camera axes of OpenGL and Blender: y up, z backwards

@@ -110,36 +110,34 @@ def is_excluded(high: Mapping[str, float]) -> bool:
 class Finding:
     """One fault, of the whole rig or of one camera.
 
-    Attributes:
-        kind: one of :data:`mvpose.calibration.findings.KINDS`.
-        text: one sentence for the user.
-        severity: ``"alarm"``, ``"note"`` or ``"unknown"``.
-        probability: probability that the fault is there, 0 to 1.
-        camera: name of the camera; None for the whole rig.
-        view: index of the camera; None for the whole rig.
-        size: size of the fault, by names that end in the unit: ``{"degrees": 1.1, "metres": 0.05, "since_s": 4.0}``.
-        interval: lowest and highest value of 90 % of the probability, for names of ``size``.
-        cost: expected loss without a mend: error of joints because of the fault, metres, times its probability.
-            Findings are ordered by it.
-        mend: what mends it in words, or what to record or to check; empty where ``repair`` says it all.
-        repair: options of ``mvpose repair`` that mend it; empty where no change of calibration or clocks does.
-
     Raises:
         ValueError: an unknown kind or severity, a probability outside of 0..1, a cost below 0, or an interval without a
             size.
     """
 
     kind: str
+    """One of :data:`mvpose.calibration.findings.KINDS`."""
     text: str
+    """One sentence for the user."""
     severity: Severity = "alarm"
+    """``"alarm"``, ``"note"`` or ``"unknown"``."""
     probability: float = 1.0
+    """Probability that the fault is there, 0 to 1."""
     camera: str | None = None
+    """Name of the camera; None for the whole rig."""
     view: int | None = None
+    """Index of the camera; None for the whole rig."""
     size: Mapping[str, float] = field(default_factory=dict)
+    """Size of the fault, by names that end in the unit: ``{"degrees": 1.1, "metres": 0.05, "since_s": 4.0}``."""
     interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Lowest and highest value of 90 % of the probability, for names of ``size``."""
     cost: float = 0.0
+    """Expected loss without a mend: error of joints because of the fault, metres, times its probability. Findings are
+    ordered by it."""
     mend: str = ""
+    """What mends it in words, or what to record or to check; empty where ``repair`` says it all."""
     repair: tuple[str, ...] = ()
+    """Options of ``mvpose repair`` that mend it; empty where no change of calibration or clocks does."""
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -175,32 +173,30 @@ class Finding:
 class Diagnosis(Sealed):
     """Answer of the doctor about one recording.
 
-    Attributes:
-        findings: worst first: alarms, then what is unknown, then notes, each by cost.
-        verdict: ``"faults"`` with at least one alarm, ``"cannot tell"`` without any but with something unknown of the
-            whole rig, else ``"fine"``.
-        evidence: lines of text with the numbers on which the verdict rests.
-        cameras: names of the cameras, V.
-        residuals: median distance of each camera's keypoints from the people that the other cameras see, (V,), pixels;
-            NaN where a camera shares nobody with the others.
-        usual: what these distances are where the calibration is right and detectors err as usual, (V,), pixels.
-        within: turn (``"degrees"``) and shift (``"metres"``) by which any camera may be off, estimates plus a standard
-            deviation; empty where the recording does not determine it.
-        repair: options of ``mvpose repair`` that mend all alarms for which there are any, in the order in which they
-            must be applied.
-
     Raises:
         ValueError: another verdict, or residuals of another number of cameras.
     """
 
     findings: tuple[Finding, ...]
+    """Worst first: alarms, then what is unknown, then notes, each by cost."""
     verdict: Verdict
+    """``"faults"`` with at least one alarm, ``"cannot tell"`` without any but with something unknown of the whole rig,
+    else ``"fine"``."""
     evidence: tuple[str, ...]
+    """Lines of text with the numbers on which the verdict rests."""
     cameras: tuple[str, ...]
+    """Names of the cameras, V."""
     residuals: Floats
+    """Median distance of each camera's keypoints from the people that the other cameras see, (V,), pixels; NaN where a
+    camera shares nobody with the others."""
     usual: Floats | None = None
+    """What these distances are where the calibration is right and detectors err as usual, (V,), pixels."""
     repair: tuple[str, ...] = ()
+    """Options of ``mvpose repair`` that mend all alarms for which there are any, in the order in which they must be
+    applied."""
     within: Mapping[str, float] = field(default_factory=dict)
+    """Turn (``"degrees"``) and shift (``"metres"``) by which any camera may be off, estimates plus a standard
+    deviation; empty where the recording does not determine it."""
 
     def __post_init__(self) -> None:
         for key in ("findings", "evidence", "cameras"):

@@ -215,35 +215,29 @@ def _unbent(u, v, camera):
 
 
 class SightingArrays(NamedTuple):
-    """Sightings of G joints by k keypoints, as kernels take them.
-
-    Attributes:
-        start: first sighting of each joint, and k, (G + 1,).
-        block: block of time of each joint, (G,).
-        view: view of each sighting, (k,).
-        velocity: velocities of keypoints, pixels/s, (k, 2).
-        sigma: standard deviations of keypoints, pixels, (k,).
-    """
+    """Sightings of G joints by k keypoints, as kernels take them."""
 
     start: Integers
+    """First sighting of each joint, and k, (G + 1,)."""
     block: Integers
+    """Block of time of each joint, (G,)."""
     view: Integers
+    """View of each sighting, (k,)."""
     velocity: Floats
+    """Velocities of keypoints, pixels/s, (k, 2)."""
     sigma: Floats
+    """Standard deviations of keypoints, pixels, (k,)."""
 
 
 class TriangulatedJoints(NamedTuple):
-    """Result of :func:`triangulate`.
-
-    Attributes:
-        joints: places, (G, 3), metres; NaN for a joint that could not be placed.
-        residuals: of the keypoints, (k, 2), pixels.
-        weights: of the keypoints, (k,).
-    """
+    """Result of :func:`triangulate`."""
 
     joints: Floats
+    """Places, (G, 3), metres; NaN for a joint that could not be placed."""
     residuals: Floats
+    """Of the keypoints, (k, 2), pixels."""
     weights: Floats
+    """Of the keypoints, (k,)."""
 
 
 @njit(cache=True)

@@ -21,38 +21,32 @@ _FRAMES = 1.6  # least bandwidth in frames: a neighbour on each side has weight
 
 
 class TrackSamples(NamedTuple):
-    """Tracks at K times.
-
-    Attributes:
-        points: normalised coordinates, (G, V, K, 2); NaN where the track is not known.
-        velocities: their change, (G, V, K, 2), 1/s.
-        sigma: standard deviation of the keypoints around, (G, V, K).
-    """
+    """Tracks at K times."""
 
     points: Floats
+    """Normalised coordinates, (G, V, K, 2); NaN where the track is not known."""
     velocities: Floats
+    """Their change, (G, V, K, 2), 1/s."""
     sigma: Floats
+    """Standard deviation of the keypoints around, (G, V, K)."""
 
 
 @dataclass(frozen=True)
 class ImageTracks:
-    """Tracks of G joints (of a person each) in V views over F frames, in normalised coordinates without distortion.
-
-    Attributes:
-        points: x / z and y / z in the camera, (G, V, F, 2); NaN where there is no keypoint.
-        sigma: standard deviation of a point, (G, V, F).
-        times: time of each picture, (F, V), seconds; between its neighbours where no picture was delivered.
-        person: person of each track, (G,).
-        joint: joint of each track, (G,).
-        period: time between frames, seconds.
-    """
+    """Tracks of G joints (of a person each) in V views over F frames, in normalised coordinates without distortion."""
 
     points: Floats
+    """x / z and y / z in the camera, (G, V, F, 2); NaN where there is no keypoint."""
     sigma: Floats
+    """Standard deviation of a point, (G, V, F)."""
     times: Floats
+    """Time of each picture, (F, V), seconds; between its neighbours where no picture was delivered."""
     person: Integers
+    """Person of each track, (G,)."""
     joint: Integers
+    """Joint of each track, (G,)."""
     period: float
+    """Time between frames, seconds."""
 
     @classmethod
     def of_sightings(cls, rig: Rig, sightings: Sightings, *, without: Bools | None = None) -> Self:

@@ -36,17 +36,14 @@ _PATTERN = re.compile(r"(?P<name>[a-z0-9-]+)(:(?P<values>[^@]+))?(@(?P<cameras>.
 
 @dataclass(frozen=True)
 class Mend:
-    """A named change of a calibration.
-
-    Attributes:
-        name: one of :data:`MENDS`.
-        values: its values as text: numbers with commas, a size, an axis; empty for none.
-        cameras: names of the cameras that it changes; empty for all.
-    """
+    """A named change of a calibration."""
 
     name: str
+    """One of :data:`MENDS`."""
     values: str = ""
+    """Its values as text: numbers with commas, a size, an axis; empty for none."""
     cameras: tuple[str, ...] = ()
+    """Names of the cameras that it changes; empty for all."""
 
     @classmethod
     def parsed(cls, text: str) -> Self:
@@ -113,15 +110,12 @@ class Mend:
 
 @dataclass(frozen=True)
 class MendKind:
-    """A kind of mend.
-
-    Attributes:
-        takes: its values, as a message names them; empty for none.
-        change: from these values to the change of a camera.
-    """
+    """A kind of mend."""
 
     takes: str
+    """Its values, as a message names them; empty for none."""
     change: Callable[[str], Callable[[Camera], Camera]]
+    """From these values to the change of a camera."""
 
 
 def _numbers(text: str, count: int) -> Floats:

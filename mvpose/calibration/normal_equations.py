@@ -51,31 +51,28 @@ _FEWEST = 20  # sightings of a person in a view
 
 @dataclass(frozen=True)
 class JointViews:
-    """Sightings of the same joint of the same person at the same time, one after the other.
-
-    Attributes:
-        start: first sighting of each of G joints, and k at the end, (G + 1,).
-        block: block of time of each joint, (G,).
-        person: person of each joint, (G,).
-        view: view of each sighting, (k,).
-        pixels: keypoints as detected, (k, 2).
-        sigma: standard deviation of each keypoint, pixels, (k,).
-        velocity: velocity of each keypoint in its picture, pixels/s, (k, 2); 0 where it is unknown.
-        blocks: number of blocks, B.
-        cluster: cluster of each joint, (G,), for which gradients are summed; by default its block.
-        importance: weight of the evidence of each joint, (G,); by default 1.
-    """
+    """Sightings of the same joint of the same person at the same time, one after the other."""
 
     start: Integers
+    """First sighting of each of G joints, and k at the end, (G + 1,)."""
     block: Integers
+    """Block of time of each joint, (G,)."""
     person: Integers
+    """Person of each joint, (G,)."""
     view: Integers
+    """View of each sighting, (k,)."""
     pixels: Floats
+    """Keypoints as detected, (k, 2)."""
     sigma: Floats
+    """Standard deviation of each keypoint, pixels, (k,)."""
     velocity: Floats
+    """Velocity of each keypoint in its picture, pixels/s, (k, 2); 0 where it is unknown."""
     blocks: int
+    """Number of blocks, B."""
     cluster: Integers | None = None
+    """Cluster of each joint, (G,), for which gradients are summed; by default its block."""
     importance: Floats | None = None
+    """Weight of the evidence of each joint, (G,); by default 1."""
 
     @property
     def joint(self) -> Integers:
@@ -95,25 +92,22 @@ class JointViews:
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """Quadratic form of the errors of the cameras around a state: ``0.5 dᵀ H d + gᵀ d`` for a change ``d``.
-
-    Attributes:
-        H: curvature of each block of time, (B, 11 V, 11 V).
-        g: gradient of each cluster, (clusters, 11 V).
-        joints: places of the joints, (G, 3), metres.
-        residuals: projected minus detected pixels, (k, 2); NaN where the joint has no place.
-        weights: weights of the sightings relative to their error model, (k,).
-        scale: standard deviation of keypoints relative to the error model.
-        cost: minus the logarithm of the likelihood, up to a constant.
-    """
+    """Quadratic form of the errors of the cameras around a state: ``0.5 dᵀ H d + gᵀ d`` for a change ``d``."""
 
     H: Floats
+    """Curvature of each block of time, (B, 11 V, 11 V)."""
     g: Floats
+    """Gradient of each cluster, (clusters, 11 V)."""
     joints: Floats
+    """Places of the joints, (G, 3), metres."""
     residuals: Floats
+    """Projected minus detected pixels, (k, 2); NaN where the joint has no place."""
     weights: Floats
+    """Weights of the sightings relative to their error model, (k,)."""
     scale: float
+    """Standard deviation of keypoints relative to the error model."""
     cost: float
+    """Minus the logarithm of the likelihood, up to a constant."""
 
 
 def normal_equations(

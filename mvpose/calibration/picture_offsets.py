@@ -37,17 +37,14 @@ Trial = tuple[float, Reading, Offset]
 
 @dataclass(frozen=True)
 class OffsetSearch:
-    """Search of crops and turns.
-
-    Attributes:
-        consistency: evidence for readings of the detections.
-        coarse: evidence on the frames and with the errors of the grid (:func:`blurred`).
-        sizes: width and height of the pictures of each camera, pixels.
-    """
+    """Search of crops and turns."""
 
     consistency: Consistency
+    """Evidence for readings of the detections."""
     coarse: Consistency
+    """Evidence on the frames and with the errors of the grid (:func:`blurred`)."""
     sizes: Sequence[Size]
+    """Width and height of the pictures of each camera, pixels."""
 
     def candidates(self, reading: Reading) -> Iterator[tuple[Mistake, Reading]]:
         """Yield for cameras that agree badly with the rest their likeliest crop and their likeliest turn."""

@@ -21,21 +21,18 @@ _LEAST_SHARE = 0.08  # of the information about a clock on each side of a step; 
 
 @dataclass(frozen=True)
 class ClockStep:
-    """Whole frames by which the pictures of a camera are later, or earlier, from a frame on.
-
-    Attributes:
-        view: index of the camera.
-        frame: first frame after the step.
-        time: its time, seconds.
-        frames: pictures that were lost; negative for pictures too many.
-        deviations: size of the step, in standard deviations of what is measured.
-    """
+    """Whole frames by which the pictures of a camera are later, or earlier, from a frame on."""
 
     view: int
+    """Index of the camera."""
     frame: int
+    """First frame after the step."""
     time: float
+    """Its time, seconds."""
     frames: int
+    """Pictures that were lost; negative for pictures too many."""
     deviations: float
+    """Size of the step, in standard deviations of what is measured."""
 
 
 def repeated_pictures(sightings: Sightings) -> Bools:

@@ -16,31 +16,28 @@ _WINDOW = 2.0  # seconds over which tracklets are matched as a whole; in it a wa
 
 @dataclass(frozen=True)
 class Pieces:
-    """Tracklets cut into windows of time: what is matched between views.
-
-    Attributes:
-        keypoints: pixels as detected, (n, J, 2); NaN where missing.
-        sigma: standard deviation of each keypoint, pixels, (n, J); infinite where missing.
-        view: view of each detection, (n,).
-        frame: frame of each detection, (n,).
-        tracklet: tracklet of each detection, (n,).
-        piece: piece of each detection, (n,), counted within its view and window.
-        start: first detection of each view and window, (V, W); detections are sorted by view, window, frame.
-        stop: one past the last one, (V, W).
-        count: number of pieces of each view and window, (V, W).
-        mirror: left-right counterpart of each joint, (J,).
-    """
+    """Tracklets cut into windows of time: what is matched between views."""
 
     keypoints: Floats
+    """Pixels as detected, (n, J, 2); NaN where missing."""
     sigma: Floats
+    """Standard deviation of each keypoint, pixels, (n, J); infinite where missing."""
     view: Integers
+    """View of each detection, (n,)."""
     frame: Integers
+    """Frame of each detection, (n,)."""
     tracklet: Integers
+    """Tracklet of each detection, (n,)."""
     piece: Integers
+    """Piece of each detection, (n,), counted within its view and window."""
     start: Integers
+    """First detection of each view and window, (V, W); detections are sorted by view, window, frame."""
     stop: Integers
+    """One past the last one, (V, W)."""
     count: Integers
+    """Number of pieces of each view and window, (V, W)."""
     mirror: Integers
+    """Left-right counterpart of each joint, (J,)."""
 
     @property
     def windows(self) -> int:

@@ -61,39 +61,36 @@ _TOO_FEW_SHARED = (
 
 @dataclass(frozen=True)
 class Repair:
-    """Repaired rig, and what is known about it.
-
-    Attributes:
-        rig: repaired cameras; the given rig, the same object, where the repair is refused.
-        offsets: time that a camera's clock is behind, (V,), seconds: a picture stamped t was taken at t + offset.
-        corrections: change of each camera, (V, 6): rotation vector about its optical centre (world axes, rad), and
-            shift of the centre, metres.
-        covariance: of the corrections of each camera, (V, 6, 6); 0 for cameras that were held.
-        offset_sigmas: standard deviations of the offsets, (V,), seconds; 0 where they were held.
-        focal: factor of each focal length, (V,).
-        center: shift of each principal point, (V, 2), pixels.
-        held: what was not changed, and why.
-        refused: why nothing was changed; None where the rig was repaired.
-        residuals_before: median distance between keypoints and projected joints with the given rig, (V,), pixels; NaN
-            for a view that shares nobody with others.
-        residuals_after: the same with the repaired rig.
-        people: number of people whom two or more views see.
-        scale: factor of the size of the whole rig, where people decide it.
-    """
+    """Repaired rig, and what is known about it."""
 
     rig: Rig
+    """Repaired cameras; the given rig, the same object, where the repair is refused."""
     offsets: Floats
+    """Time that a camera's clock is behind, (V,), seconds: a picture stamped t was taken at t + offset."""
     corrections: Floats
+    """Change of each camera, (V, 6): rotation vector about its optical centre (world axes, rad), and shift of the
+    centre, metres."""
     covariance: Floats
+    """Of the corrections of each camera, (V, 6, 6); 0 for cameras that were held."""
     offset_sigmas: Floats
+    """Standard deviations of the offsets, (V,), seconds; 0 where they were held."""
     focal: Floats
+    """Factor of each focal length, (V,)."""
     center: Floats
+    """Shift of each principal point, (V, 2), pixels."""
     held: tuple[str, ...]
+    """What was not changed, and why."""
     refused: str | None
+    """Why nothing was changed; None where the rig was repaired."""
     residuals_before: Floats
+    """Median distance between keypoints and projected joints with the given rig, (V,), pixels; NaN for a view that
+    shares nobody with others."""
     residuals_after: Floats
+    """The same with the repaired rig."""
     people: int
+    """Number of people whom two or more views see."""
     scale: float = 1.0
+    """Factor of the size of the whole rig, where people decide it."""
 
     def to_json(self) -> dict[str, Any]:
         """Return all numbers and texts, ready for JSON; missing values are None."""

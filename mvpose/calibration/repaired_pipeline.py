@@ -33,14 +33,12 @@ class RepairedPipeline:
     that of the believed calibration and of bone lengths together. Clocks are corrected where one is an alarm: an
     estimator with memory gets the corrected times of pictures, an estimator of single frames gets detections that are
     moved to the times of the frames.
-
-    Attributes:
-        estimator: what estimates people.
-        period: time between frames whose detections carry no time, seconds.
     """
 
     estimator: Estimator
+    """What estimates people."""
     period: float = 0.04
+    """Time between frames whose detections carry no time, seconds."""
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Estimate the people of one frame alone, without repair: one frame does not determine the calibration."""
@@ -78,16 +76,13 @@ def _of_given(estimate: Estimate, rows: Integers, count: int) -> Estimate:
 
 @dataclass(frozen=True)
 class Resampled:
-    """Detections of F frames, all of the time of their frame.
-
-    Attributes:
-        frames: the detections, F.
-        rows: for each detection of the frames that were given, the detection in ``frames`` of the same frame that shows
-            the same person, or -1: F arrays (m,).
-    """
+    """Detections of F frames, all of the time of their frame."""
 
     frames: tuple[Detections, ...]
+    """The detections, F."""
     rows: tuple[Integers, ...]
+    """For each detection of the frames that were given, the detection in ``frames`` of the same frame that shows the
+    same person, or -1: F arrays (m,)."""
 
 
 def resampled(rig: Rig, frames: Sequence[Detections], clocks: Clocks) -> Resampled:

@@ -29,31 +29,29 @@ _LEAST_BETTER = 10.0
 class Sightings(Sealed):
     """k sightings of joints in pictures, each by one view.
 
-    Attributes:
-        frame: frame of each sighting, (k,).
-        view: view, (k,).
-        person: person, 0, 1, ..., (k,): the same number for one person in all views and frames. A person
-            seen by one view alone, or not matched to other views, has a separate number.
-        joint: index of the joint in ``skeleton``, (k,).
-        pixels: keypoint as detected, with the distortion of the lens, (k, 2).
-        sigma: standard deviation of the keypoint, pixels, (k,).
-        times: time of each picture, (F, V), seconds; NaN where there is none.
-        skeleton: the joints.
-        velocity: velocity of the keypoint in its picture, pixels/s, (k, 2); 0 where it is unknown.
-
     Raises:
         ValueError: arrays of different lengths, or indices beyond the frames, the views or the joints.
     """
 
     frame: Integers
+    """Frame of each sighting, (k,)."""
     view: Integers
+    """View, (k,)."""
     person: Integers
+    """Person, 0, 1, ..., (k,): the same number for one person in all views and frames. A person seen by one view alone,
+    or not matched to other views, has a separate number."""
     joint: Integers
+    """Index of the joint in ``skeleton``, (k,)."""
     pixels: Floats
+    """Keypoint as detected, with the distortion of the lens, (k, 2)."""
     sigma: Floats
+    """Standard deviation of the keypoint, pixels, (k,)."""
     times: Floats
+    """Time of each picture, (F, V), seconds; NaN where there is none."""
     skeleton: Skeleton
+    """The joints."""
     velocity: Floats | None = None
+    """Velocity of the keypoint in its picture, pixels/s, (k, 2); 0 where it is unknown."""
 
     def __post_init__(self) -> None:
         count = len(self.frame)

@@ -48,14 +48,11 @@ _SHARED = 0.40  # agreement from which two views see the same people
 
 @dataclass(frozen=True)
 class PairAgreement:
-    """How well pairs of views agree.
-
-    Attributes:
-        pairs: evidence of each pair as a share of what it would be without errors, (V, V), 0 to 1; NaN where the two
-            views have no detections at the same time.
-    """
+    """How well pairs of views agree."""
 
     pairs: Floats
+    """Evidence of each pair as a share of what it would be without errors, (V, V), 0 to 1; NaN where the two views have
+    no detections at the same time."""
 
     @classmethod
     def measured(cls, consistency: Consistency, *readings: Reading) -> Self:

@@ -45,17 +45,14 @@ _STEP = 0.02  # seconds, for the derivative of a line of sight by time
 
 @dataclass(frozen=True)
 class RigUncertainty:
-    """Standard deviations of the errors of each camera along each axis.
-
-    Attributes:
-        rotation: radians.
-        translation: metres.
-        clock: seconds.
-    """
+    """Standard deviations of the errors of each camera along each axis."""
 
     rotation: float
+    """Radians."""
     translation: float
+    """Metres."""
     clock: float = 0.0
+    """Seconds."""
 
     def information(self, views: int) -> Floats:
         """Return the inverse covariance of all unknowns, (7 V, 7 V)."""
@@ -65,17 +62,14 @@ class RigUncertainty:
 
 @dataclass(frozen=True)
 class PeopleGroups:
-    """Groups of tracklets, each of one person.
-
-    Attributes:
-        person: person of each tracklet, (tracklets,); people of one view have numbers of their own.
-        score: sum of the scores of all pairs in groups, to compare matchings of the same tracklets.
-        rig: the rig with the corrections that were found on the way.
-    """
+    """Groups of tracklets, each of one person."""
 
     person: Integers
+    """Person of each tracklet, (tracklets,); people of one view have numbers of their own."""
     score: float
+    """Sum of the scores of all pairs in groups, to compare matchings of the same tracklets."""
     rig: Rig
+    """The rig with the corrections that were found on the way."""
 
 
 def corrected(camera: Camera, rotation: Floats, shift: Floats) -> Camera:

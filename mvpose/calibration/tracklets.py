@@ -42,29 +42,26 @@ _LOWEST_SCORE = 0.2  # a keypoint of a lower score is not less accurate: it is r
 
 @dataclass(frozen=True)
 class Tracklets:
-    """Detections of all frames, sorted by tracklet and then by frame.
-
-    Attributes:
-        tracklet: tracklet of each of n detections, 0, 1, ..., (n,).
-        frame: frame of each detection, (n,).
-        view: view of each detection, (n,); the same within a tracklet.
-        keypoints: pixels as detected, (n, J, 2); NaN where missing.
-        sigma: standard deviation of each keypoint, pixels, (n, J); infinite where it is missing.
-        velocity: velocity of each keypoint in its picture, pixels/s, (n, J, 2); 0 where it is unknown.
-        times: time of each picture, (F, V), seconds; NaN where there is none.
-        skeleton: the J joints.
-        descriptors: appearance, (n, D), or None; NaN for a detection without.
-    """
+    """Detections of all frames, sorted by tracklet and then by frame."""
 
     tracklet: Integers
+    """Tracklet of each of n detections, 0, 1, ..., (n,)."""
     frame: Integers
+    """Frame of each detection, (n,)."""
     view: Integers
+    """View of each detection, (n,); the same within a tracklet."""
     keypoints: Floats
+    """Pixels as detected, (n, J, 2); NaN where missing."""
     sigma: Floats
+    """Standard deviation of each keypoint, pixels, (n, J); infinite where it is missing."""
     velocity: Floats
+    """Velocity of each keypoint in its picture, pixels/s, (n, J, 2); 0 where it is unknown."""
     times: Floats
+    """Time of each picture, (F, V), seconds; NaN where there is none."""
     skeleton: Skeleton
+    """The J joints."""
     descriptors: Floats | None = None
+    """Appearance, (n, D), or None; NaN for a detection without."""
 
     def __len__(self) -> int:
         """Number of tracklets."""

@@ -110,18 +110,15 @@ def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -
 
 @dataclass(frozen=True)
 class Agreement:
-    """Agreement of people with the detections of every camera.
-
-    Attributes:
-        residuals: median distance of keypoints from the projected joints, (V,), in standard deviations of annotators
-            (twice OKS's sigma times the root of the person's area); NaN where there are too few.
-        shares: share of the detections that belong to a person whom other cameras see, too, (V,); NaN without any.
-        body: median length from shoulder to ankle, metres; NaN where nobody is complete.
-    """
+    """Agreement of people with the detections of every camera."""
 
     residuals: Floats
+    """Median distance of keypoints from the projected joints, (V,), in standard deviations of annotators (twice OKS's
+    sigma times the root of the person's area); NaN where there are too few."""
     shares: Floats
+    """Share of the detections that belong to a person whom other cameras see, too, (V,); NaN without any."""
     body: float
+    """Median length from shoulder to ankle, metres; NaN where nobody is complete."""
 
 
 def agreement(rig: Rig, frames: Sequence[Detections], estimates: Sequence[Estimate]) -> Agreement:

@@ -41,25 +41,22 @@ _FPS = 25.0
 
 @dataclass(frozen=True)
 class Inputs:
-    """A recording that was read.
-
-    Attributes:
-        rig: its cameras, z up.
-        frames: detections of each of the T frames, with the times of the pictures, all on one skeleton.
-        numbers: number of each frame in the files, (T,).
-        period: time between frames, seconds.
-        paths: file or folder with the detections of each camera, V.
-        doubt: why the given upward axis may be wrong; "" where nothing speaks against it.
-        whole: whether these are all frames of the detections.
-    """
+    """A recording that was read."""
 
     rig: "Rig"
+    """Its cameras, z up."""
     frames: "list[Detections]"
+    """Detections of each of the T frames, with the times of the pictures, all on one skeleton."""
     numbers: "NDArray[np.int64]"
+    """Number of each frame in the files, (T,)."""
     period: float
+    """Time between frames, seconds."""
     paths: tuple[Path, ...] = ()
+    """File or folder with the detections of each camera, V."""
     doubt: str = ""
+    """Why the given upward axis may be wrong; "" where nothing speaks against it."""
     whole: bool = True
+    """Whether these are all frames of the detections."""
 
     @property
     def skeleton(self) -> "mvpose.Skeleton":

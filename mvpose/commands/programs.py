@@ -31,22 +31,19 @@ FAILED = 3
 
 @dataclass(frozen=True)
 class Program:
-    """Program with commands.
-
-    Attributes:
-        name: name on the command line.
-        summary: what it is for, one line.
-        version: function that returns the version; "" for none.
-        tracebacks: whether every failure prints its traceback; else only where the environment variable
-            ``NAME_TRACEBACK`` is set, which prints those of bad input as well.
-        left: what a failure of most commands leaves on disk, for its message.
-    """
+    """Program with commands."""
 
     name: str
+    """Name on the command line."""
     summary: str
+    """What it is for, one line."""
     version: Callable[[], str]
+    """Function that returns the version; "" for none."""
     tracebacks: bool = False
+    """Whether every failure prints its traceback; else only where the environment variable ``NAME_TRACEBACK`` is set,
+    which prints those of bad input as well."""
     left: str = ""
+    """What a failure of most commands leaves on disk, for its message."""
 
     def app(self) -> typer.Typer:
         """Return the application, without commands."""

@@ -41,16 +41,14 @@ def canonical(name: str) -> str:
 class JointNames:
     """Skeleton of a file: the names of its joints in their order.
 
-    Attributes:
-        name: name of the skeleton in messages.
-        joints: names of the J joints; of equal names the first counts.
-
     Raises:
         ValueError: no names.
     """
 
     name: str
+    """Name of the skeleton in messages."""
     joints: tuple[str, ...]
+    """Names of the J joints; of equal names the first counts."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joints", tuple(self.joints))

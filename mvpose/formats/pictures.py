@@ -26,23 +26,20 @@ _COMPLETE = 0.9  # of the frames that a video states: the number in its header i
 
 @dataclass(frozen=True)
 class PictureSource:
-    """Pictures of one camera in the order of time.
-
-    Attributes:
-        path: the video or folder.
-        name: its name without ending.
-        count: number of pictures, of a video as its header states it.
-        fps: frames per second of a video; NaN where unknown.
-        size: width and height of the first picture.
-        numbers: number of each picture of a folder; empty: they count from 0, as those of a video.
-    """
+    """Pictures of one camera in the order of time."""
 
     path: Path
+    """The video or folder."""
     name: str
+    """Its name without ending."""
     count: int
+    """Number of pictures, of a video as its header states it."""
     fps: float
+    """Frames per second of a video; NaN where unknown."""
     size: tuple[int, int]
+    """Width and height of the first picture."""
     numbers: tuple[int, ...] = ()
+    """Number of each picture of a folder; empty: they count from 0, as those of a video."""
 
     def numbered_for(self, frames: Sequence[int]) -> "tuple[PictureSource, str]":
         """Return the source with numbers of pictures that are those of frames, and a remark where that is not sure.

@@ -27,15 +27,12 @@ _TABLES = {"project", *_POSES, "calibration", "triangulation"}
 
 @dataclass(frozen=True)
 class ProjectSettings:
-    """Settings of a project, the nearest file first.
-
-    Attributes:
-        files: the files.
-        tables: their content.
-    """
+    """Settings of a project, the nearest file first."""
 
     files: tuple[Path, ...] = ()
+    """The files."""
     tables: tuple[Mapping[str, Any], ...] = ()
+    """Their content."""
 
     @classmethod
     def near(cls, places: Iterable[Path]) -> "ProjectSettings":

@@ -26,16 +26,14 @@ _ASYMMETRY = 1e-6  # tolerance for rounding, also in single precision
 class Matcher:
     """Configured matching method; see :func:`match`.
 
-    Attributes:
-        method: ``"admm"``, ``"clustering"`` or ``"hungarian"``.
-        alpha: least affinity of a match, 0 to 1.
-
     Raises:
         ValueError: an unknown method, or ``alpha`` outside 0..1.
     """
 
     method: Method = "admm"
+    """``"admm"``, ``"clustering"`` or ``"hungarian"``."""
     alpha: float = 0.5
+    """Least affinity of a match, 0 to 1."""
 
     def __post_init__(self) -> None:
         if self.method not in get_args(Method):

@@ -42,26 +42,23 @@ _SINGLE = 1e-5  # least tolerance for which single precision suffices; its round
 
 @dataclass(frozen=True)
 class Relaxation:
-    """Solution of the relaxed problem.
-
-    Attributes:
-        P: relaxed permutation matrix, (m, m), in C.
-        Y: dual variable, (m, m); its spectral norm is lambda up to the residuals.
-        iterations: number of iterations.
-        residuals: primal ``||P - Q||`` and dual ``rho ||P - P_before||`` (with over-relaxation, the distance of Y from
-            the subgradient of ``lambda ||Q||_*``), Frobenius norms over m.
-        converged: whether both residuals fell below the tolerance.
-        gain: ``A - alpha E``, (m, m).
-        weight: lambda.
-    """
+    """Solution of the relaxed problem."""
 
     P: Floats
+    """Relaxed permutation matrix, (m, m), in C."""
     Y: Floats
+    """Dual variable, (m, m); its spectral norm is lambda up to the residuals."""
     iterations: int
+    """Number of iterations."""
     residuals: tuple[float, float]
+    """Primal ``||P - Q||`` and dual ``rho ||P - P_before||`` (with over-relaxation, the distance of Y from the
+    subgradient of ``lambda ||Q||_*``), Frobenius norms over m."""
     converged: bool
+    """Whether both residuals fell below the tolerance."""
     gain: Floats
+    """``A - alpha E``, (m, m)."""
     weight: float
+    """Lambda."""
 
     @property
     def objective(self) -> float:

@@ -29,37 +29,35 @@ class Card:
     (``mvpose.mean`` = ``[0.485, 0.456, 0.406]``); fields at their defaults are left out. For a file without a card,
     pass one to :class:`mvpose.networks.Session`.
 
-    Attributes:
-        name: name of the network in messages and reports.
-        size: width and height of the input in pixels; needed only if the file leaves them open.
-        mean: value subtracted from red, green and blue in 0..1. A network that takes unnormalised 0..255 has mean 0
-            and std 1/255.
-        std: divisor of the difference.
-        color_order: order of the input channels.
-        outputs: names of the outputs to read, in order; empty for all.
-        midpoint: re-ID: distance of two unit descriptors at affinity 1/2.
-        slope: re-ID: distance over which the affinity falls from 1/2 to 1/(1 + e).
-        padding: pose: size of the crop over the size of the box.
-        peak: pose: height of a confident peak of a heat map, or of a SimCC vector.
-        cells: pose: pixel of the input, W wide, that corresponds to cell k of w. ``stride``: k W/w, for heads trained
-            with the code of HRNet or SimpleBaseline and for SimCC heads; ``span``: k (W - 1)/(w - 1), unbiased data
-            processing (UDP; ViTPose); ``area``: the centre of the W/w pixels that the cell covers (CPN).
-
     Raises:
         ValueError: an invalid value; the message names the field.
     """
 
     name: str = ""
+    """Name of the network in messages and reports."""
     size: tuple[int, int] | None = None
+    """Width and height of the input in pixels; needed only if the file leaves them open."""
     mean: Colour = (0.485, 0.456, 0.406)
+    """Value subtracted from red, green and blue in 0..1. A network that takes unnormalised 0..255 has mean 0 and std
+    1/255."""
     std: Colour = (0.229, 0.224, 0.225)
+    """Divisor of the difference."""
     color_order: Literal["rgb", "bgr"] = "rgb"
+    """Order of the input channels."""
     outputs: tuple[str, ...] = ()
+    """Names of the outputs to read, in order; empty for all."""
     midpoint: float | None = None
+    """Re-ID: distance of two unit descriptors at affinity 1/2."""
     slope: float | None = None
+    """Re-ID: distance over which the affinity falls from 1/2 to 1/(1 + e)."""
     padding: float = 1.25
+    """Pose: size of the crop over the size of the box."""
     peak: float = 1.0
+    """Pose: height of a confident peak of a heat map, or of a SimCC vector."""
     cells: Literal["stride", "span", "area"] = "stride"
+    """Pose: pixel of the input, W wide, that corresponds to cell k of w. ``stride``: k W/w, for heads trained with the
+    code of HRNet or SimpleBaseline and for SimCC heads; ``span``: k (W - 1)/(w - 1), unbiased data processing (UDP;
+    ViTPose); ``area``: the centre of the W/w pixels that the cell covers (CPN)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mean", _numbers("mean", self.mean))

@@ -22,15 +22,12 @@ Images = Sequence[NDArray[np.uint8] | None]
 
 
 class Placement(NamedTuple):
-    """Position of m crops in their images.
-
-    Attributes:
-        origin: image pixel of the centre of crop pixel (0, 0), x and y, (m, 2).
-        stride: image pixels between neighbouring crop pixels, x and y, (m, 2).
-    """
+    """Position of m crops in their images."""
 
     origin: Floats
+    """Image pixel of the centre of crop pixel (0, 0), x and y, (m, 2)."""
     stride: Floats
+    """Image pixels between neighbouring crop pixels, x and y, (m, 2)."""
 
     def select(self, rows: NDArray[np.bool_]) -> "Placement":
         """Return the placement of some of the crops, given by a mask (m,)."""

@@ -49,19 +49,16 @@ _BOX = 5  # columns of boxes after non-maximum suppression: corners and score
 
 @dataclass(frozen=True)
 class PeopleInPicture:
-    """People in one picture.
-
-    Attributes:
-        boxes: x, y, width, height, (m, 4), pixels.
-        scores: confidence of each box, 0 to 1, (m,).
-        keypoints: (m, J, 2), pixels, of one-stage heads; None for detectors.
-        keypoint_scores: (m, J), 0 to 1; None for detectors.
-    """
+    """People in one picture."""
 
     boxes: Floats
+    """x, y, width, height, (m, 4), pixels."""
     scores: Floats
+    """Confidence of each box, 0 to 1, (m,)."""
     keypoints: Floats | None = None
+    """(m, J, 2), pixels, of one-stage heads; None for detectors."""
     keypoint_scores: Floats | None = None
+    """(m, J), 0 to 1; None for detectors."""
 
     @classmethod
     def joined(cls, parts: "Sequence[PeopleInPicture]") -> "PeopleInPicture":
@@ -76,13 +73,10 @@ class PeopleInPicture:
 
 
 class PeopleFinder(Protocol):
-    """What finds the people of pictures.
-
-    Attributes:
-        least: least score of a person.
-    """
+    """What finds the people of pictures."""
 
     least: float
+    """Least score of a person."""
 
     @property
     def kind(self) -> str:

@@ -39,23 +39,20 @@ _LEAST = 0.126953125  # score of a joint that counts towards the score of its pe
 
 @dataclass(frozen=True)
 class Heads:
-    """Outputs of MultiPose for one picture, (h, w, ...) cells.
-
-    Attributes:
-        centers: probability of the centre of a person, (h, w).
-        heatmaps: probability of each joint, (h, w, J).
-        regression: places of the joints of the person centred at a cell, rows and columns from it, (h, w, J, 2), cells.
-        offsets: place of a joint that is at a cell, from it, (h, w, J, 2).
-        box_size: height and width of the person centred at a cell, (h, w, 2), cells.
-        box_offset: centre of its box from the cell, (h, w, 2).
-    """
+    """Outputs of MultiPose for one picture, (h, w, ...) cells."""
 
     centers: Values
+    """Probability of the centre of a person, (h, w)."""
     heatmaps: Values
+    """Probability of each joint, (h, w, J)."""
     regression: Values
+    """Places of the joints of the person centred at a cell, rows and columns from it, (h, w, J, 2), cells."""
     offsets: Values
+    """Place of a joint that is at a cell, from it, (h, w, J, 2)."""
     box_size: Values
+    """Height and width of the person centred at a cell, (h, w, 2), cells."""
     box_offset: Values
+    """Centre of its box from the cell, (h, w, 2)."""
 
 
 class MoveNet:

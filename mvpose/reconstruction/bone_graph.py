@@ -27,33 +27,31 @@ class BoneGraph(NamedTuple):
 
     The first J of the B bones join each joint to its parent (the root has none: its bone joins nothing), and the rest
     are mirror images.
-
-    Attributes:
-        parents: joint at the inner end of each bone, (B,), -1 for the bone of the root.
-        children: joint at the outer end of each bone, (B,).
-        share: weight of the prior of each bone, (B,): 1, or 1/2 where the mirror image of a bone is not in the tree.
-        neighbours: joints at the other ends of each joint's bones, (J, D), -1 where there are fewer.
-        bones: these bones, (J, D), -1 where there are fewer.
-        inner: parent of each joint in the tree and in its mirror image, each once, (J, 2), -1 where there are fewer.
-        mate: mirror counterpart of each joint if a bone joins the two, else the joint itself, (J,).
-        visits: joints from the outermost to the innermost, (J,), in an order that left and right share.
-        order: joints in the order of elimination, (J,).
-        later: joints that are joined to each joint when it is eliminated, the first to be eliminated of them first,
-            (J, 2), -1 where there are fewer.
-        joint_bones: bones that join each joint to these, (J, 2), -1 where none does.
     """
 
     parents: Integers
+    """Joint at the inner end of each bone, (B,), -1 for the bone of the root."""
     children: Integers
+    """Joint at the outer end of each bone, (B,)."""
     share: Floats
+    """Weight of the prior of each bone, (B,): 1, or 1/2 where the mirror image of a bone is not in the tree."""
     neighbours: Integers
+    """Joints at the other ends of each joint's bones, (J, D), -1 where there are fewer."""
     bones: Integers
+    """These bones, (J, D), -1 where there are fewer."""
     inner: Integers
+    """Parent of each joint in the tree and in its mirror image, each once, (J, 2), -1 where there are fewer."""
     mate: Integers
+    """Mirror counterpart of each joint if a bone joins the two, else the joint itself, (J,)."""
     visits: Integers
+    """Joints from the outermost to the innermost, (J,), in an order that left and right share."""
     order: Integers
+    """Joints in the order of elimination, (J,)."""
     later: Integers
+    """Joints that are joined to each joint when it is eliminated, the first to be eliminated of them first, (J, 2), -1
+    where there are fewer."""
     joint_bones: Integers
+    """Bones that join each joint to these, (J, 2), -1 where none does."""
 
 
 @cache

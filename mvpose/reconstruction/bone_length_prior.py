@@ -55,16 +55,13 @@ _BONES: dict[frozenset[str], tuple[float, float]] = {
 
 
 class Bones(NamedTuple):
-    """Published lengths of the bones of :func:`mvpose.reconstruction.bone_graph.bone_graph`.
-
-    Attributes:
-        length: mean over adults, (B,), metres; 0 where no length is published, and for the bone of the root.
-        definition: standard deviation of the length due to the detectors' definition of the joints, (B,), metres;
-            infinite where no length is published, and for the bone of the root.
-    """
+    """Published lengths of the bones of :func:`mvpose.reconstruction.bone_graph.bone_graph`."""
 
     length: Floats
+    """Mean over adults, (B,), metres; 0 where no length is published, and for the bone of the root."""
     definition: Floats
+    """Standard deviation of the length due to the detectors' definition of the joints, (B,), metres; infinite where no
+    length is published, and for the bone of the root."""
 
 
 @cache

@@ -21,41 +21,35 @@ from mvpose.skeleton import Skeleton
 
 
 class Hypotheses(NamedTuple):
-    """States of all joints (S in total), and the keypoints that support them.
-
-    Attributes:
-        start: first state of each joint, and S, (J + 1,).
-        points: positions of the states, (S, 3), metres.
-        support_start: first supporting keypoint of each state, and their total number, (S + 1,).
-        support: detections whose keypoints support each state, in the order of their views.
-        evidence: log-likelihood ratio of each supporting keypoint with the joint at the state against without it.
-    """
+    """States of all joints (S in total), and the keypoints that support them."""
 
     start: Integers
+    """First state of each joint, and S, (J + 1,)."""
     points: Floats
+    """Positions of the states, (S, 3), metres."""
     support_start: Integers
+    """First supporting keypoint of each state, and their total number, (S + 1,)."""
     support: Integers
+    """Detections whose keypoints support each state, in the order of their views."""
     evidence: Floats
+    """Log-likelihood ratio of each supporting keypoint with the joint at the state against without it."""
 
 
 class Links(NamedTuple):
-    """Kinematic tree, and links between states at the distance of its bones.
-
-    Attributes:
-        parents: parent of each joint, (J,), -1 for the root.
-        order: joints from the root outwards, (J,).
-        known: whether the length of the bone from each joint to its parent has a prior, (J,).
-        start: first link of each state, and their total number, (S + 1,).
-        state: states of the parent joint at the distance of a bone.
-        cost: negative log-prior of the bone length of each link.
-    """
+    """Kinematic tree, and links between states at the distance of its bones."""
 
     parents: Integers
+    """Parent of each joint, (J,), -1 for the root."""
     order: Integers
+    """Joints from the root outwards, (J,)."""
     known: Bools
+    """Whether the length of the bone from each joint to its parent has a prior, (J,)."""
     start: Integers
+    """First link of each state, and their total number, (S + 1,)."""
     state: Integers
+    """States of the parent joint at the distance of a bone."""
     cost: Floats
+    """Negative log-prior of the bone length of each link."""
 
 
 def hypothesize(rays: Rays, skeleton: Skeleton, *, noise: Noise, agreement: float, most: int) -> Hypotheses:

@@ -30,24 +30,21 @@ _FASTMATH = {"contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
 class Noise:
     """Error model of a keypoint.
 
-    Attributes:
-        area: square root of the person's area as OKS uses it, in metres: an adult fills 53 % of a box of
-            1.7 m x 0.55 m (fraction from Ronchi & Perona 2017).
-        definition: standard deviation between views of the point that a detector takes for the joint, metres.
-        pixels: least standard deviation of any detector, pixels.
-        floor: likelihood of a wrong keypoint at any place, as a fraction of the peak likelihood of a right one. One
-            keypoint in ten is grossly wrong (rates of PoseFix) and lies anywhere in a square metre; the others lie
-            within 0.05 m.
-
     Raises:
         ValueError: ``floor`` not above 0, a negative ``area``, ``definition`` or ``pixels``, or ``area`` and
             ``definition`` both 0.
     """
 
     area: float = 0.70
+    """Square root of the person's area as OKS uses it, in metres: an adult fills 53 % of a box of 1.7 m x 0.55 m
+    (fraction from Ronchi & Perona 2017)."""
     definition: float = 0.02
+    """Standard deviation between views of the point that a detector takes for the joint, metres."""
     pixels: float = 1.0
+    """Least standard deviation of any detector, pixels."""
     floor: float = 0.01
+    """Likelihood of a wrong keypoint at any place, as a fraction of the peak likelihood of a right one. One keypoint in
+    ten is grossly wrong (rates of PoseFix) and lies anywhere in a square metre; the others lie within 0.05 m."""
 
     def __post_init__(self) -> None:
         check_numbers(self, "the noise model", positive=("floor",), not_negative=("area", "definition", "pixels"))

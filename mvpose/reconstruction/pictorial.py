@@ -46,37 +46,31 @@ _SAME = 0.25  # squared distance, in variances of the joint, below which refinem
 
 
 class _ModeRays(NamedTuple):
-    """Viewing rays of the K modes of every keypoint of m detections.
-
-    Attributes:
-        origins: optical centres, (m, 3), metres.
-        directions: unit vectors, (m, J, K, 3).
-        weights: scores, (m, J, K); 0 for a missing keypoint.
-        pixel: least angle of an error, (m,), radians.
-    """
+    """Viewing rays of the K modes of every keypoint of m detections."""
 
     origins: Floats
+    """Optical centres, (m, 3), metres."""
     directions: Floats
+    """Unit vectors, (m, J, K, 3)."""
     weights: Floats
+    """Scores, (m, J, K); 0 for a missing keypoint."""
     pixel: Floats
+    """Least angle of an error, (m,), radians."""
 
 
 class _BodyPrior(NamedTuple):
-    """What is known of every body on a skeleton of B bones.
-
-    Attributes:
-        graph: the bones.
-        length: their mean lengths, (B,), metres.
-        definition: standard deviation of their lengths by definition.
-        concentrations: of the directions of limbs, (B,).
-        segments: segment of the trunk that each joint belongs to, (J,).
-    """
+    """What is known of every body on a skeleton of B bones."""
 
     graph: BoneGraph
+    """The bones."""
     length: Floats
+    """Their mean lengths, (B,), metres."""
     definition: Floats
+    """Standard deviation of their lengths by definition."""
     concentrations: Floats
+    """Of the directions of limbs, (B,)."""
     segments: Integers
+    """Segment of the trunk that each joint belongs to, (J,)."""
 
 
 @dataclass(frozen=True)
@@ -89,21 +83,19 @@ class PictorialStructure:
     A joint that only one view sees is placed on its ray by the prior, with the resulting covariance; a joint that no
     view sees is missing.
 
-    Attributes:
-        noise: error model of keypoints.
-        personal: whether to scale the bone-length prior to the person's stature, estimated from the well-seen bones.
-        most_pairs: greatest number of pairs of views that propose positions for a joint; pairs that agree and meet at
-            wide angles come first. The limit matters from 12 views on.
-        most_states: number of proposals kept for a joint, the likeliest ones.
-
     Raises:
         ValueError: ``most_pairs`` or ``most_states`` below 1.
     """
 
     noise: Noise = Noise()
+    """Error model of keypoints."""
     personal: bool = True
+    """Whether to scale the bone-length prior to the person's stature, estimated from the well-seen bones."""
     most_pairs: int = 64
+    """Greatest number of pairs of views that propose positions for a joint; pairs that agree and meet at wide angles
+    come first. The limit matters from 12 views on."""
     most_states: int = 32
+    """Number of proposals kept for a joint, the likeliest ones."""
 
     def __post_init__(self) -> None:
         for name in ("most_pairs", "most_states"):

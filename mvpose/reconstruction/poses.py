@@ -12,21 +12,18 @@ MISSING_SCORE = 1e-9
 
 
 class Poses(NamedTuple):
-    """Joints of n people.
-
-    Attributes:
-        joints: positions, (n, J, 3), metres; NaN where a joint could not be placed.
-        scores: mean over the person's views of the keypoint score times the posterior probability that the keypoint
-            is right, (n, J); 0 where a joint could not be placed.
-        covariance: covariance of each position, (n, J, 3, 3), square metres; NaN where a joint could not be placed.
-        freedom: degrees of freedom of the multivariate t distribution of its error, (n, J), above 2; NaN where a joint
-            could not be placed.
-    """
+    """Joints of n people."""
 
     joints: Floats
+    """Positions, (n, J, 3), metres; NaN where a joint could not be placed."""
     scores: Floats
+    """Mean over the person's views of the keypoint score times the posterior probability that the keypoint is right,
+    (n, J); 0 where a joint could not be placed."""
     covariance: Floats
+    """Covariance of each position, (n, J, 3, 3), square metres; NaN where a joint could not be placed."""
     freedom: Floats
+    """Degrees of freedom of the multivariate t distribution of its error, (n, J), above 2; NaN where a joint could not
+    be placed."""
 
 
 @njit(cache=True)

@@ -39,18 +39,16 @@ class Triangulation:
 
     Joints seen by fewer than two views are missing.
 
-    Attributes:
-        method: ``"robust"`` finds wrong views and leaves them out; ``"dlt"`` averages all views, weighted by score;
-            ``"best-pair"`` takes the pair of views with the least reprojection error over all views, as the code
-            released with the paper does.
-        noise: error model of keypoints.
-
     Raises:
         ValueError: an unknown method.
     """
 
     method: Method = "robust"
+    """``"robust"`` finds wrong views and leaves them out; ``"dlt"`` averages all views, weighted by score;
+    ``"best-pair"`` takes the pair of views with the least reprojection error over all views, as the code released with
+    the paper does."""
     noise: Noise = Noise()
+    """Error model of keypoints."""
 
     def __post_init__(self) -> None:
         if self.method not in _METHODS:

@@ -42,29 +42,27 @@ _SHARED = 3  # least number of joints of a detection that a person must explain 
 class UnmatchedPictorialStructure:
     """Reconstruction by 3DPS from all detections at once, without matching.
 
-    Attributes:
-        noise: error model of keypoints.
-        agreement: greatest distance between two rays that propose a state, in standard deviations.
-        reach: greatest error of a bone length, in standard deviations of the length and of the states at its ends.
-        least_joints: least number of joints of a person on which two or more views agree. It exceeds the five joints
-            of a face: they lie within a hand's breadth, so all five agree where the rays of two faces meet by chance.
-        apart: least mean distance between corresponding joints of two people, metres; a chest is 0.25 m deep
-            (ANSUR II). A nearer pose is the same person found again, with left and right exchanged or not.
-        most_states: greatest number of states that a keypoint proposes, the likeliest ones.
-        most_detections: greatest number of detections that are used; of more, the same number of each view, those with
-            the greatest sums of scores. It bounds the time, which grows with the cube of this number.
-
     Raises:
         ValueError: a parameter that is not above 0 (``apart``: below 0).
     """
 
     noise: Noise = Noise()
+    """Error model of keypoints."""
     agreement: float = 3.0
+    """Greatest distance between two rays that propose a state, in standard deviations."""
     reach: float = 4.0
+    """Greatest error of a bone length, in standard deviations of the length and of the states at its ends."""
     least_joints: int = 6
+    """Least number of joints of a person on which two or more views agree. It exceeds the five joints of a face: they
+    lie within a hand's breadth, so all five agree where the rays of two faces meet by chance."""
     apart: float = 0.15
+    """Least mean distance between corresponding joints of two people, metres; a chest is 0.25 m deep (ANSUR II). A
+    nearer pose is the same person found again, with left and right exchanged or not."""
     most_states: int = 8
+    """Greatest number of states that a keypoint proposes, the likeliest ones."""
     most_detections: int = 500
+    """Greatest number of detections that are used; of more, the same number of each view, those with the greatest sums
+    of scores. It bounds the time, which grows with the cube of this number."""
 
     def __post_init__(self) -> None:
         check_numbers(

@@ -99,25 +99,22 @@ def write_doctor_page(
 
 @dataclass(frozen=True)
 class DoctorCase:
-    """A rig with its residuals before and after the repair.
-
-    Attributes:
-        rig: the rig as it was given.
-        names: names of its cameras, all different.
-        sightings: keypoints matched over time and views.
-        diagnosis: what is wrong.
-        repair: the repair, or None.
-        before: residuals of the sightings with the rig.
-        after: residuals with the repaired rig; None where nothing was changed.
-    """
+    """A rig with its residuals before and after the repair."""
 
     rig: Rig
+    """The rig as it was given."""
     names: tuple[str, ...]
+    """Names of its cameras, all different."""
     sightings: Sightings
+    """Keypoints matched over time and views."""
     diagnosis: Diagnosis
+    """What is wrong."""
     repair: Repair | None
+    """The repair, or None."""
     before: Missing
+    """Residuals of the sightings with the rig."""
     after: Missing | None
+    """Residuals with the repaired rig; None where nothing was changed."""
 
     @classmethod
     def of(cls, rig: Rig, sightings: Sightings, diagnosis: Diagnosis, repair: Repair | None) -> Self:

@@ -33,29 +33,26 @@ _SEED = 0  # the same numbers for the same people
 
 @dataclass(frozen=True)
 class ExaminedRecording:
-    """A recording and what its page measures.
-
-    Attributes:
-        people: people of the T frames.
-        rig: V cameras.
-        frames: detections of the T frames.
-        names: names of the cameras, all different.
-        seen: people beside the detections.
-        supports: views that support each joint, (F, n, J); -1 if absent.
-        views: views of each person, (F, n); -1 if absent.
-        groups: names of the G groups of joints that tables show.
-        group: group of each joint, (J,).
-    """
+    """A recording and what its page measures."""
 
     people: People
+    """People of the T frames."""
     rig: Rig
+    """V cameras."""
     frames: Sequence[Detections]
+    """Detections of the T frames."""
     names: tuple[str, ...]
+    """Names of the cameras, all different."""
     seen: Reprojection
+    """People beside the detections."""
     supports: Integers
+    """Views that support each joint, (F, n, J); -1 if absent."""
     views: Integers
+    """Views of each person, (F, n); -1 if absent."""
     groups: tuple[str, ...]
+    """Names of the G groups of joints that tables show."""
     group: Integers
+    """Group of each joint, (J,)."""
 
     @classmethod
     def of(cls, people: People, rig: Rig, frames: Sequence[Detections]) -> Self:

@@ -39,17 +39,14 @@ _SLOWEST = 1.0  # frames per second that players can be relied on to show
 
 @dataclass(frozen=True)
 class CameraFilm:
-    """Film of a camera.
-
-    Attributes:
-        camera: name of the camera.
-        address: address of the file, relative to the folder of the page.
-        poster: the picture that shows most people, as a data URI.
-    """
+    """Film of a camera."""
 
     camera: str
+    """Name of the camera."""
     address: str
+    """Address of the file, relative to the folder of the page."""
     poster: str
+    """The picture that shows most people, as a data URI."""
 
 
 def write_films(

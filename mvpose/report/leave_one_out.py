@@ -21,16 +21,13 @@ _LEAST_OTHERS = 2  # views that place the joint
 
 @dataclass(frozen=True)
 class Missing:
-    """Residuals of k sightings from the other views.
-
-    Attributes:
-        offset: detected minus expected, (k, 2), pixels; NaN where fewer than two other views see the joint, or do not
-            determine its place.
-        point: joint by all views, (k, 3), metres, in the world; NaN where fewer than two views see it.
-    """
+    """Residuals of k sightings from the other views."""
 
     offset: Floats
+    """Detected minus expected, (k, 2), pixels; NaN where fewer than two other views see the joint, or do not determine
+    its place."""
     point: Floats
+    """Joint by all views, (k, 3), metres, in the world; NaN where fewer than two views see it."""
 
 
 def leave_one_out(rig: Rig, sightings: Sightings, *, offsets: Floats | None = None) -> Missing:

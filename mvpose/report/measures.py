@@ -69,21 +69,18 @@ def share_on_one_view(supports: Integers) -> float:
 
 @dataclass(frozen=True)
 class Bone:
-    """Lengths of one bone of one person over time.
-
-    Attributes:
-        name: name of the bone.
-        person: row in ``People``.
-        length: median length, of both sides where there are two, metres.
-        spread: standard deviation over time, from the interquartile range, metres; the mean of both sides.
-        asymmetry: difference of left and right over their mean; NaN for a bone without sides.
-    """
+    """Lengths of one bone of one person over time."""
 
     name: str
+    """Name of the bone."""
     person: int
+    """Row in ``People``."""
     length: float
+    """Median length, of both sides where there are two, metres."""
     spread: float
+    """Standard deviation over time, from the interquartile range, metres; the mean of both sides."""
     asymmetry: float
+    """Difference of left and right over their mean; NaN for a bone without sides."""
 
 
 def bones(people: People) -> list[Bone]:

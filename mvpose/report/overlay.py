@@ -29,17 +29,14 @@ USUAL_HEIGHT = 600.0
 
 @dataclass(frozen=True)
 class BoxTag:
-    """Tag of a box.
-
-    Attributes:
-        text: text of the tag.
-        box: x, y, width, height of the box, pixels.
-        color: colour of the tag.
-    """
+    """Tag of a box."""
 
     text: str
+    """Text of the tag."""
     box: tuple[float, ...]
+    """x, y, width, height of the box, pixels."""
     color: Color
+    """Colour of the tag."""
 
 
 class Overlay:

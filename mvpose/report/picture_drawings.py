@@ -28,17 +28,14 @@ _QUALITY = 80
 
 @dataclass(frozen=True)
 class Person:
-    """A person as drawn in a picture.
-
-    Attributes:
-        pixels: projected joints, (J, 2); NaN for a joint to leave out.
-        color: colour of the limbs.
-        name: what a pointer on the limbs shows.
-    """
+    """A person as drawn in a picture."""
 
     pixels: Floats
+    """Projected joints, (J, 2); NaN for a joint to leave out."""
     color: str
+    """Colour of the limbs."""
     name: str
+    """What a pointer on the limbs shows."""
 
 
 def picture_element(

@@ -26,32 +26,29 @@ _FAR = 1e6  # metres; cost of a pair that cannot be
 
 @dataclass(frozen=True)
 class Reprojection:
-    """Keypoints of the detections that show a person, beside the projections of that person's joints, k of them.
-
-    Attributes:
-        frames: indices of the F frames that were compared, ascending.
-        owners: for each of the F frames, the row in ``People`` of each detection, (m,); -1 for nobody's.
-        frame: frame of each keypoint, (k,), an index of the recording.
-        view: camera, (k,).
-        person: row in ``People``, (k,).
-        joint: joint of the skeleton, (k,).
-        keypoint: detected place, (k, 2), pixels.
-        offset: detected minus projected, (k, 2), pixels.
-        metres: length of the offset at the distance of the joint, (k,), metres.
-        supports: whether the keypoint lies where the error model takes it for right, (k,): within 3 standard deviations
-            (:class:`mvpose.reconstruction.likelihood.Noise`).
-    """
+    """Keypoints of the detections that show a person, beside the projections of that person's joints, k of them."""
 
     frames: Integers
+    """Indices of the F frames that were compared, ascending."""
     owners: tuple[Integers, ...]
+    """For each of the F frames, the row in ``People`` of each detection, (m,); -1 for nobody's."""
     frame: Integers
+    """Frame of each keypoint, (k,), an index of the recording."""
     view: Integers
+    """Camera, (k,)."""
     person: Integers
+    """Row in ``People``, (k,)."""
     joint: Integers
+    """Joint of the skeleton, (k,)."""
     keypoint: Floats
+    """Detected place, (k, 2), pixels."""
     offset: Floats
+    """Detected minus projected, (k, 2), pixels."""
     metres: Floats
+    """Length of the offset at the distance of the joint, (k,), metres."""
     supports: Bools
+    """Whether the keypoint lies where the error model takes it for right, (k,): within 3 standard deviations
+    (:class:`mvpose.reconstruction.likelihood.Noise`)."""
 
     def __len__(self) -> int:
         return len(self.view)

@@ -85,21 +85,18 @@ def cone_from_above(camera: Camera, reach: float) -> Floats:
 
 @dataclass(frozen=True)
 class MapLabel:
-    """Label of a place.
-
-    Attributes:
-        text: one line or more.
-        place: what the label is for, (2,), in the units of the axes.
-        away: preferred direction of the label from the place, (2,).
-        color: colour of the letters.
-        size: font size, points.
-    """
+    """Label of a place."""
 
     text: str
+    """One line or more."""
     place: Floats
+    """What the label is for, (2,), in the units of the axes."""
     away: Floats
+    """Preferred direction of the label from the place, (2,)."""
     color: Color = INK
+    """Colour of the letters."""
     size: float = 8.0
+    """Font size, points."""
 
     @property
     def extent(self) -> Floats:

@@ -21,21 +21,18 @@ _MOST_GROUPS = 16  # rows of a table of joints; of larger skeletons only the gro
 
 @dataclass(frozen=True)
 class Cell:
-    """Cell of a table.
-
-    Attributes:
-        text: the number.
-        small: second line; of a head, the word before the text, which narrow tables leave out.
-        share: shade, 0 (none) to 1 (full).
-        color: chip before the text; empty for none.
-        strong: whether the number is bold.
-    """
+    """Cell of a table."""
 
     text: str
+    """The number."""
     small: str = ""
+    """Second line; of a head, the word before the text, which narrow tables leave out."""
     share: float = 0.0
+    """Shade, 0 (none) to 1 (full)."""
     color: str = ""
+    """Chip before the text; empty for none."""
     strong: bool = False
+    """Whether the number is bold."""
 
 
 @dataclass(frozen=True)

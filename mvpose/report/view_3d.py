@@ -27,18 +27,15 @@ _DARKER = 0.28  # share of black in the rim of a round body
 
 
 class Shape3D(NamedTuple):
-    """What is drawn between the points of a piece; whatever needs a point that is unknown is left out.
-
-    Attributes:
-        lines: pairs of points.
-        faces: corners of polygons.
-        bodies: points of a round body and the radius around them, metres: one point is a ball, two are a capsule, more
-            are a polygon with round edges.
-    """
+    """What is drawn between the points of a piece; whatever needs a point that is unknown is left out."""
 
     lines: tuple[tuple[int, int], ...] = ()
+    """Pairs of points."""
     faces: tuple[tuple[int, ...], ...] = ()
+    """Corners of polygons."""
     bodies: tuple[tuple[tuple[int, ...], float], ...] = ()
+    """Points of a round body and the radius around them, metres: one point is a ball, two are a capsule, more are a
+    polygon with round edges."""
 
 
 def loop(count: int, first: int = 0) -> tuple[tuple[int, int], ...]:
@@ -56,36 +53,30 @@ def prism(count: int) -> Shape3D:
 
 
 class Style3D(NamedTuple):
-    """How a piece is drawn.
-
-    Attributes:
-        color: "#rrggbb", or a variable of the page's style: "--ink", "--faint", "--line", "--accent".
-        width: of lines, pixels.
-        dashed: whether lines are dashed.
-        opacity: of faces, 0 to 1.
-        rim: colour of the edge of round bodies; "": a darker shade of ``color``, which is no variable then.
-    """
+    """How a piece is drawn."""
 
     color: str
+    """"#rrggbb", or a variable of the page's style: "--ink", "--faint", "--line", "--accent"."""
     width: float = 1.0
+    """Of lines, pixels."""
     dashed: bool = False
+    """Whether lines are dashed."""
     opacity: float = 1.0
+    """Of faces, 0 to 1."""
     rim: str = ""
+    """Colour of the edge of round bodies; "": a darker shade of ``color``, which is no variable then."""
 
 
 @dataclass(frozen=True)
 class Piece3D:
-    """Piece of a scene.
-
-    Attributes:
-        points: (n, 3) metres; NaN where unknown.
-        shape: what is drawn between the points.
-        style: how.
-    """
+    """Piece of a scene."""
 
     points: Floats = field(repr=False)
+    """(n, 3) metres; NaN where unknown."""
     shape: Shape3D
+    """What is drawn between the points."""
     style: Style3D
+    """How."""
 
     @classmethod
     def of_lines(cls, lines: Sequence[Floats], style: Style3D) -> Self:
@@ -96,44 +87,38 @@ class Piece3D:
 
 @dataclass(frozen=True)
 class Scene3D:
-    """What a view shows.
-
-    Attributes:
-        label: description for readers who cannot see it.
-        center: point that the view turns around, (3,) metres.
-        fitted: points that are in the view from all sides at first, (n, 3) metres.
-        fixed: what is there all the time.
-        names: texts and their places, (3,) metres.
-        frames: what is there in each frame; none where nothing moves.
-        times: of the frames, seconds.
-        first: number of the first frame.
-        start: index of the frame that is shown at first.
-    """
+    """What a view shows."""
 
     label: str
+    """Description for readers who cannot see it."""
     center: Floats
+    """Point that the view turns around, (3,) metres."""
     fitted: Floats = field(repr=False)
+    """Points that are in the view from all sides at first, (n, 3) metres."""
     fixed: Sequence[Piece3D] = field(repr=False)
+    """What is there all the time."""
     names: Sequence[tuple[str, Floats]] = ()
+    """Texts and their places, (3,) metres."""
     frames: Sequence[Sequence[Piece3D]] = field(default=(), repr=False)
+    """What is there in each frame; none where nothing moves."""
     times: Sequence[float] = field(default=(), repr=False)
+    """Of the frames, seconds."""
     first: int = 0
+    """Number of the first frame."""
     start: int = 0
+    """Index of the frame that is shown at first."""
 
 
 @dataclass(frozen=True)
 class View3D:
-    """A 3D view of a page, which the macro ``view_3d`` of ``parts.html`` shows.
-
-    Attributes:
-        label: description.
-        data: input of ``view_3d.js``: lengths in whole millimetres, null for an unknown point.
-        still: the view at first as SVG.
-    """
+    """A 3D view of a page, which the macro ``view_3d`` of ``parts.html`` shows."""
 
     label: str
+    """Description."""
     data: dict[str, Any] = field(repr=False)
+    """Input of ``view_3d.js``: lengths in whole millimetres, null for an unknown point."""
     still: Markup = field(repr=False)
+    """The view at first as SVG."""
 
     @property
     def json(self) -> Markup:

@@ -19,30 +19,27 @@ from mvpose.skeleton_fit.joint_limits import HingeLimit, Limit
 
 @dataclass(frozen=True)
 class BodySegment:
-    """Segment of the body.
-
-    Attributes:
-        name: name in files, as most animation programs write it.
-        parent: name of the parent; "" for the root.
-        bone: direction from the origin of the parent to its own in the T-pose, (3,), a unit vector.
-        length: name of the length of that offset in :data:`LENGTHS`; both sides share it.
-        share: share of that length that the offset is.
-        limit: range of motion; None for the root, which turns freely.
-        axes: axes about which it turns in its own frame, (D, 3); empty if it is fixed to its parent.
-        spread: standard deviation of its rotation about the axes, degrees, around ``rest``. It only matters where
-            joints do not determine the rotation.
-        rest: mean rotation, a rotation vector in degrees, (3,).
-    """
+    """Segment of the body."""
 
     name: str
+    """Name in files, as most animation programs write it."""
     parent: str
+    """Name of the parent; "" for the root."""
     bone: tuple[float, float, float]
+    """Direction from the origin of the parent to its own in the T-pose, (3,), a unit vector."""
     length: str
+    """Name of the length of that offset in :data:`LENGTHS`; both sides share it."""
     limit: Limit | None
+    """Range of motion; None for the root, which turns freely."""
     axes: tuple[tuple[float, float, float], ...]
+    """Axes about which it turns in its own frame, (D, 3); empty if it is fixed to its parent."""
     spread: float
+    """Standard deviation of its rotation about the axes, degrees, around ``rest``. It only matters where joints do not
+    determine the rotation."""
     share: float = 1.0
+    """Share of that length that the offset is."""
     rest: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Mean rotation, a rotation vector in degrees, (3,)."""
 
 
 LENGTHS = {
@@ -116,23 +113,20 @@ _ORIGINS = {
 
 @dataclass(frozen=True)
 class ArticulatedBody:
-    """Body of one person: its segments and the joints of a skeleton on them, in metres.
-
-    Attributes:
-        segments: the S segments, parents before children.
-        offsets: from the origin of the parent to that of the segment, (S, 3); that of the root is zero.
-        joints: names of the M joints of the skeleton that lie on the body.
-        rows: their indices in the skeleton, (M,).
-        carriers: index of the segment of each of them, (M,).
-        places: their places in the frames of their segments, (M, 3).
-    """
+    """Body of one person: its segments and the joints of a skeleton on them, in metres."""
 
     segments: tuple[BodySegment, ...]
+    """The S segments, parents before children."""
     offsets: Floats
+    """From the origin of the parent to that of the segment, (S, 3); that of the root is zero."""
     joints: tuple[str, ...]
+    """Names of the M joints of the skeleton that lie on the body."""
     rows: tuple[int, ...]
+    """Their indices in the skeleton, (M,)."""
     carriers: tuple[int, ...]
+    """Index of the segment of each of them, (M,)."""
     places: Floats
+    """Their places in the frames of their segments, (M, 3)."""
 
     @classmethod
     def of_skeleton(cls, skeleton: Skeleton) -> Self:

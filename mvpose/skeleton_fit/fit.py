@@ -27,19 +27,16 @@ _SIDES = ("left", "right")
 
 @dataclass(frozen=True)
 class FittedBody:
-    """Body of one person and its motion.
-
-    Attributes:
-        identity: identity of the person.
-        first: index of its first frame in the recording.
-        times: time of each frame from the first to the last in which the person is seen, (T,), seconds.
-        pose: the body and its poses in these frames.
-    """
+    """Body of one person and its motion."""
 
     identity: int
+    """Identity of the person."""
     first: int
+    """Index of its first frame in the recording."""
     times: Floats
+    """Time of each frame from the first to the last in which the person is seen, (T,), seconds."""
     pose: Pose
+    """The body and its poses in these frames."""
 
     @property
     def body(self) -> ArticulatedBody:

@@ -40,18 +40,15 @@ _STRAIGHT = 0.25  # sine of the angle at an elbow or knee; a straighter limb doe
 
 @dataclass(frozen=True)
 class JointTargets:
-    """Joints that poses should reach.
-
-    Attributes:
-        times: time of each frame, (T,), seconds.
-        joints: (T, M, 3), metres; NaN where absent.
-        whitening: matrices W such that W (error) has the identity as covariance, (T, M, 3, 3), 1/metres; zero where a
-            joint is absent.
-    """
+    """Joints that poses should reach."""
 
     times: Floats
+    """Time of each frame, (T,), seconds."""
     joints: Floats
+    """(T, M, 3), metres; NaN where absent."""
     whitening: Floats
+    """Matrices W such that W (error) has the identity as covariance, (T, M, 3, 3), 1/metres; zero where a joint is
+    absent."""
 
 
 def reach(pose: Pose, target: JointTargets, *, steps: int) -> Pose:

@@ -54,20 +54,18 @@ class Cone:
 
     The rotation is a swing of the bone, about an axis at right angles to it, after a twist about the bone. The
     section of the cone has a half-axis of its own in each of the four directions.
-
-    Attributes:
-        bone: direction of the bone in the T-pose, (3,), a unit vector.
-        toward: two directions at right angles to the bone and each other, (2, 3), toward which the bone swings.
-        far: most degrees toward each of them, (2,).
-        back: most degrees away from each of them, (2,).
-        twist: most degrees of rotation about the bone: negative and positive, (2,).
     """
 
     bone: tuple[float, float, float]
+    """Direction of the bone in the T-pose, (3,), a unit vector."""
     toward: tuple[tuple[float, float, float], tuple[float, float, float]]
+    """Two directions at right angles to the bone and each other, (2, 3), toward which the bone swings."""
     far: tuple[float, float]
+    """Most degrees toward each of them, (2,)."""
     back: tuple[float, float]
+    """Most degrees away from each of them, (2,)."""
     twist: tuple[float, float]
+    """Most degrees of rotation about the bone: negative and positive, (2,)."""
 
     def nearest(self, rotations: Floats) -> Floats:
         """Return rotations with swing and twist within their ranges."""
@@ -91,20 +89,18 @@ class Shoulder:
     on the way by which the arm got there (Codman's paradox); here it is the shortest way from the middle of the range,
     and the range of rotation is wider than the published one by the largest difference between ways within a quarter of
     the sphere, 45 degrees.
-
-    Attributes:
-        side: 1 for the left shoulder, -1 for the right one.
-        extension: most degrees behind the body of an arm at the side.
-        horizontal_extension: most degrees behind the side of a horizontal arm.
-        crossing: most degrees of abduction below 0: the arm crosses the chest.
-        twist: most degrees of outward and inward rotation.
     """
 
     side: int
+    """1 for the left shoulder, -1 for the right one."""
     extension: float = 60.0
+    """Most degrees behind the body of an arm at the side."""
     horizontal_extension: float = 45.0
+    """Most degrees behind the side of a horizontal arm."""
     crossing: float = 45.0
+    """Most degrees of abduction below 0: the arm crosses the chest."""
     twist: tuple[float, float] = (90.0 + 45.0, 70.0 + 45.0)
+    """Most degrees of outward and inward rotation."""
 
     def nearest(self, rotations: Floats) -> Floats:
         """Return rotations with the arm in an allowed direction, and its own rotation within the range."""

@@ -12,18 +12,14 @@ from mvpose.skeleton_fit.rotations import to_matrices
 
 @dataclass(frozen=True)
 class Pose:
-    """Poses of a body in T frames.
-
-    Attributes:
-        body: the body with S segments and M joints.
-        root: origin of the root segment, (T, 3), metres.
-        rotations: rotation of every segment relative to its parent, (T, S, 3, 3); that of the root relative to the
-            world.
-    """
+    """Poses of a body in T frames."""
 
     body: ArticulatedBody
+    """The body with S segments and M joints."""
     root: Floats
+    """Origin of the root segment, (T, 3), metres."""
     rotations: Floats
+    """Rotation of every segment relative to its parent, (T, S, 3, 3); that of the root relative to the world."""
 
     @cached_property
     def frames(self) -> tuple[Floats, Floats]:
@@ -47,17 +43,14 @@ class Pose:
 
 @dataclass(frozen=True)
 class Freedom:
-    """Axes about which a body can turn: D rotations, after the three translations of the root.
-
-    Attributes:
-        body: the body.
-        segments: segment of each axis, (D,).
-        axes: the axes in the frames of their segments, (D, 3).
-    """
+    """Axes about which a body can turn: D rotations, after the three translations of the root."""
 
     body: ArticulatedBody
+    """The body."""
     segments: Integers
+    """Segment of each axis, (D,)."""
     axes: Floats
+    """The axes in the frames of their segments, (D, 3)."""
 
     @classmethod
     def of_body(cls, body: ArticulatedBody) -> "Freedom":

@@ -22,24 +22,21 @@ from mvpose.rays import Rays
 
 @dataclass(frozen=True)
 class TrackAffinity:
-    """Affinity from the mean distance between predicted joints and viewing rays.
-
-    Attributes:
-        midpoint: distance at affinity 1/2, metres.
-        slope: distance over which the affinity falls from 1/2 to 1/(1 + e), metres.
-        threshold: distance beyond which the affinity is 0, metres.
-        saturation: greatest distance that one joint contributes, metres.
-        keypoint: standard deviation of a keypoint across its ray, metres: predicted joints that are less certain than
-            that count less.
-        least_joints: least number of joints that both have.
-    """
+    """Affinity from the mean distance between predicted joints and viewing rays."""
 
     midpoint: float = 0.15
+    """Distance at affinity 1/2, metres."""
     slope: float = 0.04
+    """Distance over which the affinity falls from 1/2 to 1/(1 + e), metres."""
     threshold: float = 0.25
+    """Distance beyond which the affinity is 0, metres."""
     saturation: float = 0.5
+    """Greatest distance that one joint contributes, metres."""
     keypoint: float = 0.1
+    """Standard deviation of a keypoint across its ray, metres: predicted joints that are less certain than that count
+    less."""
     least_joints: int = 3
+    """Least number of joints that both have."""
 
     def __post_init__(self) -> None:
         check_numbers(

@@ -28,17 +28,14 @@ _CONVERGED = 1e-6  # m²
 
 
 class BonePrior(NamedTuple):
-    """Bones of a skeleton with published lengths.
-
-    Attributes:
-        ends: joints at both ends, (B, 2); with every bone its mirror image, so that no side is favoured.
-        length: mean length over adults, (B,), metres.
-        variance: variance of that length, (B,), square metres.
-    """
+    """Bones of a skeleton with published lengths."""
 
     ends: Integers
+    """Joints at both ends, (B, 2); with every bone its mirror image, so that no side is favoured."""
     length: Floats
+    """Mean length over adults, (B,), metres."""
     variance: Floats
+    """Variance of that length, (B,), square metres."""
 
 
 @cache

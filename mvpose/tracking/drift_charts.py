@@ -43,39 +43,36 @@ _ALL_STRAY, _STRAY_VARIANCE = 0.6, 0.09  # share of stray people where a camera 
 
 
 class Charts(NamedTuple):
-    """What is known of V cameras, as arrays that kernels update in place.
-
-    Attributes:
-        looked: time of the latest look, (V,), seconds; -inf before the first.
-        start: start of the batch, (V,), seconds; NaN before the first.
-        keypoints: number of keypoints of the batch, (V,).
-        normal: normal equations of the batch, (V, 4, 5).
-        people: people of the batch whom the camera found, and stray ones, (V, 2).
-        residual: sums over the latest seconds, (V, 3), see :func:`mvpose.tracking.picture_shift.measure_shifts`.
-        batches: number of batches so far, (V,).
-        reference: mean numbers of the first minute, (V, 5).
-        deviation: mean deviation from them in the latest seconds, (V, 5).
-        sums: cumulative sums, (V, 5, 2), for rising and falling numbers.
-        calm: number of the latest batches in which the mean deviation was small, (V,).
-        onset: time at which each left zero, (V, 5, 2), seconds.
-        alarm: time at which the camera was found to have moved, (V,), seconds; NaN for none.
-        since: time since which it has, (V,), seconds.
-    """
+    """What is known of V cameras, as arrays that kernels update in place."""
 
     looked: Floats
+    """Time of the latest look, (V,), seconds; -inf before the first."""
     start: Floats
+    """Start of the batch, (V,), seconds; NaN before the first."""
     keypoints: Floats
+    """Number of keypoints of the batch, (V,)."""
     normal: Floats
+    """Normal equations of the batch, (V, 4, 5)."""
     people: Floats
+    """People of the batch whom the camera found, and stray ones, (V, 2)."""
     residual: Floats
+    """Sums over the latest seconds, (V, 3), see :func:`mvpose.tracking.picture_shift.measure_shifts`."""
     batches: Floats
+    """Number of batches so far, (V,)."""
     reference: Floats
+    """Mean numbers of the first minute, (V, 5)."""
     deviation: Floats
+    """Mean deviation from them in the latest seconds, (V, 5)."""
     sums: Floats
+    """Cumulative sums, (V, 5, 2), for rising and falling numbers."""
     calm: Floats
+    """Number of the latest batches in which the mean deviation was small, (V,)."""
     onset: Floats
+    """Time at which each left zero, (V, 5, 2), seconds."""
     alarm: Floats
+    """Time at which the camera was found to have moved, (V,), seconds; NaN for none."""
     since: Floats
+    """Time since which it has, (V,), seconds."""
 
     @classmethod
     def empty(cls, cameras: int) -> Self:
@@ -100,19 +97,16 @@ class Charts(NamedTuple):
 
 
 class DriftTest(NamedTuple):
-    """Settings of the test whether a camera has moved.
-
-    Attributes:
-        smallest: least shift that counts, of each number of a shift, (4,).
-        floor: standard deviation of the numbers between batches that no residual shows, (4,).
-        inflation: factor of the variance of the mean of keypoints, which are not independent.
-        threshold: sum at which a camera has moved.
-    """
+    """Settings of the test whether a camera has moved."""
 
     smallest: Floats
+    """Least shift that counts, of each number of a shift, (4,)."""
     floor: Floats
+    """Standard deviation of the numbers between batches that no residual shows, (4,)."""
     inflation: float
+    """Factor of the variance of the mean of keypoints, which are not independent."""
     threshold: float
+    """Sum at which a camera has moved."""
 
 
 @njit(cache=True)

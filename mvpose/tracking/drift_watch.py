@@ -27,23 +27,21 @@ _FEWEST_CAMERAS = 3  # two disagree, but neither is known to be right
 class DriftModel:
     """Settings of the watch over the cameras.
 
-    Attributes:
-        smallest: least turn of a camera that counts, degrees. Half of it is taken for no drift: people ask for
-            corrections of 0.16 to 0.28 degrees even of published calibrations (Shelf). For roll and zoom it is what
-            moves a joint as far that is 20 degrees off the image centre.
-        alarms: rate of false alarms of a rig, per hour.
-        inflation: factor of the variance of a mean of keypoints: errors of keypoints of a person are alike.
-        floor: standard deviation of the shift of one second's pictures beyond that, degrees: how detectors define a
-            joint depends on the side from which they see it.
-
     Raises:
         ValueError: a value that is not above 0.
     """
 
     smallest: float = 0.6
+    """Least turn of a camera that counts, degrees. Half of it is taken for no drift: people ask for corrections of 0.16
+    to 0.28 degrees even of published calibrations (Shelf). For roll and zoom it is what moves a joint as far that is 20
+    degrees off the image centre."""
     alarms: float = 0.01
+    """Rate of false alarms of a rig, per hour."""
     inflation: float = 4.0
+    """Factor of the variance of a mean of keypoints: errors of keypoints of a person are alike."""
     floor: float = 0.1
+    """Standard deviation of the shift of one second's pictures beyond that, degrees: how detectors define a joint
+    depends on the side from which they see it."""
 
     def __post_init__(self) -> None:
         check_numbers(self, "the drift model", positive=("smallest", "alarms", "inflation", "floor"))
@@ -75,27 +73,24 @@ class CameraResiduals:
 
 @dataclass(frozen=True)
 class Drift:
-    """Camera that has moved since the first minute of a stream.
-
-    Attributes:
-        view: index of the camera.
-        camera: its name.
-        since: time since which it has moved, seconds.
-        found: time at which this was certain, seconds.
-        degrees: turn of its pictures across the optical axis; 0 where its detections fit nobody any more.
-        roll_degrees: turn about the axis.
-        zoom: change of scale.
-        stray: share of the people in its pictures whom its detections do not fit.
-    """
+    """Camera that has moved since the first minute of a stream."""
 
     view: int
+    """Index of the camera."""
     camera: str
+    """Its name."""
     since: float
+    """Time since which it has moved, seconds."""
     found: float
+    """Time at which this was certain, seconds."""
     degrees: float
+    """Turn of its pictures across the optical axis; 0 where its detections fit nobody any more."""
     roll_degrees: float
+    """Turn about the axis."""
     zoom: float
+    """Change of scale."""
     stray: float
+    """Share of the people in its pictures whom its detections do not fit."""
 
     def __str__(self) -> str:
         size = f"its pictures are turned by {self.degrees:.1f} degrees, {self.roll_degrees:+.1f} about the axis"

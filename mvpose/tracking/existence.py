@@ -38,41 +38,39 @@ class Existence:
     The shares of false detections that last and that move were chosen on simulated scenes with four false detections a
     view and on people who come and go, at other seeds than those of the suites and studies (200 to 203, 110, 111).
 
-    Attributes:
-        arrivals: people who come into the view of two cameras, per second.
-        departures: times that a person who is here leaves, per second.
-        found: probability that a person is found in a picture that can show it.
-        seeable: probability that a view can see a person whom no tracked person hides.
-        band: share of the false detections of a view that agree with a given false detection of another view: a band
-            along the epipolar line.
-        patch: share of the false detections of a view that agree with a given place in the room.
-        lasting: probability that a false detection lasts longer than ``memory``.
-        repeated: probability that a lasting one is there in a picture: it hangs where it is well seen.
-        mobile: share of the lasting ones that move: shadows, reflections.
-        statues: false detections per second that appear to several views at one place of the room, and stay.
-        least_clutter: least number of false detections in a picture, which a tracker starts with.
-        independent: time between pictures that count as independent, seconds.
-        memory: time after which evidence has lost 63 % of its weight, seconds.
-        vague: standard deviation of the position of the best-known joint, metres, above which nobody is reported.
-
     Raises:
         ValueError: a probability that is not between 0 and 1, or another value that is not above 0.
     """
 
     arrivals: float = 0.1
+    """People who come into the view of two cameras, per second."""
     departures: float = 0.1
+    """Times that a person who is here leaves, per second."""
     found: float = 0.92
+    """Probability that a person is found in a picture that can show it."""
     seeable: float = 0.85
+    """Probability that a view can see a person whom no tracked person hides."""
     band: float = 0.1
+    """Share of the false detections of a view that agree with a given false detection of another view: a band along the
+    epipolar line."""
     patch: float = 0.03
+    """Share of the false detections of a view that agree with a given place in the room."""
     lasting: float = 0.5
+    """Probability that a false detection lasts longer than ``memory``."""
     repeated: float = 0.95
+    """Probability that a lasting one is there in a picture: it hangs where it is well seen."""
     mobile: float = 0.1
+    """Share of the lasting ones that move: shadows, reflections."""
     statues: float = 0.02
+    """False detections per second that appear to several views at one place of the room, and stay."""
     least_clutter: float = 0.02
+    """Least number of false detections in a picture, which a tracker starts with."""
     independent: float = 0.2
+    """Time between pictures that count as independent, seconds."""
     memory: float = 3.0
+    """Time after which evidence has lost 63 % of its weight, seconds."""
     vague: float = 0.5
+    """Standard deviation of the position of the best-known joint, metres, above which nobody is reported."""
 
     def __post_init__(self) -> None:
         probabilities = ("found", "seeable", "band", "patch", "lasting", "repeated", "mobile")

@@ -30,18 +30,14 @@ _TOGETHER = 0.1  # seconds: two cameras have seen a track at about the same time
 
 
 class JointMotion(NamedTuple):
-    """Motion model of the J joints of a skeleton.
-
-    Attributes:
-        speed: standard deviation of a component of the velocity, (J,), m/s; relative to the trunk for joints outside
-            of it.
-        time: time after which the velocity is correlated by 1/e, (J,), seconds.
-        trunk: whether the joint belongs to the trunk, (J,).
-    """
+    """Motion model of the J joints of a skeleton."""
 
     speed: Floats
+    """Standard deviation of a component of the velocity, (J,), m/s; relative to the trunk for joints outside of it."""
     time: Floats
+    """Time after which the velocity is correlated by 1/e, (J,), seconds."""
     trunk: Bools
+    """Whether the joint belongs to the trunk, (J,)."""
 
 
 @dataclass(frozen=True)
@@ -58,20 +54,18 @@ class MotionModel:
     How fast somebody is who has just come is not known: if walking and running at 3 m/s (Novacheck, "The biomechanics
     of running", Gait and Posture 7, 1998) are equally likely, it is 1.64 m/s (RMS) along each axis.
 
-    Attributes:
-        trunk: standard deviation of a velocity component (m/s) and correlation time (s) of shoulders and hips.
-        middle: the same, of elbows, knees and the joints of the head relative to the trunk.
-        extremities: the same, of wrists and ankles.
-        newcomer: standard deviation of a velocity component of the trunk of people who have just come, m/s.
-
     Raises:
         ValueError: a value that is not above 0 and finite.
     """
 
     trunk: tuple[float, float] = (1.0, 1.6)
+    """Standard deviation of a velocity component (m/s) and correlation time (s) of shoulders and hips."""
     middle: tuple[float, float] = (0.8, 0.3)
+    """The same, of elbows, knees and the joints of the head relative to the trunk."""
     extremities: tuple[float, float] = (1.3, 0.15)
+    """The same, of wrists and ankles."""
     newcomer: float = 1.64
+    """Standard deviation of a velocity component of the trunk of people who have just come, m/s."""
 
     def __post_init__(self) -> None:
         check_numbers(self, "the motion model", positive=("newcomer",))

@@ -27,17 +27,14 @@ _MEMORY = 10.0  # seconds that the mean residuals are over
 
 
 class ExpectedPeople(NamedTuple):
-    """People who are expected in the pictures of a frame.
-
-    Attributes:
-        groups: group of each track in the matching, (n,), or -1.
-        reported: whether each has been reported as a person, (n,).
-        state: predicted positions and velocities, (n, J, 6).
-    """
+    """People who are expected in the pictures of a frame."""
 
     groups: Integers
+    """Group of each track in the matching, (n,), or -1."""
     reported: Bools
+    """Whether each has been reported as a person, (n,)."""
     state: Floats
+    """Predicted positions and velocities, (n, J, 6)."""
 
 
 @njit(cache=True)

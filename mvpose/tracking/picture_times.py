@@ -23,23 +23,20 @@ _BLIND = 1.0  # seconds without pictures, after which nobody's place is known an
 
 
 class FrameTimes(NamedTuple):
-    """Times of one frame.
-
-    Attributes:
-        now: time of the frame, that of its latest picture, seconds; NaN before the first picture.
-        elapsed: time since the previous frame, seconds; 0 in the first.
-        lead: time from the frame to the picture of each camera, (V,), at most 0 seconds; 0 without a picture.
-        pictures: whether each camera gave a picture that is used, (V,).
-        too_old: whether the picture of some camera is too old to be used.
-        latest: time of the latest picture, seconds; NaN without any.
-    """
+    """Times of one frame."""
 
     now: float
+    """Time of the frame, that of its latest picture, seconds; NaN before the first picture."""
     elapsed: float
+    """Time since the previous frame, seconds; 0 in the first."""
     lead: Floats
+    """Time from the frame to the picture of each camera, (V,), at most 0 seconds; 0 without a picture."""
     pictures: Bools
+    """Whether each camera gave a picture that is used, (V,)."""
     too_old: bool
+    """Whether the picture of some camera is too old to be used."""
     latest: float
+    """Time of the latest picture, seconds; NaN without any."""
 
 
 @dataclass
@@ -49,18 +46,16 @@ class FrameClock:
     Detections without times are ``period`` after the previous frame, and all cameras are taken to have delivered a
     picture. A frame without any picture comes as long after the previous one as frames came on average. This is a
     guess; a picture that turns out to be before it is taken as a late one.
-
-    Attributes:
-        period: time between frames without times, seconds.
-        interval: mean time between the latest frames with pictures, seconds.
-        time: time of the latest frame, seconds; NaN before the first picture.
-        pictured: time of the latest picture, seconds.
     """
 
     period: float
+    """Time between frames without times, seconds."""
     interval: float
+    """Mean time between the latest frames with pictures, seconds."""
     time: float = math.nan
+    """Time of the latest frame, seconds; NaN before the first picture."""
     pictured: float = math.nan
+    """Time of the latest picture, seconds."""
 
     @property
     def started(self) -> bool:

@@ -33,43 +33,37 @@ _UNKNOWN = 1.0  # m²: variance of a joint that is seen for the first time, befo
 
 
 class MatchedRays(NamedTuple):
-    """Viewing rays of the m detections of a frame, as kernels take them, with the groups of the matching.
-
-    Attributes:
-        labels: group of each detection, (m,), or -1.
-        view: camera of each, (m,).
-        origins: optical centres, (m, 3), metres.
-        directions: unit vectors, (m, J, 3).
-        weights: scores, (m, J); 0 for a missing keypoint.
-        pixel: least angle of an error, (m,), radians.
-        lead: time from the frame to the picture of each, (m,), seconds.
-    """
+    """Viewing rays of the m detections of a frame, as kernels take them, with the groups of the matching."""
 
     labels: Integers
+    """Group of each detection, (m,), or -1."""
     view: Integers
+    """Camera of each, (m,)."""
     origins: Floats
+    """Optical centres, (m, 3), metres."""
     directions: Floats
+    """Unit vectors, (m, J, 3)."""
     weights: Floats
+    """Scores, (m, J); 0 for a missing keypoint."""
     pixel: Floats
+    """Least angle of an error, (m,), radians."""
     lead: Floats
+    """Time from the frame to the picture of each, (m,), seconds."""
 
 
 class PlacedPeople(NamedTuple):
-    """Poses of k of n tracked people, as the stages of one frame place them.
-
-    Attributes:
-        of_pose: row of each track in the poses, (n,); -1 for a track whose rays are the evidence.
-        places: joints, (k, J, 3), metres; NaN for an unknown joint.
-        spreads: their covariances, (k, J, 3, 3).
-        confidences: their scores, (k, J).
-        factor: factor of these covariances, at least 1.
-    """
+    """Poses of k of n tracked people, as the stages of one frame place them."""
 
     of_pose: Integers
+    """Row of each track in the poses, (n,); -1 for a track whose rays are the evidence."""
     places: Floats
+    """Joints, (k, J, 3), metres; NaN for an unknown joint."""
     spreads: Floats
+    """Their covariances, (k, J, 3, 3)."""
     confidences: Floats
+    """Their scores, (k, J)."""
     factor: float
+    """Factor of these covariances, at least 1."""
 
 
 @njit(cache=True)

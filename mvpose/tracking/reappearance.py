@@ -24,33 +24,31 @@ class Reappearance:
     Where detections carry descriptors, the likelihood of the looks (:mod:`mvpose.tracking.looks`) counts as well. It
     alone decides when the place says nothing more, and only if it outweighs the chance that somebody new is seen.
 
-    Attributes:
-        memory: time after which the place of a lost person says nothing more, seconds. People in a room of a few
-            metres are anywhere in it after ten seconds of walking. Who has no descriptors is forgotten then.
-        gate: largest squared distance from the place where the person was lost, in variances of the motion model; a
-            person stays within 9 in 97 of 100 cases (chi-square of three degrees of freedom).
-        returns: rate at which a lost person comes back, per second: people are hidden for a few seconds.
-        arrivals: people who come, per second, as in :class:`mvpose.tracking.existence.Existence`.
-        room: area in which they may appear, square metres.
-        deviation: standard deviation of the trunk's position in one frame, metres.
-        looks_memory: time after which a lost person with descriptors is forgotten, seconds. Clothes are worn for hours;
-            but so many other people pass in hours that one of them looks alike, and all of them must be kept.
-        odds: least odds that somebody who comes after ``memory`` is one of the lost people, by their looks.
-        most: largest number of lost people who are remembered, the latest.
-
     Raises:
         ValueError: a value that is not above 0.
     """
 
     memory: float = 10.0
+    """Time after which the place of a lost person says nothing more, seconds. People in a room of a few metres are
+    anywhere in it after ten seconds of walking. Who has no descriptors is forgotten then."""
     gate: float = 9.0
+    """Largest squared distance from the place where the person was lost, in variances of the motion model; a person
+    stays within 9 in 97 of 100 cases (chi-square of three degrees of freedom)."""
     returns: float = 0.3
+    """Rate at which a lost person comes back, per second: people are hidden for a few seconds."""
     arrivals: float = 0.1
+    """People who come, per second, as in :class:`mvpose.tracking.existence.Existence`."""
     room: float = 50.0
+    """Area in which they may appear, square metres."""
     deviation: float = 0.1
+    """Standard deviation of the trunk's position in one frame, metres."""
     looks_memory: float = 600.0
+    """Time after which a lost person with descriptors is forgotten, seconds. Clothes are worn for hours; but so many
+    other people pass in hours that one of them looks alike, and all of them must be kept."""
     odds: float = 9.0
+    """Least odds that somebody who comes after ``memory`` is one of the lost people, by their looks."""
     most: int = 200
+    """Largest number of lost people who are remembered, the latest."""
 
     def __post_init__(self) -> None:
         names = ("memory", "gate", "returns", "arrivals", "room", "deviation", "looks_memory", "odds", "most")

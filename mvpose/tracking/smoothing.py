@@ -254,19 +254,16 @@ def smooth_joint(state, covariance, predicted, predicted_covariance, after, afte
 
 @dataclass(frozen=True)
 class TrackingPipeline:
-    """Tracker of recordings (:class:`mvpose.estimators.SequenceEstimator`), which keeps no state between them.
-
-    Attributes:
-        pipeline: stages of one frame.
-        model: settings of the tracker.
-        lag: seconds of later frames that an estimate waits for: 0 for none, infinite for a whole recording. A fifth of
-            a second, the default, is long enough to tell a person from two false detections that meet, and short enough
-            for a live display.
-    """
+    """Tracker of recordings (:class:`mvpose.estimators.SequenceEstimator`), which keeps no state between them."""
 
     pipeline: Pipeline = Pipeline()
+    """Stages of one frame."""
     model: TrackingModel = TrackingModel()
+    """Settings of the tracker."""
     lag: float = 0.2
+    """Seconds of later frames that an estimate waits for: 0 for none, infinite for a whole recording. A fifth of a
+    second, the default, is long enough to tell a person from two false detections that meet, and short enough for a
+    live display."""
 
     def __post_init__(self) -> None:
         if not self.lag >= 0.0:

@@ -32,17 +32,14 @@ _DRIFT = Charts._fields
 class TrackerState:
     """All that a tracker knows of the past.
 
-    Attributes:
-        arrays: read-only arrays by name: ``tracks.*`` and ``lost.*`` are the fields of
-            :class:`mvpose.tracking.tracks.Tracks`, ``recent.*`` those of
-            :class:`mvpose.tracking.recent_pictures.RecentPictures`, ``drift.*`` those of
-            :class:`mvpose.tracking.drift_charts.Charts`, the others clock, rates, rig and skeleton.
-
     Raises:
         ValueError: arrays of another version of the layout, or that do not fit each other.
     """
 
     arrays: Mapping[str, NDArray[Any]]
+    """Read-only arrays by name: ``tracks.*`` and ``lost.*`` are the fields of :class:`mvpose.tracking.tracks.Tracks`,
+    ``recent.*`` those of :class:`mvpose.tracking.recent_pictures.RecentPictures`, ``drift.*`` those of
+    :class:`mvpose.tracking.drift_charts.Charts`, the others clock, rates, rig and skeleton."""
 
     def __post_init__(self) -> None:
         copies = {name: np.array(value) for name, value in self.arrays.items()}

@@ -43,39 +43,33 @@ _FORGETTING = 0.5  # seconds: time constant of the score of a joint that no view
 
 
 class _Frame(NamedTuple):
-    """Detections of a frame that take part, in the canonical order.
-
-    Attributes:
-        chosen: their indices, (m,).
-        ordered: the detections.
-        rays: their viewing rays.
-        lead: time from the frame to the picture of each, (m,), seconds.
-        times: times of the frame and its pictures.
-    """
+    """Detections of a frame that take part, in the canonical order."""
 
     chosen: Integers
+    """Their indices, (m,)."""
     ordered: Detections
+    """The detections."""
     rays: Rays
+    """Their viewing rays."""
     lead: Floats
+    """Time from the frame to the picture of each, (m,), seconds."""
     times: FrameTimes
+    """Times of the frame and its pictures."""
 
 
 class _Sightings(NamedTuple):
-    """Detections that show tracks, of this frame and of earlier pictures that met their partners in it.
-
-    Attributes:
-        owner: track of each of the m detections of the frame, (m,), or -1.
-        shown_by: the same of all k detections, (k,).
-        in_view: their cameras, (k,).
-        poses: poses of newcomers; None where nobody came.
-        since: time from the previous picture of each camera, (V,), seconds.
-    """
+    """Detections that show tracks, of this frame and of earlier pictures that met their partners in it."""
 
     owner: Integers
+    """Track of each of the m detections of the frame, (m,), or -1."""
     shown_by: Integers
+    """The same of all k detections, (k,)."""
     in_view: Integers
+    """Their cameras, (k,)."""
     poses: Poses | None
+    """Poses of newcomers; None where nobody came."""
     since: Floats
+    """Time from the previous picture of each camera, (V,), seconds."""
 
 
 class Tracker:

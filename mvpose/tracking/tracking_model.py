@@ -14,28 +14,25 @@ from mvpose.tracking.reappearance import Reappearance
 
 @dataclass(frozen=True)
 class TrackingModel:
-    """Settings of a tracker.
-
-    Attributes:
-        motion: motion of joints.
-        affinity: affinity between tracks and detections.
-        existence: how often people come, and how often people and ghosts are found.
-        reappearance: how people who were lost come back.
-        noise: error model of keypoints.
-        drift: watch over the cameras.
-        correlation: time over which the errors of poses are correlated, seconds: wrong keypoints last 0.2 to 0.3 s,
-            others change faster.
-        period: time between frames whose detections carry no time, seconds.
-    """
+    """Settings of a tracker."""
 
     motion: MotionModel = MotionModel()
+    """Motion of joints."""
     affinity: TrackAffinity = TrackAffinity()
+    """Affinity between tracks and detections."""
     existence: Existence = Existence()
+    """How often people come, and how often people and ghosts are found."""
     reappearance: Reappearance = Reappearance()
+    """How people who were lost come back."""
     noise: Noise = Noise()
+    """Error model of keypoints."""
     drift: DriftModel = DriftModel()
+    """Watch over the cameras."""
     correlation: float = 0.15
+    """Time over which the errors of poses are correlated, seconds: wrong keypoints last 0.2 to 0.3 s, others change
+    faster."""
     period: float = 0.04
+    """Time between frames whose detections carry no time, seconds."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.correlation < np.inf:

@@ -12,69 +12,63 @@ from mvpose.tracking.bones import BonePrior, scaled_lengths
 
 
 class TrackedPoses(NamedTuple):
-    """Poses of n tracks as kernels take them: fields of :class:`Tracks`, in place.
-
-    Attributes:
-        state: position and velocity of every joint, (n, J, 6), metres and m/s; NaN for an unknown joint.
-        covariance: their covariances, (n, J, 6, 6).
-        scores: confidence of every joint, (n, J), 0 to 1.
-        length: bone lengths, (n, B), metres.
-        variance: variances of the bone lengths, (n, B), square metres.
-    """
+    """Poses of n tracks as kernels take them: fields of :class:`Tracks`, in place."""
 
     state: Floats
+    """Position and velocity of every joint, (n, J, 6), metres and m/s; NaN for an unknown joint."""
     covariance: Floats
+    """Their covariances, (n, J, 6, 6)."""
     scores: Floats
+    """Confidence of every joint, (n, J), 0 to 1."""
     length: Floats
+    """Bone lengths, (n, B), metres."""
     variance: Floats
+    """Variances of the bone lengths, (n, B), square metres."""
 
 
 @dataclass
 class Tracks:
-    """State of n tracks with J joints, B bones and V cameras, as arrays that kernels update in place.
-
-    Attributes:
-        ids: identities, (n,), numbered from 0 in the order of birth.
-        state: position and velocity of every joint, (n, J, 6), metres and m/s; NaN for an unknown joint.
-        covariance: their covariances, (n, J, 6, 6).
-        scores: confidence of every joint, (n, J), 0 to 1.
-        length: bone lengths, (n, B), metres.
-        variance: variances of the bone lengths, (n, B), square metres.
-        span: time before its birth in which each may have come, (n,), seconds.
-        born_at: time of birth, (n,), seconds.
-        origin: views that the track was born from, (n, V).
-        hits: effective number of pictures of each camera that found the person, (n, V).
-        misses: effective number of pictures that should have and did not, (n, V).
-        absent: effective number of pictures that should have found the person since one last did, (n, V).
-        found: time at which each camera last found the track, (n, V), seconds; -inf if none ever did.
-        anchor: place of each joint when it was first known, (n, J, 3), metres; NaN before.
-        moved: how far the body as a whole has been from there, (n,), metres.
-        reported: whether the track has ever been reported as a person, (n,).
-        looks: mean of the unit descriptors of the track's detections, (n, D), zeros before there is any.
-        described: seconds of detections with descriptors in this mean, (n,), 0 for none.
-        rival: least distance to the descriptors of anybody else who was there at the same time, (n,), infinite where
-            nobody is known; see :mod:`mvpose.tracking.looks`.
-    """
+    """State of n tracks with J joints, B bones and V cameras, as arrays that kernels update in place."""
 
     ids: Integers
+    """Identities, (n,), numbered from 0 in the order of birth."""
     state: Floats
+    """Position and velocity of every joint, (n, J, 6), metres and m/s; NaN for an unknown joint."""
     covariance: Floats
+    """Their covariances, (n, J, 6, 6)."""
     scores: Floats
+    """Confidence of every joint, (n, J), 0 to 1."""
     length: Floats
+    """Bone lengths, (n, B), metres."""
     variance: Floats
+    """Variances of the bone lengths, (n, B), square metres."""
     span: Floats
+    """Time before its birth in which each may have come, (n,), seconds."""
     born_at: Floats
+    """Time of birth, (n,), seconds."""
     origin: Bools
+    """Views that the track was born from, (n, V)."""
     hits: Floats
+    """Effective number of pictures of each camera that found the person, (n, V)."""
     misses: Floats
+    """Effective number of pictures that should have and did not, (n, V)."""
     absent: Floats
+    """Effective number of pictures that should have found the person since one last did, (n, V)."""
     found: Floats
+    """Time at which each camera last found the track, (n, V), seconds; -inf if none ever did."""
     anchor: Floats
+    """Place of each joint when it was first known, (n, J, 3), metres; NaN before."""
     moved: Floats
+    """How far the body as a whole has been from there, (n,), metres."""
     reported: Bools
+    """Whether the track has ever been reported as a person, (n,)."""
     looks: Floats
+    """Mean of the unit descriptors of the track's detections, (n, D), zeros before there is any."""
     described: Floats
+    """Seconds of detections with descriptors in this mean, (n,), 0 for none."""
     rival: Floats
+    """Least distance to the descriptors of anybody else who was there at the same time, (n,), infinite where nobody is
+    known; see :mod:`mvpose.tracking.looks`."""
 
     @classmethod
     def none(cls, *, joints: int, bones: int, cameras: int, dimensions: int = 0) -> Self:
@@ -190,35 +184,32 @@ class Tracks:
 
 @dataclass
 class Moment:
-    """What a tracker knows after a frame, for its estimate and for smoothing.
-
-    Attributes:
-        time: time of the frame, seconds; NaN before the first picture.
-        elapsed: time since the previous frame, seconds.
-        tracks: tracks after the frame, with those that end here.
-        predicted: state of each track before the frame, (n, J, 6), and its covariance, (n, J, 6, 6); NaN for new
-            tracks. None where nobody smooths.
-        odds: log-odds that each track is a person, (n,).
-        presence: log-odds that this person is still here, (n,).
-        shown: whether each track is reported, (n,).
-        owner: track of each detection that took part, (k,), or -1.
-        chosen: indices of these detections, (k,).
-        detections: number of detections of the frame.
-        poses: poses of the tracks as the pipeline gives them, where the frame is the first.
-        timings: seconds by stage.
-        link: row of each track in the next moment and the gains of the smoother, where they are known already.
-    """
+    """What a tracker knows after a frame, for its estimate and for smoothing."""
 
     time: float
+    """Time of the frame, seconds; NaN before the first picture."""
     elapsed: float
+    """Time since the previous frame, seconds."""
     tracks: Tracks
+    """Tracks after the frame, with those that end here."""
     predicted: tuple[Floats, Floats] | None
+    """State of each track before the frame, (n, J, 6), and its covariance, (n, J, 6, 6); NaN for new tracks. None where
+    nobody smooths."""
     odds: Floats
+    """Log-odds that each track is a person, (n,)."""
     presence: Floats
+    """Log-odds that this person is still here, (n,)."""
     shown: Bools
+    """Whether each track is reported, (n,)."""
     owner: Integers
+    """Track of each detection that took part, (k,), or -1."""
     chosen: Integers
+    """Indices of these detections, (k,)."""
     detections: int
+    """Number of detections of the frame."""
     poses: Poses | None
+    """Poses of the tracks as the pipeline gives them, where the frame is the first."""
     timings: dict[str, float]
+    """Seconds by stage."""
     link: tuple[Integers, Floats] | None = None
+    """Row of each track in the next moment and the gains of the smoother, where they are known already."""

@@ -29,14 +29,12 @@ class WholeBody:
     to each person, with the error model and covariances of :class:`mvpose.reconstruction.Triangulation`; a joint that
     fewer than two views agree on is missing. They belong to the pictures of the frame: a tracker does not move them to
     its own time, nor does it smooth them.
-
-    Attributes:
-        estimator: estimator of people on COCO17 that reports labels.
-        triangulation: reconstruction of the other joints.
     """
 
     estimator: Estimator
+    """Estimator of people on COCO17 that reports labels."""
     triangulation: Triangulation = Triangulation()
+    """Reconstruction of the other joints."""
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Estimate the people of one frame on the skeleton of the detections.

@@ -89,19 +89,16 @@ _LEAST_DEPTH = 0.015  # metres, as of the landmarks
 
 @dataclass(frozen=True)
 class OuterJoints:
-    """Outer joints of one body: E of them, B bones.
-
-    Attributes:
-        names: names of the joints, (E,).
-        keypoints: the joints as linear functions of the bone transforms, (E, B, 4): a joint is the sum over bones of
-            ``transform @ keypoints[joint, bone]``. NaN for a joint that the body model does not have.
-        depths: depth of the joints under the surface, (E,) metres: twice the distance to the nearest skin, at least
-            15 mm; NaN for a joint that the body model does not have.
-    """
+    """Outer joints of one body: E of them, B bones."""
 
     names: tuple[str, ...]
+    """Names of the joints, (E,)."""
     keypoints: Floats
+    """The joints as linear functions of the bone transforms, (E, B, 4): a joint is the sum over bones of ``transform @
+    keypoints[joint, bone]``. NaN for a joint that the body model does not have."""
     depths: Floats
+    """Depth of the joints under the surface, (E,) metres: twice the distance to the nearest skin, at least 15 mm; NaN
+    for a joint that the body model does not have."""
 
     @classmethod
     def of_body(cls, body: Body, skeleton: Skeleton) -> "OuterJoints":

@@ -112,36 +112,30 @@ def _falloff(vignetting: float) -> NDArray[np.float64]:
 
 
 class Optics(NamedTuple):
-    """Lens of a sensor.
-
-    Attributes:
-        axis: column and row of the optical axis, and 1 / focal length^2, pixels, (3,) float32.
-        falloff: coefficients of the polynomial of cos^2 that gives the share of light far from the axis, (k,) float32,
-            the highest power first.
-        variance: variance of the blur along each axis, pixels^2.
-        aberration: magnification of red over that of green, less 1; that of blue is as much smaller.
-    """
+    """Lens of a sensor."""
 
     axis: NDArray[np.float32]
+    """Column and row of the optical axis, and 1 / focal length^2, pixels, (3,) float32."""
     falloff: NDArray[np.float32]
+    """Coefficients of the polynomial of cos^2 that gives the share of light far from the axis, (k,) float32, the
+    highest power first."""
     variance: np.float32
+    """Variance of the blur along each axis, pixels^2."""
     aberration: np.float32
+    """Magnification of red over that of green, less 1; that of blue is as much smaller."""
 
 
 class SensorNoise(NamedTuple):
-    """Noise of one picture.
-
-    Attributes:
-        words: random numbers, (c, h, w) uint16; no elements for no noise.
-        normals: quantiles of the standard normal distribution, (4096,) float32.
-        shot: variance of the noise of light at white.
-        read: variance of the noise of the readout.
-    """
+    """Noise of one picture."""
 
     words: NDArray[np.uint16]
+    """Random numbers, (c, h, w) uint16; no elements for no noise."""
     normals: NDArray[np.float32]
+    """Quantiles of the standard normal distribution, (4096,) float32."""
     shot: np.float32
+    """Variance of the noise of light at white."""
     read: np.float32
+    """Variance of the noise of the readout."""
 
 
 @njit(cache=True)

@@ -158,39 +158,33 @@ def _ends(model: mujoco.MjModel, geom: int, head: Floats) -> tuple[Floats, Float
 
 
 class PlacedCapsules(NamedTuple):
-    """Capsules of people where they are.
-
-    Attributes:
-        placed: ends of their axes, (c, 2, 3), metres.
-        radii: their radii, (c,), metres.
-        first: first capsule of each person, and the end, (P + 1,).
-        around: bounding spheres of the people, centre and radius, (P, 4).
-    """
+    """Capsules of people where they are."""
 
     placed: NDArray[np.float64]
+    """Ends of their axes, (c, 2, 3), metres."""
     radii: NDArray[np.float64]
+    """Their radii, (c,), metres."""
     first: NDArray[np.int64]
+    """First capsule of each person, and the end, (P + 1,)."""
     around: NDArray[np.float64]
+    """Bounding spheres of the people, centre and radius, (P, 4)."""
 
 
 class CastRays(NamedTuple):
-    """Rays of several views, one after the other, r in all.
-
-    Attributes:
-        direction: unit vectors, (r, 3).
-        length: distance of the targets from the centres, metres, (r,).
-        near: distance from the centres at which the rays start, metres, (r,).
-        owner: person hit first, (r,).
-        distance: distance of the hit from the centre, metres, (r,).
-        met: which rays meet a box, (r,) bool.
-    """
+    """Rays of several views, one after the other, r in all."""
 
     direction: NDArray[np.float64]
+    """Unit vectors, (r, 3)."""
     length: NDArray[np.float64]
+    """Distance of the targets from the centres, metres, (r,)."""
     near: NDArray[np.float64]
+    """Distance from the centres at which the rays start, metres, (r,)."""
     owner: NDArray[np.int64]
+    """Person hit first, (r,)."""
     distance: NDArray[np.float64]
+    """Distance of the hit from the centre, metres, (r,)."""
     met: NDArray[np.bool_]
+    """Which rays meet a box, (r,) bool."""
 
 
 @njit(cache=True)

@@ -118,21 +118,18 @@ def cast_bands(
 
 @dataclass(frozen=True)
 class CameraArrays:
-    """Parameters of V cameras.
-
-    Attributes:
-        cameras: the cameras.
-        centers: their centres in the world, (V, 3), metres.
-        axes: directions of their optical axes, (V, 3).
-        projections: ``K [R | t]``, (V, 3, 4).
-        table: all parameters, (V, 26), see :func:`~simharness.capture.body_outlines.packed`.
-    """
+    """Parameters of V cameras."""
 
     cameras: tuple[Camera, ...]
+    """The cameras."""
     centers: Floats
+    """Their centres in the world, (V, 3), metres."""
     axes: Floats
+    """Directions of their optical axes, (V, 3)."""
     projections: Floats
+    """``K [R | t]``, (V, 3, 4)."""
     table: Floats
+    """All parameters, (V, 26), see :func:`~simharness.capture.body_outlines.packed`."""
 
     @classmethod
     def of_cameras(cls, cameras: Sequence[Camera], last: "CameraArrays | None" = None) -> "CameraArrays":

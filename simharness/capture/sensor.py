@@ -31,17 +31,14 @@ _LEAST_CONTRAST = 0.2
 
 @dataclass(frozen=True)
 class Response:
-    """Deviation of one camera from an ideal one.
-
-    Attributes:
-        contrast: slope of the response about middle gray; 1 is ideal.
-        balance: factors of red, green and blue in linear light; green is 1.
-        stops: overexposure as a power of two.
-    """
+    """Deviation of one camera from an ideal one."""
 
     contrast: float = 1.0
+    """Slope of the response about middle gray; 1 is ideal."""
     balance: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Factors of red, green and blue in linear light; green is 1."""
     stops: float = 0.0
+    """Overexposure as a power of two."""
 
 
 def draw_response(sensor: SensorSection, *, seed: int, view: int) -> Response:

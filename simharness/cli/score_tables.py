@@ -27,19 +27,16 @@ _UNLIMITED = 10_000  # columns of a terminal in which everything fits
 
 @dataclass(frozen=True)
 class ScoreTable:
-    """Scores by row.
-
-    Attributes:
-        title: title above the table.
-        labels: headings of the columns that name a row.
-        scores: headings of the columns of scores.
-        rows: cells of every row: its labels, then its scores; a cell or a heading may have several lines.
-    """
+    """Scores by row."""
 
     title: str
+    """Title above the table."""
     labels: Sequence[str]
+    """Headings of the columns that name a row."""
     scores: Sequence[str]
+    """Headings of the columns of scores."""
     rows: Sequence[Sequence[str]]
+    """Cells of every row: its labels, then its scores; a cell or a heading may have several lines."""
 
     def print_to(self, console: Console) -> None:
         """Print the table; where it does not fit, the scores that follow are in another table below, with the labels.

@@ -48,17 +48,14 @@ _STREAM_KEYS: Mapping[Origin, str] = {
 
 @dataclass(frozen=True)
 class DescriptorSettings:
-    """Settings for drawing descriptors.
-
-    Attributes:
-        model: model of the descriptors of a re-ID network.
-        look_alike: how alike people are dressed, 0 to 1, for the first ``alike`` people.
-        alike: number of people who are dressed alike; 0: all.
-    """
+    """Settings for drawing descriptors."""
 
     model: "DescriptorModel"
+    """Model of the descriptors of a re-ID network."""
     look_alike: float
+    """How alike people are dressed, 0 to 1, for the first ``alike`` people."""
     alike: int = 0
+    """Number of people who are dressed alike; 0: all."""
 
 
 class DescriptorSampler:
@@ -147,46 +144,40 @@ _PARTS = 5  # of a person's signal: one for the identity, two for each harmonic 
 
 @dataclass(frozen=True)
 class DescriptorShares:
-    """Composition of descriptors at one value of ``look_alike``.
-
-    Attributes:
-        identity: share of the variance of a clear crop that identifies the person; the rest depends on the bearing.
-        facing: share of that rest that distinguishes front from back; the remainder distinguishes both from the sides.
-        alike: share of the identity that the people of a scene have in common.
-        alike_sides: share of the bearing part that they have in common.
-        noise: factor of the noise, relative to the first value of ``look_alike``.
-    """
+    """Composition of descriptors at one value of ``look_alike``."""
 
     identity: float
+    """Share of the variance of a clear crop that identifies the person; the rest depends on the bearing."""
     facing: float
+    """Share of that rest that distinguishes front from back; the remainder distinguishes both from the sides."""
     alike: float
+    """Share of the identity that the people of a scene have in common."""
     alike_sides: float
+    """Share of the bearing part that they have in common."""
     noise: float
+    """Factor of the noise, relative to the first value of ``look_alike``."""
 
 
 @dataclass(frozen=True)
 class DescriptorModel:
-    """Fitted model of the descriptors of one network.
-
-    Attributes:
-        dimensions: dimensions of drawn descriptors, such that distances spread as the network's do.
-        look_alike: values of ``look_alike`` at which the network was measured, ascending, (d,).
-        shares: composition of descriptors at each of them, (d,).
-        hidden: shares of hidden joints, ascending, (h,).
-        noise: mean variance of the noise at these shares and the first ``look_alike``, in units of a clear crop's
-            variance, (h,).
-        uneven: standard deviation of the logarithm of that variance from crop to crop.
-        common: share of the noise's variance that all crops have in common, because occluders look alike: hidden crops
-            of two people are as near as clear ones, though less of either person is seen.
-    """
+    """Fitted model of the descriptors of one network."""
 
     dimensions: int
+    """Dimensions of drawn descriptors, such that distances spread as the network's do."""
     look_alike: tuple[float, ...]
+    """Values of ``look_alike`` at which the network was measured, ascending, (d,)."""
     shares: tuple[DescriptorShares, ...]
+    """Composition of descriptors at each of them, (d,)."""
     hidden: tuple[float, ...]
+    """Shares of hidden joints, ascending, (h,)."""
     noise: tuple[float, ...]
+    """Mean variance of the noise at these shares and the first ``look_alike``, in units of a clear crop's variance,
+    (h,)."""
     uneven: float
+    """Standard deviation of the logarithm of that variance from crop to crop."""
     common: float
+    """Share of the noise's variance that all crops have in common, because occluders look alike: hidden crops of two
+    people are as near as clear ones, though less of either person is seen."""
 
     @classmethod
     def of_network(cls, model: Path) -> Self:

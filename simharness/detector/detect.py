@@ -31,19 +31,16 @@ from simharness.types.views import Views
 
 @dataclass(frozen=True)
 class Detected:
-    """Detections of one frame and the truth about them.
-
-    Attributes:
-        detections: ordered by view, then by falling box score, as detectors report them.
-        truth: the truth about them.
-        peaks: parameters of their heat maps; None without heat maps.
-        whole: the same detections with feet and hands, and their truth; None where the detector reports COCO17 alone.
-    """
+    """Detections of one frame and the truth about them."""
 
     detections: Detections
+    """Ordered by view, then by falling box score, as detectors report them."""
     truth: Truth
+    """The truth about them."""
     peaks: Peaks | None = None
+    """Parameters of their heat maps; None without heat maps."""
     whole: WholeFrame | None = None
+    """The same detections with feet and hands, and their truth; None where the detector reports COCO17 alone."""
 
     def at_times(self, time: Floats | None) -> "Detected":
         """Return the detections with the times of their pictures, (V,) seconds; None: with none."""

@@ -33,33 +33,31 @@ class DetectionBlock:
     """Detections in the pictures that V cameras take in T frames, in S slots of each picture.
 
     Values in a slot that holds no detection have no meaning.
-
-    Attributes:
-        present: which slots hold a detection, (T, V, S).
-        keypoints: pixels, (T, V, S, J, 2); NaN where a joint is not reported.
-        scores: scores of keypoints, 0 to 1, (T, V, S, J); 0 where a joint is not reported.
-        boxes: x, y, width, height in pixels, (T, V, S, 4).
-        box_scores: 0 to 1, (T, V, S).
-        person: index of the person that the detection shows, (T, V, S); -1 of a false positive.
-        origin: :class:`Origin`, (T, V, S).
-        number: number among the detections of this origin, (T, V, S); unlike the slot, it does not depend on how many
-            other detections there are.
-        error: :class:`KeypointError`, (T, V, S, J).
-        guessed: which keypoints are guesses, (T, V, S, J).
-        rivals: position of a second peak in the heat map, pixels, (T, V, S, J, 2); NaN where there is none.
     """
 
     present: Bools
+    """Which slots hold a detection, (T, V, S)."""
     keypoints: Floats
+    """Pixels, (T, V, S, J, 2); NaN where a joint is not reported."""
     scores: Floats
+    """Scores of keypoints, 0 to 1, (T, V, S, J); 0 where a joint is not reported."""
     boxes: Floats
+    """x, y, width, height in pixels, (T, V, S, 4)."""
     box_scores: Floats
+    """0 to 1, (T, V, S)."""
     person: Integers
+    """Index of the person that the detection shows, (T, V, S); -1 of a false positive."""
     origin: NDArray[np.int8]
+    """:class:`Origin`, (T, V, S)."""
     number: Integers
+    """Number among the detections of this origin, (T, V, S); unlike the slot, it does not depend on how many other
+    detections there are."""
     error: NDArray[np.int8]
+    """:class:`KeypointError`, (T, V, S, J)."""
     guessed: Bools
+    """Which keypoints are guesses, (T, V, S, J)."""
     rivals: Floats
+    """Position of a second peak in the heat map, pixels, (T, V, S, J, 2); NaN where there is none."""
 
     @classmethod
     def of_people(cls, views: Views) -> Self:

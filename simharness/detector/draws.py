@@ -40,17 +40,14 @@ IN_TREE = np.arange(len(PARENT)) >= 5
 
 @dataclass(frozen=True)
 class KeyedDraws:
-    """Random draws of one detector on one sequence, each block from the stream of its key.
-
-    Attributes:
-        seed: seed of the scenario.
-        time: times of the frames, (T,), seconds, evenly spaced.
-        views: V, number of cameras.
-    """
+    """Random draws of one detector on one sequence, each block from the stream of its key."""
 
     seed: int
+    """Seed of the scenario."""
     time: Floats
+    """Times of the frames, (T,), seconds, evenly spaced."""
     views: int
+    """V, number of cameras."""
 
     @cached_property
     def step(self) -> float:
@@ -179,17 +176,14 @@ def logistic(usual: ArrayLike, spread: ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class ErrorDraws:
-    """Draws of the errors of people's joints, (T, V, 17) for one person.
-
-    Attributes:
-        draws: draws of the sequence.
-        correlation: correlation in time, over the views and within limbs.
-        tree: whether joints are dropped along the tree of parts.
-    """
+    """Draws of the errors of people's joints, (T, V, 17) for one person."""
 
     draws: KeyedDraws
+    """Draws of the sequence."""
     correlation: CorrelationSection
+    """Correlation in time, over the views and within limbs."""
     tree: bool
+    """Whether joints are dropped along the tree of parts."""
 
     def occurs(self, what: str, person: int, share: Floats | float) -> Bools:
         """Draw which joints of a person an error takes with probability ``share``, (T, V, 17)."""

@@ -33,21 +33,18 @@ _TILT = 0.1  # share of its height that the floor loses away from the peak: mode
 
 @dataclass(frozen=True)
 class Peaks:
-    """Parameters of the heat maps of m detections of one frame: a few numbers for each joint.
-
-    Attributes:
-        boxes: x, y, width, height in pixels, (m, 4).
-        keypoints: pixels, (m, J, 2); NaN where a joint is not reported.
-        scores: scores of keypoints, 0 to 1, (m, J); 0 where not reported.
-        rivals: positions of second peaks, pixels, (m, J, 2); NaN where there is none.
-        config: parameters of the head.
-    """
+    """Parameters of the heat maps of m detections of one frame: a few numbers for each joint."""
 
     boxes: Floats
+    """x, y, width, height in pixels, (m, 4)."""
     keypoints: Floats
+    """Pixels, (m, J, 2); NaN where a joint is not reported."""
     scores: Floats
+    """Scores of keypoints, 0 to 1, (m, J); 0 where not reported."""
     rivals: Floats
+    """Positions of second peaks, pixels, (m, J, 2); NaN where there is none."""
     config: HeatmapHeadSection
+    """Parameters of the head."""
 
     def heatmaps(self) -> Heatmaps:
         """Draw the maps: the strongest modes are the keypoints, as high as their scores; the second are the rivals.

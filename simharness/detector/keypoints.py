@@ -52,20 +52,17 @@ _HARDEST = 4.0  # largest factor by which small size raises them
 
 @dataclass(frozen=True)
 class Keypoints2D:
-    """Keypoints of everyone in every picture.
-
-    Attributes:
-        pixels: positions, (T, V, P, J, 2); NaN where not reported.
-        error: :class:`KeypointError`, (T, V, P, J): an inversion or a swap where one was drawn and led away from the
-            joint, else by the distance.
-        guessed: which keypoints are guesses, (T, V, P, J).
-        rivals: positions of second peaks, (T, V, P, J, 2); NaN where there is none.
-    """
+    """Keypoints of everyone in every picture."""
 
     pixels: Floats
+    """Positions, (T, V, P, J, 2); NaN where not reported."""
     error: NDArray[np.int8]
+    """:class:`KeypointError`, (T, V, P, J): an inversion or a swap where one was drawn and led away from the joint,
+    else by the distance."""
     guessed: Bools
+    """Which keypoints are guesses, (T, V, P, J)."""
     rivals: Floats
+    """Positions of second peaks, (T, V, P, J, 2); NaN where there is none."""
 
 
 @step("keypoints", stage=StepStage.KEYPOINTS, sections=("keypoints", "bias", "correlation"))

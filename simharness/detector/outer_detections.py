@@ -47,15 +47,12 @@ _ENDS = {"big": "ankle", "small": "ankle", "heel": "ankle", "hand": "wrist"}  # 
 
 @dataclass(frozen=True)
 class OuterDetections:
-    """Outer joints of n detections.
-
-    Attributes:
-        keypoints: pixels, (n, E, 2); NaN where not reported.
-        scores: 0 to 1, (n, E); 0 where not reported.
-    """
+    """Outer joints of n detections."""
 
     keypoints: Floats
+    """Pixels, (n, E, 2); NaN where not reported."""
     scores: Floats
+    """0 to 1, (n, E); 0 where not reported."""
 
 
 def anchors_of(skeleton: Skeleton) -> Integers:

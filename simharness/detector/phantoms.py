@@ -273,18 +273,16 @@ class BirthDeathProcess:
     included, and each of them lives on for an independent exponential time: the queue M/M/∞ at the times of the
     frames; with a life of zero, independent frames. Lower rates are reached by thinning: an individual that is present
     at a rate is present at every higher rate.
-
-    Attributes:
-        draws: draws of the sequence.
-        key: name of the process; all its streams begin with it.
-        life: mean life, seconds; 0: each individual is present in one frame.
-        max_rate: highest rate that is drawn, mean number alive at once.
     """
 
     draws: KeyedDraws
+    """Draws of the sequence."""
     key: tuple[Key, ...]
+    """Name of the process; all its streams begin with it."""
     life: float
+    """Mean life, seconds; 0: each individual is present in one frame."""
     max_rate: float
+    """Highest rate that is drawn, mean number alive at once."""
 
     @property
     def born(self) -> Integers:

@@ -31,17 +31,14 @@ from simharness.scenario.sections.detector_section import (
 
 @dataclass(frozen=True)
 class Reported:
-    """Joints of one person that are reported.
-
-    Attributes:
-        joints: which joints are reported, (T, V, J).
-        guessed: which of them are guesses, (T, V, J).
-        at_border: which of them are outside the images, but so near that they are found at the border, (T, V, J).
-    """
+    """Joints of one person that are reported."""
 
     joints: Bools
+    """Which joints are reported, (T, V, J)."""
     guessed: Bools
+    """Which of them are guesses, (T, V, J)."""
     at_border: Bools
+    """Which of them are outside the images, but so near that they are found at the border, (T, V, J)."""
 
 
 class ReportedJoints:
@@ -143,15 +140,12 @@ _PLACE = 1.0  # deviation of a person from the given centre, metres: wide, so th
 
 @dataclass(frozen=True)
 class PosesInPictures:
-    """Distribution of poses in pictures by the bearing of the camera from the trunk.
-
-    Attributes:
-        mean: joints right and down of the mean of all joints, (BEARINGS, 34), metres: x and y of joint after joint.
-        covariance: covariance of these numbers, (BEARINGS, 34, 34).
-    """
+    """Distribution of poses in pictures by the bearing of the camera from the trunk."""
 
     mean: Floats
+    """Joints right and down of the mean of all joints, (BEARINGS, 34), metres: x and y of joint after joint."""
     covariance: Floats
+    """Covariance of these numbers, (BEARINGS, 34, 34)."""
 
     def between(self, bearings: Floats) -> tuple[Integers, Floats]:
         """Return the index of the bearing before each of n bearings, radians, and the weight of the next, (n,) each.

@@ -19,17 +19,14 @@ from simharness.types.truth import GOOD_BELOW
 
 @dataclass(frozen=True)
 class Scatter:
-    """Scatter of the keypoints of a sequence, drawn for one person after the other.
-
-    Attributes:
-        config: deviations of good keypoints.
-        correlation: shares of the variance, and how long they last.
-        draws: draws of the sequence.
-    """
+    """Scatter of the keypoints of a sequence, drawn for one person after the other."""
 
     config: KeypointsSection
+    """Deviations of good keypoints."""
     correlation: CorrelationSection
+    """Shares of the variance, and how long they last."""
     draws: KeyedDraws
+    """Draws of the sequence."""
 
     def of_person(self, person: int, occlusion: NDArray[np.int8], axes: Floats) -> Floats:
         """Return the displacements of a person's keypoints, (T, V, 17, 2) units: Gaussian, truncated at 1.14.

@@ -69,21 +69,18 @@ class StepStage(IntEnum):
 
 @dataclass(frozen=True)
 class Context:
-    """Everything that a step may read: the truth, the cameras, the parameters and the random draws.
-
-    Attributes:
-        sequence: ground truth in space, T frames of P people.
-        views: ground truth in the pictures of V cameras.
-        rig: true rig, which takes the pictures.
-        config: all parameters of the detector.
-        draws: keyed random draws.
-    """
+    """Everything that a step may read: the truth, the cameras, the parameters and the random draws."""
 
     sequence: Sequence
+    """Ground truth in space, T frames of P people."""
     views: Views
+    """Ground truth in the pictures of V cameras."""
     rig: Rig
+    """True rig, which takes the pictures."""
     config: DetectorSection
+    """All parameters of the detector."""
     draws: KeyedDraws
+    """Keyed random draws."""
 
     @cached_property
     def conditions(self) -> Conditions:
@@ -96,19 +93,16 @@ StepFunction = Callable[[DetectionBlock, Context], DetectionBlock]
 
 @dataclass(frozen=True)
 class Step:
-    """One registered error of the detector.
-
-    Attributes:
-        name: unique name.
-        stage: when it runs.
-        sections: sections of ``[detector]`` that it reads.
-        apply: the function itself.
-    """
+    """One registered error of the detector."""
 
     name: str
+    """Unique name."""
     stage: StepStage
+    """When it runs."""
     sections: tuple[str, ...]
+    """Sections of ``[detector]`` that it reads."""
     apply: StepFunction
+    """The function itself."""
 
 
 REGISTRY: dict[str, Step] = {}

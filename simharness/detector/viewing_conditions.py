@@ -72,26 +72,23 @@ OVERLAP_MIN = 0.1
 
 @dataclass(frozen=True)
 class Conditions:
-    """Viewing conditions of everyone, (T, V, P) people in pictures.
-
-    Attributes:
-        unit: OKS sigma x sqrt(area) of each joint, (T, V, P, J), pixels.
-        area: BOX_SHARE of the box, (T, V, P), square pixels.
-        occlusion: VISIBLE, SELF_OCCLUDED, OCCLUDED or OUTSIDE, (T, V, P, J).
-        valid: number of joints that are visible or self-occluded, (T, V, P).
-        cut: whether the border of the image cuts the person, (T, V, P).
-        neighbour: person whose box overlaps most, (T, V, P); -1 where no box overlaps.
-        crowded: at most 10 valid joints and an overlapping box, or at most 15 and three (PoseFix: Moon et al., CVPR
-            2019), (T, V, P).
-    """
+    """Viewing conditions of everyone, (T, V, P) people in pictures."""
 
     unit: Floats
+    """OKS sigma x sqrt(area) of each joint, (T, V, P, J), pixels."""
     area: Floats
+    """BOX_SHARE of the box, (T, V, P), square pixels."""
     occlusion: NDArray[np.int8]
+    """VISIBLE, SELF_OCCLUDED, OCCLUDED or OUTSIDE, (T, V, P, J)."""
     valid: NDArray[np.int64]
+    """Number of joints that are visible or self-occluded, (T, V, P)."""
     cut: Bools
+    """Whether the border of the image cuts the person, (T, V, P)."""
     neighbour: NDArray[np.int64]
+    """Person whose box overlaps most, (T, V, P); -1 where no box overlaps."""
     crowded: Bools
+    """At most 10 valid joints and an overlapping box, or at most 15 and three (PoseFix: Moon et al., CVPR 2019), (T, V,
+    P)."""
 
     @classmethod
     def of_views(cls, views: Views) -> Self:

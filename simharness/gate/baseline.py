@@ -31,21 +31,18 @@ _HEAD = ("suite", "fingerprint", "code", "processor")
 
 @dataclass(frozen=True)
 class Measurement:
-    """Scores of a suite.
-
-    Attributes:
-        suite: name of the suite.
-        fingerprint: digest of its settings, seeds and variants, :func:`simharness.gate.suite.fingerprint`.
-        code: version of the code that was measured.
-        processor: kind of processor that measured it, :func:`simharness.gate.suite.processor`.
-        scores: scores of each trial: all of ``KEPT``, rounded to four decimals, None where a score does not apply.
-    """
+    """Scores of a suite."""
 
     suite: str
+    """Name of the suite."""
     fingerprint: str
+    """Digest of its settings, seeds and variants, :func:`simharness.gate.suite.fingerprint`."""
     code: str
+    """Version of the code that was measured."""
     processor: str
+    """Kind of processor that measured it, :func:`simharness.gate.suite.processor`."""
     scores: Mapping[TrialKey, Mapping[str, float | None]]
+    """Scores of each trial: all of ``KEPT``, rounded to four decimals, None where a score does not apply."""
 
     def __post_init__(self) -> None:
         rounded = {

@@ -17,15 +17,12 @@ Verdict = Literal["worse", "unexpected", "better", "same"]
 
 @dataclass(frozen=True)
 class Allowed:
-    """Largest changes of a score that fail nothing, in the unit of :attr:`simharness.gate.score_tests.Tested.loss`.
-
-    Attributes:
-        loss: largest loss.
-        gain: largest gain; for a score with a best value the largest change in either direction.
-    """
+    """Largest changes of a score that fail nothing, in the unit of :attr:`simharness.gate.score_tests.Tested.loss`."""
 
     loss: float
+    """Largest loss."""
     gain: float
+    """Largest gain; for a score with a best value the largest change in either direction."""
 
 
 @dataclass(frozen=True)
@@ -33,38 +30,33 @@ class Change(Tested):
     """Judged change of one score of one variant.
 
     Its ``p`` is corrected for other tests, 1 where no test was made; its ``loss`` is in tolerances.
-
-    Attributes:
-        score: key of the score in the catalogue, or ``TIME``.
-        variant: variant of the method.
-        case: case; None for the whole suite.
-        verdict: worse, unexpected, better or same.
-        undecided: larger than its tolerance, but could not be significant even if all seeds agreed.
-        allowed: largest changes that fail nothing.
     """
 
     score: str
+    """Key of the score in the catalogue, or ``TIME``."""
     variant: str
+    """Variant of the method."""
     case: str | None
+    """Case; None for the whole suite."""
     verdict: Verdict
+    """Worse, unexpected, better or same."""
     undecided: bool
+    """Larger than its tolerance, but could not be significant even if all seeds agreed."""
     allowed: Allowed
+    """Largest changes that fail nothing."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Changes of a suite: scores of the whole suite, then of each case; then time in the same order.
-
-    Attributes:
-        changes: change of each score and of time, by variant, over the whole suite and, if there are several cases,
-            over each case.
-        cases: names of the cases; empty if there is only one.
-        uncompared: scores that no trial of the baseline has, because they were not yet gated when it was written.
-    """
+    """Changes of a suite: scores of the whole suite, then of each case; then time in the same order."""
 
     changes: tuple[Change, ...]
+    """Change of each score and of time, by variant, over the whole suite and, if there are several cases, over each
+    case."""
     cases: tuple[str, ...]
+    """Names of the cases; empty if there is only one."""
     uncompared: tuple[str, ...] = ()
+    """Scores that no trial of the baseline has, because they were not yet gated when it was written."""
 
     def with_verdict(self, verdict: Verdict) -> tuple[Change, ...]:
         """Return the changes with a verdict: those of the whole suite first, the largest first."""
@@ -169,47 +161,41 @@ def _ratio(value: float, limit: float) -> float:
 
 @dataclass(frozen=True)
 class FailedCase:
-    """Case at a seed that could not be run.
-
-    Attributes:
-        case: name of the setting, :func:`simharness.gate.trial_command.setting_name`.
-        seed: seed.
-        error: message of the error.
-    """
+    """Case at a seed that could not be run."""
 
     case: str
+    """Name of the setting, :func:`simharness.gate.trial_command.setting_name`."""
     seed: int
+    """Seed."""
     error: str
+    """Message of the error."""
 
 
 @dataclass(frozen=True)
 class GateResult:
-    """Result of a gate check: comparison of a suite with its baseline.
-
-    Attributes:
-        suite: name of the suite.
-        variants: variants of the method.
-        gate: tolerances and level.
-        comparison: changes of all scores from the baseline.
-        failed: trials that could not be run.
-        trials: number of trials; a trial is a setting at a seed.
-        worst: trial to inspect first: one that could not be run, else the one with the largest loss, else the one with
-            the lowest PCP.
-        command: command line that runs this trial.
-        seconds: duration of the run.
-        accept_better: whether unexpected improvements fail nothing.
-    """
+    """Result of a gate check: comparison of a suite with its baseline."""
 
     suite: str
+    """Name of the suite."""
     variants: tuple[str, ...]
+    """Variants of the method."""
     gate: GateSection
+    """Tolerances and level."""
     comparison: Comparison
+    """Changes of all scores from the baseline."""
     failed: tuple[FailedCase, ...]
+    """Trials that could not be run."""
     trials: int
+    """Number of trials; a trial is a setting at a seed."""
     worst: TrialKey
+    """Trial to inspect first: one that could not be run, else the one with the largest loss, else the one with the
+    lowest PCP."""
     command: str
+    """Command line that runs this trial."""
     seconds: float
+    """Duration of the run."""
     accept_better: bool = False
+    """Whether unexpected improvements fail nothing."""
 
     @property
     def passed(self) -> bool:

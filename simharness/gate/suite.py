@@ -33,15 +33,12 @@ Scores = Mapping[str, float | None]
 
 @dataclass(frozen=True)
 class SuiteRun:
-    """Scores and failed trials of a suite.
-
-    Attributes:
-        scores: scores of each trial: all of the catalogue, ``FRAMES`` and ``TIME``.
-        failed: trials that could not be run.
-    """
+    """Scores and failed trials of a suite."""
 
     scores: Mapping[TrialKey, Scores]
+    """Scores of each trial: all of the catalogue, ``FRAMES`` and ``TIME``."""
     failed: tuple[FailedCase, ...]
+    """Trials that could not be run."""
 
     def measurement(self, study: Study) -> Measurement:
         """Return the scores that a baseline keeps."""

@@ -17,17 +17,14 @@ _ALONE = {"cases": "{}", "sweep": "{}", "seeds": "1"}  # overrides that turn a s
 
 
 class TrialKey(NamedTuple):
-    """Key of one variant at one setting and seed.
-
-    Attributes:
-        case: name of the setting, from :func:`setting_name`.
-        seed: seed.
-        variant: name of the variant.
-    """
+    """Key of one variant at one setting and seed."""
 
     case: str
+    """Name of the setting, from :func:`setting_name`."""
     seed: int
+    """Seed."""
     variant: str
+    """Name of the variant."""
 
     def __str__(self) -> str:
         return f"{self.case}, seed {self.seed}, {self.variant}"

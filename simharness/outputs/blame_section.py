@@ -16,42 +16,36 @@ _WIDTH, _HEIGHT = 240.0, 18.0  # of a bar's drawing, px
 
 @dataclass(frozen=True)
 class BlameRow:
-    """Row of the table: a cause, or what no cause explains.
-
-    Attributes:
-        title: name of the cause.
-        mended: what a user has who mends it.
-        bar: drawing of the share with its interval, and of the gain alone.
-        numbers: share, gain alone and gain last, each with its interval; empty where there is none.
-    """
+    """Row of the table: a cause, or what no cause explains."""
 
     title: str
+    """Name of the cause."""
     mended: str
+    """What a user has who mends it."""
     bar: Markup
+    """Drawing of the share with its interval, and of the gain alone."""
     numbers: tuple[tuple[str, str], ...]
+    """Share, gain alone and gain last, each with its interval; empty where there is none."""
 
 
 @dataclass(frozen=True)
 class BlameSection:
-    """What a template shows of a blame.
-
-    Attributes:
-        found: the blame.
-        heading: the score as it is and with all causes mended.
-        conclusion: what to mend first.
-        caution: whether the intervals allow to decide.
-        rows: the causes, the largest share first, and last what no cause explains.
-        absent: titles of the causes that the scenario does not have.
-        score: title of the score.
-    """
+    """What a template shows of a blame."""
 
     found: Blame
+    """The blame."""
     heading: str
+    """The score as it is and with all causes mended."""
     conclusion: str
+    """What to mend first."""
     caution: str
+    """Whether the intervals allow to decide."""
     rows: tuple[BlameRow, ...]
+    """The causes, the largest share first, and last what no cause explains."""
     absent: tuple[str, ...]
+    """Titles of the causes that the scenario does not have."""
     score: str
+    """Title of the score."""
 
 
 def blame_section(found: Blame) -> BlameSection:

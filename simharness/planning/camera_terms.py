@@ -183,13 +183,10 @@ class _OneCamera:
 
 @dataclass(frozen=True)
 class _CameraDraws(KeyedDraws):
-    """Draws of the detector in one camera, of its own seed; what all views share is of the common seed.
-
-    Attributes:
-        common: seed of all cameras.
-    """
+    """Draws of the detector in one camera, of its own seed; what all views share is of the common seed."""
 
     common: int = 0
+    """Seed of all cameras."""
 
     def _normal(self, count: int, key: tuple[Key, ...], shape: tuple[int, ...]) -> Floats:
         if _SHARED not in key:

@@ -20,21 +20,18 @@ _STEEPEST = np.radians(80.0)  # of a direction below or above the horizon: uprig
 
 @dataclass(frozen=True)
 class Candidate:
-    """Camera that may hang in a room.
-
-    Attributes:
-        mount: index of its mount.
-        lens: index of its lens.
-        place: position, three coordinates in metres.
-        bearing: direction of view from the x axis, counter-clockwise from above, radians.
-        tilt: direction of view above the horizon, radians; negative below.
-    """
+    """Camera that may hang in a room."""
 
     mount: int
+    """Index of its mount."""
     lens: int
+    """Index of its lens."""
     place: tuple[float, float, float]
+    """Position, three coordinates in metres."""
     bearing: float
+    """Direction of view from the x axis, counter-clockwise from above, radians."""
     tilt: float
+    """Direction of view above the horizon, radians; negative below."""
 
     @property
     def direction(self) -> Floats:

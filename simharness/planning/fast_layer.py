@@ -40,21 +40,18 @@ _RESAMPLES = 2000
 
 @dataclass(frozen=True)
 class FastLayer:
-    """Fast layer of a volume, its people, its obstacles and a detector; :meth:`in_volume` makes one.
-
-    Attributes:
-        volume: where people stand.
-        scenes: the scenes that all cameras share.
-        detector: profile of the detector.
-        obstacles: boxes that hide people.
-        seed: seed of all draws.
-    """
+    """Fast layer of a volume, its people, its obstacles and a detector; :meth:`in_volume` makes one."""
 
     volume: Volume
+    """Where people stand."""
     scenes: StandingScenes = field(repr=False)
+    """The scenes that all cameras share."""
     detector: DetectorSection = field(repr=False)
+    """Profile of the detector."""
     obstacles: tuple[Box, ...] = ()
+    """Boxes that hide people."""
     seed: int = 0
+    """Seed of all draws."""
 
     @classmethod
     def in_volume(
@@ -144,30 +141,27 @@ class FastLayer:
 
 @dataclass(frozen=True)
 class Prediction:
-    """Maps of a set of cameras over P places, NaN where nothing is known.
-
-    Attributes:
-        places: (P, 2), metres.
-        pcp: percentage of correct parts, 0 to 100, (P,).
-        recall: probability that a person is found, (P,).
-        error_mm: expected error of the joints of people who are found, millimetres, (P,).
-        views: mean number of cameras that see a person whole, (P,).
-        ellipse: covariance of a joint of the trunk on the floor, (P, 2, 2), square metres.
-        risk: probability of a wrong match, (P,): a person has a detection of somebody else, or is two people
-            in the end; NaN where matching was not tried.
-        person_pcp: percentage of correct parts of everyone in every scene, (S, Q); NaN for absent people.
-        person_error_mm: mean error of the joints of everyone, (S, Q), millimetres; NaN for people not found.
-    """
+    """Maps of a set of cameras over P places, NaN where nothing is known."""
 
     places: Floats
+    """(P, 2), metres."""
     pcp: Floats
+    """Percentage of correct parts, 0 to 100, (P,)."""
     recall: Floats
+    """Probability that a person is found, (P,)."""
     error_mm: Floats
+    """Expected error of the joints of people who are found, millimetres, (P,)."""
     views: Floats
+    """Mean number of cameras that see a person whole, (P,)."""
     ellipse: Floats
+    """Covariance of a joint of the trunk on the floor, (P, 2, 2), square metres."""
     risk: Floats
+    """Probability of a wrong match, (P,): a person has a detection of somebody else, or is two people in the end; NaN
+    where matching was not tried."""
     person_pcp: Floats
+    """Percentage of correct parts of everyone in every scene, (S, Q); NaN for absent people."""
     person_error_mm: Floats
+    """Mean error of the joints of everyone, (S, Q), millimetres; NaN for people not found."""
 
     def summary(self, *, seconds: float = 10.0) -> dict[str, Interval]:
         """Return ``pcp`` and ``mpjpe_mm`` of the volume, with the 90 % intervals of a recording of some seconds.
@@ -225,19 +219,14 @@ _SCENES_AT_ONCE = 64  # whose people are triangulated in one call, which searche
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """Estimates of everyone in S scenes of Q people.
-
-    Attributes:
-        nearest: joints of the estimate nearest to everyone, by which PCP is scored, (S, Q, 17, 3), metres; NaN where
-            missing.
-        paired: joints of the estimate paired one to one with everyone, (S, Q, 17, 3), metres; NaN where missing.
-        mixed: who is matched with a detection of somebody else, or twice, (S, Q), 0 or 1; NaN where matching was not
-            tried.
-    """
+    """Estimates of everyone in S scenes of Q people."""
 
     nearest: Floats
+    """Joints of the estimate nearest to everyone, by which PCP is scored, (S, Q, 17, 3), metres; NaN where missing."""
     paired: Floats
+    """Joints of the estimate paired one to one with everyone, (S, Q, 17, 3), metres; NaN where missing."""
     mixed: Floats
+    """Who is matched with a detection of somebody else, or twice, (S, Q), 0 or 1; NaN where matching was not tried."""
 
 
 def reconstruct(terms: Sequence[CameraTerms], *, variant: str = "") -> Reconstruction:

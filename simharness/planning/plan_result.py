@@ -17,19 +17,16 @@ from simharness.statistics.intervals import Interval
 
 @dataclass(frozen=True)
 class Figures:
-    """Figures of a rig in the volume.
-
-    Attributes:
-        pcp: percentage of correct parts, with its interval (90 % by the fast layer, 95 % by simulation).
-        error_mm: mean error of joints, millimetres, with its interval.
-        share: share of the places of the volume within the target, percent; NaN where it was not computed.
-        worst: least PCP of a place, percent; NaN where it was not computed.
-    """
+    """Figures of a rig in the volume."""
 
     pcp: Interval
+    """Percentage of correct parts, with its interval (90 % by the fast layer, 95 % by simulation)."""
     error_mm: Interval
+    """Mean error of joints, millimetres, with its interval."""
     share: float = math.nan
+    """Share of the places of the volume within the target, percent; NaN where it was not computed."""
     worst: float = math.nan
+    """Least PCP of a place, percent; NaN where it was not computed."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the figures as JSON values; null where unknown."""
@@ -63,40 +60,34 @@ class Figures:
 
 @dataclass(frozen=True)
 class PlannedCamera:
-    """Camera of a plan.
-
-    Attributes:
-        name: its name.
-        candidate: where it hangs; None of a camera that hangs already.
-        mount: name of its mount, "wall 2"; "fixed" of a camera that hangs already.
-        lens: name of its lens.
-        sure: share of the near-best rigs that have a camera like it, 0 to 1; NaN of a camera that hangs already.
-        worth: loss of predicted PCP without it, points.
-    """
+    """Camera of a plan."""
 
     name: str
+    """Its name."""
     candidate: Candidate | None
+    """Where it hangs; None of a camera that hangs already."""
     mount: str
+    """Name of its mount, "wall 2"; "fixed" of a camera that hangs already."""
     lens: str
+    """Name of its lens."""
     sure: float
+    """Share of the near-best rigs that have a camera like it, 0 to 1; NaN of a camera that hangs already."""
     worth: float
+    """Loss of predicted PCP without it, points."""
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """Rig that was compared.
-
-    Attributes:
-        title: name for people: "plan", "second best", "corners", "ring".
-        rig: the rig.
-        predicted: its figures by the fast layer.
-        simulated: its figures by simulation; None where it was not simulated.
-    """
+    """Rig that was compared."""
 
     title: str
+    """Name for people: "plan", "second best", "corners", "ring"."""
     rig: Rig = field(repr=False)
+    """The rig."""
     predicted: Figures
+    """Its figures by the fast layer."""
     simulated: Figures | None = None
+    """Its figures by simulation; None where it was not simulated."""
 
 
 @dataclass(frozen=True)
@@ -110,33 +101,30 @@ class CurvePoint:
 
 @dataclass(frozen=True)
 class RigPlan:
-    """Planned rig.
-
-    Attributes:
-        room: the room.
-        rig: the planned cameras, those that hang already first.
-        cameras: each camera of the rig.
-        alternatives: the plan first, then other rigs.
-        prediction: maps of the plan by the fast layer.
-        curve: what fewer and more cameras would give.
-        near_best: number of near-best rigs by which ``sure`` is counted.
-        candidates: number of cameras from which the search chose.
-        simulated_scenes: number of simulated scenes; 0: none.
-        seed: seed of the plan.
-        seconds: duration by stage, of this run.
-    """
+    """Planned rig."""
 
     room: Room = field(repr=False)
+    """The room."""
     rig: Rig = field(repr=False)
+    """The planned cameras, those that hang already first."""
     cameras: tuple[PlannedCamera, ...]
+    """Each camera of the rig."""
     alternatives: tuple[Alternative, ...]
+    """The plan first, then other rigs."""
     prediction: Prediction = field(repr=False)
+    """Maps of the plan by the fast layer."""
     curve: tuple[CurvePoint, ...]
+    """What fewer and more cameras would give."""
     near_best: int
+    """Number of near-best rigs by which ``sure`` is counted."""
     candidates: int
+    """Number of cameras from which the search chose."""
     simulated_scenes: int
+    """Number of simulated scenes; 0: none."""
     seed: int
+    """Seed of the plan."""
     seconds: dict[str, float] = field(default_factory=dict, compare=False)
+    """Duration by stage, of this run."""
 
     @property
     def best(self) -> Alternative:

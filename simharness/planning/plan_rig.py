@@ -43,21 +43,18 @@ _PREVIEW_SHARE = 1e-3  # of seen joints: less is nothing
 
 @dataclass(frozen=True)
 class PlanEffort:
-    """How much is searched and simulated.
-
-    Attributes:
-        scenes: simulated scenes that confirm the plan; 0: none.
-        starts: greedy starts of the search.
-        curve: numbers of cameras beyond the requested one for which the curve is computed.
-        candidates: largest number of cameras from which the search chooses.
-        workers: processes of the simulation; the results do not depend on it.
-    """
+    """How much is searched and simulated."""
 
     scenes: int = 8
+    """Simulated scenes that confirm the plan; 0: none."""
     starts: int = 6
+    """Greedy starts of the search."""
     curve: tuple[int, ...] = (-2, -1, 0, 1, 2)
+    """Numbers of cameras beyond the requested one for which the curve is computed."""
     candidates: int = 1200
+    """Largest number of cameras from which the search chooses."""
     workers: int = 1
+    """Processes of the simulation; the results do not depend on it."""
 
 
 def plan_rig(

@@ -160,23 +160,20 @@ _ROUNDING = 1e-6  # metres
 
 @dataclass(frozen=True)
 class LensChoice:
-    """Camera model with its lens, in one of its two orientations.
-
-    Attributes:
-        name: name in the file.
-        K: intrinsics, (3, 3).
-        size: width and height in pixels.
-        distortion: k1 k2 p1 p2 k3, (5,).
-        cost: cost in the unit of the budget.
-        turned: whether the camera hangs turned by 90 degrees.
-    """
+    """Camera model with its lens, in one of its two orientations."""
 
     name: str
+    """Name in the file."""
     K: Floats
+    """Intrinsics, (3, 3)."""
     size: tuple[int, int]
+    """Width and height in pixels."""
     distortion: Floats
+    """K1 k2 p1 p2 k3, (5,)."""
     cost: float
+    """Cost in the unit of the budget."""
     turned: bool = False
+    """Whether the camera hangs turned by 90 degrees."""
 
     @property
     def fov(self) -> tuple[float, float]:
@@ -191,33 +188,30 @@ class LensChoice:
 
 @dataclass(frozen=True)
 class Room:
-    """Room with places for cameras.
-
-    Attributes:
-        name: name of the room.
-        keys: all keys of its file.
-        space: its floor and height.
-        volume: where people are.
-        mounts: where cameras may hang.
-        obstacles: boxes in the room.
-        doors: start and end of each door, (d, 2, 2), metres.
-        lenses: lenses to choose from, turned ones after the others.
-        fixed: cameras that hang already.
-        detector: detector profile.
-        file: file of the room.
-    """
+    """Room with places for cameras."""
 
     name: str
+    """Name of the room."""
     keys: RoomKeys
+    """All keys of its file."""
     space: Volume
+    """Its floor and height."""
     volume: Volume
+    """Where people are."""
     mounts: tuple[Mount, ...]
+    """Where cameras may hang."""
     obstacles: tuple[Box, ...]
+    """Boxes in the room."""
     doors: Floats
+    """Start and end of each door, (d, 2, 2), metres."""
     lenses: tuple[LensChoice, ...]
+    """Lenses to choose from, turned ones after the others."""
     fixed: tuple[Camera, ...]
+    """Cameras that hang already."""
     detector: DetectorSection
+    """Detector profile."""
     file: str = ""
+    """File of the room."""
 
     @cached_property
     def blocking(self) -> tuple[Box, ...]:

@@ -21,42 +21,36 @@ HEIGHTS = (0.1, 0.9, 1.7, 2.2)
 
 @dataclass(frozen=True)
 class Estimated:
-    """A set of cameras, as the fast layer predicts it and as the simulator shows it.
-
-    Attributes:
-        layer_pcp: PCP of the fast layer, percent.
-        layer_error_mm: its expected joint error, mm.
-        pcp: simulated PCP, percent.
-        mpjpe_mm: simulated joint error, mm.
-        recall: simulated recall of people, percent.
-    """
+    """A set of cameras, as the fast layer predicts it and as the simulator shows it."""
 
     layer_pcp: float
+    """PCP of the fast layer, percent."""
     layer_error_mm: float
+    """Its expected joint error, mm."""
     pcp: Interval
+    """Simulated PCP, percent."""
     mpjpe_mm: Interval
+    """Simulated joint error, mm."""
     recall: Interval
+    """Simulated recall of people, percent."""
 
 
 @dataclass(frozen=True)
 class CameraWorth:
-    """What one camera contributes.
-
-    Attributes:
-        camera: the camera.
-        sees: share of the places at which it sees a standing person whole, 0 to 1 (fast layer).
-        without: the rig without it; None of a rig of two cameras.
-        worth: points of PCP that its failure costs in simulation, paired by scene.
-        worth_mm: what its failure adds to the joint error, mm.
-        layer_worth: points of PCP that its failure costs by the fast layer.
-    """
+    """What one camera contributes."""
 
     camera: Camera
+    """The camera."""
     sees: float
+    """Share of the places at which it sees a standing person whole, 0 to 1 (fast layer)."""
     without: Estimated | None
+    """The rig without it; None of a rig of two cameras."""
     worth: Interval
+    """Points of PCP that its failure costs in simulation, paired by scene."""
     worth_mm: Interval
+    """What its failure adds to the joint error, mm."""
     layer_worth: float
+    """Points of PCP that its failure costs by the fast layer."""
 
     @property
     def redundant(self) -> bool:
@@ -66,85 +60,76 @@ class CameraWorth:
 
 @dataclass(frozen=True)
 class ExtraCamera:
-    """The best place found for one more camera.
-
-    Attributes:
-        camera: the camera, at its place.
-        places: number of places and directions that were compared by the fast layer.
-        rig: the rig with it.
-        gain: points of PCP that it adds in simulation, paired by scene.
-        gain_mm: what it takes from the joint error, mm.
-        layer_gain: points of PCP that it adds by the fast layer.
-    """
+    """The best place found for one more camera."""
 
     camera: Camera
+    """The camera, at its place."""
     places: int
+    """Number of places and directions that were compared by the fast layer."""
     rig: Estimated
+    """The rig with it."""
     gain: Interval
+    """Points of PCP that it adds in simulation, paired by scene."""
     gain_mm: Interval
+    """What it takes from the joint error, mm."""
     layer_gain: float
+    """Points of PCP that it adds by the fast layer."""
 
 
 @dataclass(frozen=True)
 class Crowd:
-    """A number of people in the volume.
-
-    Attributes:
-        people: their number.
-        layer_pcp: PCP of the fast layer, percent.
-        layer_error_mm: its expected joint error, mm.
-        layer_risk: its mean probability of a wrong match, 0 to 1.
-        pcp: simulated PCP, percent; None where so many were not simulated or do not fit.
-        mixed: simulated percentage of matched groups that hold two people; None likewise.
-    """
+    """A number of people in the volume."""
 
     people: int
+    """Their number."""
     layer_pcp: float
+    """PCP of the fast layer, percent."""
     layer_error_mm: float
+    """Its expected joint error, mm."""
     layer_risk: float
+    """Its mean probability of a wrong match, 0 to 1."""
     pcp: Interval | None = None
+    """Simulated PCP, percent; None where so many were not simulated or do not fit."""
     mixed: Interval | None = None
+    """Simulated percentage of matched groups that hold two people; None likewise."""
 
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """What a rig will give in a volume, before its cameras hang.
-
-    Attributes:
-        name: name of the rig.
-        rig: its cameras.
-        setup: what it is rehearsed for.
-        prediction: fast layer, all cameras.
-        coverage: number of cameras that have a point over each place in the picture, by :data:`HEIGHTS`, (H, P).
-        good: which places reach the target, (P,) (fast layer).
-        whole: all cameras.
-        cameras: worth of each camera, by name.
-        subsets: sets of cameras by the names of their cameras; with those of leave-one-out and all cameras.
-        extra: one more camera; None where no place improves the rig.
-        crowds: the same with other numbers of people, ascending.
-        tolerances: what errors of calibration and clocks cost.
-        scenes: simulated scenes, for the maps of the simulation.
-        mixed: simulated percentage of matched groups that hold two people, all cameras.
-        seconds: time that the fast layer and the simulation took.
-        sentences: the result in plain sentences, the most important first.
-    """
+    """What a rig will give in a volume, before its cameras hang."""
 
     name: str
+    """Name of the rig."""
     rig: Rig
+    """Its cameras."""
     setup: RehearsalSetup
+    """What it is rehearsed for."""
     prediction: Prediction
+    """Fast layer, all cameras."""
     coverage: Integers
+    """Number of cameras that have a point over each place in the picture, by :data:`HEIGHTS`, (H, P)."""
     good: Bools
+    """Which places reach the target, (P,) (fast layer)."""
     whole: Estimated
+    """All cameras."""
     cameras: Mapping[str, CameraWorth]
+    """Worth of each camera, by name."""
     subsets: Mapping[tuple[str, ...], Estimated]
+    """Sets of cameras by the names of their cameras; with those of leave-one-out and all cameras."""
     extra: ExtraCamera | None
+    """One more camera; None where no place improves the rig."""
     crowds: tuple[Crowd, ...]
+    """The same with other numbers of people, ascending."""
     tolerances: tuple[FaultTolerance, ...]
+    """What errors of calibration and clocks cost."""
     scenes: tuple[SceneResult, ...]
+    """Simulated scenes, for the maps of the simulation."""
     mixed: Interval
+    """Simulated percentage of matched groups that hold two people, all cameras."""
     seconds: Mapping[str, float] = field(default_factory=dict)
+    """Time that the fast layer and the simulation took."""
     sentences: tuple[str, ...] = ()
+    """The result in plain sentences, the most important first."""
 
     @property
     def good_share(self) -> float:

@@ -34,26 +34,24 @@ _WALL = 0.005  # metres that a camera on a wall may be within it, because files 
 class RehearsalSetup:
     """People, their surroundings and the detector of a rehearsal.
 
-    Attributes:
-        volume: where people are.
-        detector: profile of the detector (:func:`simharness.scenario.presets.read_profile`).
-        people: number of people in the volume.
-        space: floor and height of the room; None where it is unknown.
-        obstacles: boxes that hide people.
-        clutter: objects that the simulator places around the people, in the simulation alone.
-        target: what a place must reach to be good.
-
     Raises:
         ValueError: no people.
     """
 
     volume: Volume
+    """Where people are."""
     detector: DetectorSection
+    """Profile of the detector (:func:`simharness.scenario.presets.read_profile`)."""
     people: int = 4
+    """Number of people in the volume."""
     space: Volume | None = None
+    """Floor and height of the room; None where it is unknown."""
     obstacles: tuple[Box, ...] = ()
+    """Boxes that hide people."""
     clutter: ClutterSection = ClutterSection()
+    """Objects that the simulator places around the people, in the simulation alone."""
     target: TargetKeys = TargetKeys()
+    """What a place must reach to be good."""
 
     def __post_init__(self) -> None:
         if self.people < 1:
@@ -139,43 +137,37 @@ _MARGIN = 2.0  # metres of floor beyond cameras and people
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """What all scenes have in common.
-
-    Attributes:
-        rig: cameras in the world, floor at z = 0.
-        setup: the volume, its people, what hides them, and the detector. With clutter, people use the square around
-            the volume.
-        activities: activities of the people, in turn.
-        frames: frames of a take; a scene has four takes, or one with clutter.
-        rate: frames per second.
-        variant: variant of the method.
-        head: rule for the head joints of PCP.
-        whole: indices of the cameras of the maps; all by default.
-    """
+    """What all scenes have in common."""
 
     rig: Rig
+    """Cameras in the world, floor at z = 0."""
     setup: RehearsalSetup
+    """The volume, its people, what hides them, and the detector. With clutter, people use the square around the
+    volume."""
     activities: tuple[str, ...] = ACTIVITIES
+    """Activities of the people, in turn."""
     frames: int = 8
+    """Frames of a take; a scene has four takes, or one with clutter."""
     rate: float = 2.0
+    """Frames per second."""
     variant: str = "full"
+    """Variant of the method."""
     head: HeadRule = RULES[0]
+    """Rule for the head joints of PCP."""
     whole: tuple[int, ...] = ()
+    """Indices of the cameras of the maps; all by default."""
 
 
 @dataclass(frozen=True)
 class SceneFrame:
-    """Position of a volume's rectangle in the world of the rig.
-
-    Attributes:
-        center: middle of the rectangle, (2,), metres.
-        bearing: direction of its first side from the world's x axis, radians.
-        half: half its sides, (2,), metres.
-    """
+    """Position of a volume's rectangle in the world of the rig."""
 
     center: Floats
+    """Middle of the rectangle, (2,), metres."""
     bearing: float
+    """Direction of its first side from the world's x axis, radians."""
     half: Floats
+    """Half its sides, (2,), metres."""
 
     @classmethod
     def around(cls, outline: Floats) -> "SceneFrame":

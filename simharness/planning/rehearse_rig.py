@@ -43,23 +43,20 @@ _VARIANT = "full"  # of the method
 
 @dataclass(frozen=True)
 class RehearsalEffort:
-    """How much is simulated.
-
-    Attributes:
-        scenes: scenes of the rig, at the seeds 0, 1, ... from the seed of the rehearsal on.
-        crowd_scenes: scenes of each other number of people.
-        crowds: other numbers of people that are simulated; the fast layer has all from 1 to ``most``.
-        most: largest number of people.
-        around: places on the walls where one more camera is tried, each at two heights; 0: none.
-        workers: processes; the results do not depend on it.
-    """
+    """How much is simulated."""
 
     scenes: int = 16
+    """Scenes of the rig, at the seeds 0, 1, ... from the seed of the rehearsal on."""
     crowd_scenes: int = 6
+    """Scenes of each other number of people."""
     crowds: tuple[int, ...] = (1, 2, 6, 8, 10)
+    """Other numbers of people that are simulated; the fast layer has all from 1 to ``most``."""
     most: int = 10
+    """Largest number of people."""
     around: int = 16
+    """Places on the walls where one more camera is tried, each at two heights; 0: none."""
     workers: int = 1
+    """Processes; the results do not depend on it."""
 
 
 def rehearse_rig(

@@ -95,17 +95,14 @@ class SightingOdds:
 
 @dataclass(frozen=True)
 class Maps:
-    """Expected figures of a set of cameras at P places.
-
-    Attributes:
-        pcp: percentage of correct parts, (P,).
-        error_mm: expected error of the joints that are placed, millimetres, (P,); NaN where none is.
-        seen: mean over joints of the probability of two right sightings or more, and half of that of one, (P,).
-    """
+    """Expected figures of a set of cameras at P places."""
 
     pcp: Floats
+    """Percentage of correct parts, (P,)."""
     error_mm: Floats
+    """Expected error of the joints that are placed, millimetres, (P,); NaN where none is."""
     seen: Floats
+    """Mean over joints of the probability of two right sightings or more, and half of that of one, (P,)."""
 
 
 @dataclass(frozen=True)

@@ -41,56 +41,47 @@ from simharness.world.scene.build import Scene
 
 @dataclass(frozen=True)
 class Condition:
-    """What changes between two estimates of a scene.
-
-    Attributes:
-        cameras: indices of the cameras, increasing.
-        fault: key of ``[faults]`` that is set: "rotation" (degrees), "translation" (m) or "clock_offset" (s); "": none.
-        level: its value.
-    """
+    """What changes between two estimates of a scene."""
 
     cameras: tuple[int, ...]
+    """Indices of the cameras, increasing."""
     fault: str = ""
+    """Key of ``[faults]`` that is set: "rotation" (degrees), "translation" (m) or "clock_offset" (s); "": none."""
     level: float = 0.0
+    """Its value."""
 
 
 @dataclass(frozen=True)
 class SceneScores:
-    """Scores of one scene under one condition, of people inside the volume; NaN where nothing was scored.
-
-    Attributes:
-        pcp: percent of correct parts.
-        recall: percent of people found.
-        mpjpe_mm: mean error of the people found, mm.
-        mixed: percent of the matched groups of detections that hold two people.
-    """
+    """Scores of one scene under one condition, of people inside the volume; NaN where nothing was scored."""
 
     pcp: float
+    """Percent of correct parts."""
     recall: float
+    """Percent of people found."""
     mpjpe_mm: float
+    """Mean error of the people found, mm."""
     mixed: float
+    """Percent of the matched groups of detections that hold two people."""
 
 
 @dataclass(frozen=True)
 class SceneResult:
-    """Result of one scene.
-
-    Attributes:
-        seed: its seed.
-        places: people on the floor of the world, (F, P, 2), metres.
-        inside: who is inside the volume, (F, P).
-        parts: share of correct parts of each person by the cameras of the maps, without a fault, (F, P); NaN where
-            undefined.
-        errors: mean joint error of each person found, (F, P), metres; NaN where missed.
-        scores: scores by condition.
-    """
+    """Result of one scene."""
 
     seed: int
+    """Its seed."""
     places: Floats
+    """People on the floor of the world, (F, P, 2), metres."""
     inside: Bools
+    """Who is inside the volume, (F, P)."""
     parts: Floats
+    """Share of correct parts of each person by the cameras of the maps, without a fault, (F, P); NaN where
+    undefined."""
     errors: Floats
+    """Mean joint error of each person found, (F, P), metres; NaN where missed."""
     scores: Mapping[Condition, SceneScores]
+    """Scores by condition."""
 
 
 def interval_of(results: Sequence[SceneResult], condition: Condition, score: str) -> Interval:
@@ -117,17 +108,14 @@ _TAKES = 4  # of a scene, with other places of the people and other draws: build
 
 @dataclass(frozen=True)
 class SceneBatch:
-    """Scenes of the same settings.
-
-    Attributes:
-        settings: what the scenes have in common.
-        conditions: subsets of cameras and faults; the same scene and the same draws for all.
-        seeds: seeds of the scenes.
-    """
+    """Scenes of the same settings."""
 
     settings: SceneSettings
+    """What the scenes have in common."""
     conditions: tuple[Condition, ...]
+    """Subsets of cameras and faults; the same scene and the same draws for all."""
     seeds: tuple[int, ...]
+    """Seeds of the scenes."""
 
 
 def simulate_scenes(
@@ -204,21 +192,18 @@ def _run(settings: SceneSettings, conditions: Sequence[Condition], seed: int) ->
 
 
 class _Scored(NamedTuple):
-    """Scores of F frames under one condition.
-
-    Attributes:
-        correct: share of correct parts of each person, (F, P); NaN where undefined.
-        error: mean joint error of each person found, (F, P), metres.
-        found: who is found, (F, P).
-        groups: number of matched groups, (F,).
-        mixed: number of them that hold two people, (F,).
-    """
+    """Scores of F frames under one condition."""
 
     correct: Floats
+    """Share of correct parts of each person, (F, P); NaN where undefined."""
     error: Floats
+    """Mean joint error of each person found, (F, P), metres."""
     found: Bools
+    """Who is found, (F, P)."""
     groups: Integers
+    """Number of matched groups, (F,)."""
     mixed: Integers
+    """Number of them that hold two people, (F,)."""
 
     @classmethod
     def joined(cls, parts: "Sequence[_Scored]") -> "_Scored":

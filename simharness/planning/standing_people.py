@@ -39,44 +39,38 @@ _TRIES = 40  # open scenes that a person is tried in before the rule of the leas
 
 
 class Silhouettes(NamedTuple):
-    """Shapes of K poses, from which boxes in pictures follow.
-
-    Attributes:
-        body: body of each pose, (K,).
-        outlines: outermost vertices of the skin of all poses, one after the other, (n, 3), metres.
-        outline_of: first vertex of each pose, and the end, (K + 1,).
-        extremes: outermost of these, which suffice where the whole person is in the picture, (m, 3), metres.
-        extremes_of: first of them of each pose, and the end, (K + 1,).
-        edges: edges of the outlines of all bodies, one after the other, as vertices of a pose, (e, 2).
-        edges_of: first edge of each body, and the end.
-    """
+    """Shapes of K poses, from which boxes in pictures follow."""
 
     body: Integers
+    """Body of each pose, (K,)."""
     outlines: Floats
+    """Outermost vertices of the skin of all poses, one after the other, (n, 3), metres."""
     outline_of: Integers
+    """First vertex of each pose, and the end, (K + 1,)."""
     extremes: Floats
+    """Outermost of these, which suffice where the whole person is in the picture, (m, 3), metres."""
     extremes_of: Integers
+    """First of them of each pose, and the end, (K + 1,)."""
     edges: Integers
+    """Edges of the outlines of all bodies, one after the other, as vertices of a pose, (e, 2)."""
     edges_of: Integers
+    """First edge of each body, and the end."""
 
 
 @dataclass(frozen=True)
 class PosePool:
-    """Poses of a few bodies, each standing over the origin and facing +x: K poses, C capsules.
-
-    Attributes:
-        landmarks: positions of ``simharness.types.sequence.LANDMARKS``, (K, L, 3), metres.
-        capsules: ends of the axes of the capsules that hide, (K, C, 2, 3), metres.
-        radii: radii of the capsules, (K, C), metres.
-        depths: largest distance of the skin in front of each COCO-17 joint, (K, 17), metres.
-        silhouettes: shapes in pictures.
-    """
+    """Poses of a few bodies, each standing over the origin and facing +x: K poses, C capsules."""
 
     landmarks: Floats = field(repr=False)
+    """Positions of ``simharness.types.sequence.LANDMARKS``, (K, L, 3), metres."""
     capsules: Floats = field(repr=False)
+    """Ends of the axes of the capsules that hide, (K, C, 2, 3), metres."""
     radii: Floats = field(repr=False)
+    """Radii of the capsules, (K, C), metres."""
     depths: Floats = field(repr=False)
+    """Largest distance of the skin in front of each COCO-17 joint, (K, 17), metres."""
     silhouettes: Silhouettes = field(repr=False)
+    """Shapes in pictures."""
 
     def __len__(self) -> int:
         return len(self.landmarks)
@@ -180,31 +174,28 @@ def _turns(angle: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class StandingScenes:
-    """S scenes of Q people who stand in a volume.
-
-    Attributes:
-        pool: the poses.
-        places: places of the map, (P, 2), metres.
-        place: index of the place of each person, (S, Q).
-        pose: index of the pose of each person, (S, Q).
-        position: position on the floor, (S, Q, 3), metres; far below it for absent people.
-        turn: rotation about z, (S, Q, 3, 3).
-        present: who is in each scene, (S, Q).
-        landmarks: positions of all landmarks, (S, Q, L, 3), metres.
-        capsules: ends of the axes of all capsules, (S, Q, C, 2, 3), metres.
-        frame: recorded frame of each scene, (S,); -1 of a scene that is drawn.
-    """
+    """S scenes of Q people who stand in a volume."""
 
     pool: PosePool
+    """The poses."""
     places: Floats
+    """Places of the map, (P, 2), metres."""
     place: Integers
+    """Index of the place of each person, (S, Q)."""
     pose: Integers
+    """Index of the pose of each person, (S, Q)."""
     position: Floats
+    """Position on the floor, (S, Q, 3), metres; far below it for absent people."""
     turn: Floats
+    """Rotation about z, (S, Q, 3, 3)."""
     present: Bools
+    """Who is in each scene, (S, Q)."""
     landmarks: Floats
+    """Positions of all landmarks, (S, Q, L, 3), metres."""
     capsules: Floats
+    """Ends of the axes of all capsules, (S, Q, C, 2, 3), metres."""
     frame: Integers
+    """Recorded frame of each scene, (S,); -1 of a scene that is drawn."""
 
     @classmethod
     def posed(

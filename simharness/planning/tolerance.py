@@ -19,21 +19,18 @@ CLIFF = 5.0
 
 @dataclass(frozen=True)
 class FaultKind:
-    """Kind of error.
-
-    Attributes:
-        key: key of the section ``[faults]`` of scenarios.
-        title: name in text.
-        unit: unit in text.
-        scale: units of text in one unit of the scenario.
-        levels: levels, in units of text, ascending.
-    """
+    """Kind of error."""
 
     key: str
+    """Key of the section ``[faults]`` of scenarios."""
     title: str
+    """Name in text."""
     unit: str
+    """Unit in text."""
     scale: float
+    """Units of text in one unit of the scenario."""
     levels: tuple[float, ...]
+    """Levels, in units of text, ascending."""
 
 
 FAULTS: Mapping[str, FaultKind] = MappingProxyType(
@@ -48,22 +45,19 @@ FAULTS: Mapping[str, FaultKind] = MappingProxyType(
 
 @dataclass(frozen=True)
 class FaultTolerance:
-    """What errors of one kind cost a rig.
-
-    Attributes:
-        fault: kind of error.
-        pcp: PCP at each level, percent.
-        mpjpe_mm: joint error at each level, mm.
-        loss: points of PCP lost at each level, paired by scene.
-        cliff: level, in units of text, from which :data:`CLIFF` points are lost, between two levels by interpolation;
-            None where it is beyond the largest.
-    """
+    """What errors of one kind cost a rig."""
 
     fault: FaultKind
+    """Kind of error."""
     pcp: tuple[Interval, ...]
+    """PCP at each level, percent."""
     mpjpe_mm: tuple[Interval, ...]
+    """Joint error at each level, mm."""
     loss: tuple[Interval, ...]
+    """Points of PCP lost at each level, paired by scene."""
     cliff: float | None
+    """Level, in units of text, from which :data:`CLIFF` points are lost, between two levels by interpolation; None
+    where it is beyond the largest."""
 
     @property
     def limit(self) -> str:

@@ -157,19 +157,16 @@ def _boxes(camera: Camera, scenes: StandingScenes) -> Floats:
 
 
 class _Placed(NamedTuple):
-    """People of S scenes.
-
-    Attributes:
-        pose: poses of the pool, (S, Q).
-        turn: rotations, (S, Q, 3, 3).
-        position: positions, (S, Q, 3), metres.
-        present: who is in the scene, (S, Q).
-    """
+    """People of S scenes."""
 
     pose: Integers
+    """Poses of the pool, (S, Q)."""
     turn: Floats
+    """Rotations, (S, Q, 3, 3)."""
     position: Floats
+    """Positions, (S, Q, 3), metres."""
     present: Bools
+    """Who is in the scene, (S, Q)."""
 
 
 @njit(cache=True)

@@ -22,29 +22,27 @@ DetectorKind = Literal["bottom-up", "top-down"]
 class AnnotatedRecording:
     """Frames with detections, and joints of the people who are annotated in them.
 
-    Attributes:
-        rig: the V cameras.
-        truth: annotated joints on SHELF14, (F, A, 14, 3), metres; NaN where an actor is not annotated.
-        detections: detections in each of the F frames.
-        frames: numbers of the frames in the original sequence, (F,), increasing; gaps are allowed.
-        name: name of the recording in tables and files.
-        rate: frames of the original sequence per second, Hz.
-        actors: indices of the actors whose PCP is averaged; None: all.
-        kind: kind of the detector.
-
     Raises:
         ValueError: shapes or numbers of frames that differ, frames that do not increase, detections in views that the
             rig does not have, a rate that is not positive, or actors that do not exist.
     """
 
     rig: Rig
+    """The V cameras."""
     truth: NDArray[np.float64]
+    """Annotated joints on SHELF14, (F, A, 14, 3), metres; NaN where an actor is not annotated."""
     detections: tuple[Detections, ...]
+    """Detections in each of the F frames."""
     frames: NDArray[np.int64]
+    """Numbers of the frames in the original sequence, (F,), increasing; gaps are allowed."""
     name: str = "recording"
+    """Name of the recording in tables and files."""
     rate: float = 25.0
+    """Frames of the original sequence per second, Hz."""
     actors: tuple[int, ...] | None = None
+    """Indices of the actors whose PCP is averaged; None: all."""
     kind: DetectorKind = "bottom-up"
+    """Kind of the detector."""
 
     def __post_init__(self) -> None:
         set_arrays(self, frames=(("F",), np.int64), truth=("F", "A", len(SHELF14), 3))

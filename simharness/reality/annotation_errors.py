@@ -40,21 +40,17 @@ _SIDE14[SHELF14_OF_LIMBS] = SIDE[LIMB_JOINTS]
 
 @dataclass(frozen=True)
 class AnnotationModel:
-    """Errors of the annotated joints of A actors, on SHELF14.
-
-    Attributes:
-        shift: mean offset of each annotated joint from the true one in the body's frame, forward, left and up,
-            (A, 14, 3) metres. For the head: from the joints of the head that the rule of VoxelPose computes from the
-            true face.
-        deviation: standard deviation of the random part of each joint along each axis, (A, 14) metres.
-        life: correlation time of the random part, seconds.
-        noise: share of the variance of the random part that is drawn anew in every frame.
-    """
+    """Errors of the annotated joints of A actors, on SHELF14."""
 
     shift: Floats
+    """Mean offset of each annotated joint from the true one in the body's frame, forward, left and up, (A, 14, 3)
+    metres. For the head: from the joints of the head that the rule of VoxelPose computes from the true face."""
     deviation: Floats
+    """Standard deviation of the random part of each joint along each axis, (A, 14) metres."""
     life: float
+    """Correlation time of the random part, seconds."""
     noise: float
+    """Share of the variance of the random part that is drawn anew in every frame."""
 
     @property
     def rms(self) -> Floats:
@@ -127,17 +123,15 @@ class AnnotationFit:
 
     The two cannot be separated with one recording: an offset that all actors share is booked on the detector, because
     annotators and detectors define joints (hips, above all) differently; what differs between actors is the annotation.
-
-    Attributes:
-        annotation: errors of the truth.
-        bias: offset of the detector's joints from the annotated ones by kind of joint, forward, outward and up,
-            (9, 3) metres; 0 for the face.
-        compared: frames in which each actor's joint was compared, (A, 14).
     """
 
     annotation: AnnotationModel
+    """Errors of the truth."""
     bias: Floats
+    """Offset of the detector's joints from the annotated ones by kind of joint, forward, outward and up, (9, 3) metres;
+    0 for the face."""
     compared: Floats
+    """Frames in which each actor's joint was compared, (A, 14)."""
 
     @property
     def of_detected(self) -> AnnotationModel:

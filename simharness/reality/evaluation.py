@@ -31,26 +31,23 @@ FILES = "files"
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Scores of variants on a recording.
-
-    Attributes:
-        name: name of the recording.
-        head: mapping from COCO-17 to the head of SHELF14.
-        frames: number of frames that the variants were given.
-        annotated: number of these frames that have truth and are scored.
-        variants: scores by variant.
-        violations: by variant, the number of detections that share a label with another detection of their view; None
-            for a method that does not report which detections belong to its people.
-        actors: indices of the actors whose PCP is averaged.
-    """
+    """Scores of variants on a recording."""
 
     name: str
+    """Name of the recording."""
     head: HeadMapping
+    """Mapping from COCO-17 to the head of SHELF14."""
     frames: int
+    """Number of frames that the variants were given."""
     annotated: int
+    """Number of these frames that have truth and are scored."""
     variants: Mapping[str, VariantScores]
+    """Scores by variant."""
     violations: Mapping[str, int | None]
+    """By variant, the number of detections that share a label with another detection of their view; None for a method
+    that does not report which detections belong to its people."""
     actors: tuple[int, ...]
+    """Indices of the actors whose PCP is averaged."""
 
     def summary(self) -> dict[str, Any]:
         """Return the summary, ready for JSON, with the keys of a run's ``summary.json``.

@@ -40,15 +40,12 @@ _MARGIN = 1.5  # metres between people or cameras and the border of the floor
 
 @dataclass(frozen=True)
 class Take:
-    """Part of a recording in which the same people are present.
-
-    Attributes:
-        rows: its frames, as rows of the recording.
-        people: indices of its people.
-    """
+    """Part of a recording in which the same people are present."""
 
     rows: range
+    """Its frames, as rows of the recording."""
     people: tuple[int, ...]
+    """Indices of its people."""
 
 
 @dataclass(frozen=True)
@@ -56,19 +53,17 @@ class FilmedRecording:
     """Simulated recording before any detector.
 
     People who are absent in a frame are outside of all pictures there.
-
-    Attributes:
-        sequence: true poses of everyone and who is present in each frame, with the floor at z = 0. The limbs are where
-            the recording's detector found them, which is not where annotators would place them.
-        views: truth in the pictures.
-        rig: the cameras, with the floor at z = 0.
-        floor: height of the recording's floor, metres.
     """
 
     sequence: Sequence
+    """True poses of everyone and who is present in each frame, with the floor at z = 0. The limbs are where the
+    recording's detector found them, which is not where annotators would place them."""
     views: Views
+    """Truth in the pictures."""
     rig: Rig
+    """The cameras, with the floor at z = 0."""
     floor: float
+    """Height of the recording's floor, metres."""
 
     @property
     def joints(self) -> Floats:

@@ -47,17 +47,14 @@ class PcpInterval:
 
 @dataclass(frozen=True)
 class SeedEvaluation:
-    """Scores of the variants of a scenario at several seeds.
-
-    Attributes:
-        scenario: the scenario, with its first seed.
-        head: mapping to the head of SHELF14.
-        evaluations: evaluations by seed.
-    """
+    """Scores of the variants of a scenario at several seeds."""
 
     scenario: Scenario
+    """The scenario, with its first seed."""
     head: HeadMapping
+    """Mapping to the head of SHELF14."""
     evaluations: Mapping[int, Evaluation]
+    """Evaluations by seed."""
 
     @property
     def seeds(self) -> tuple[int, ...]:

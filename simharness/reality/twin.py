@@ -35,21 +35,18 @@ the bodies matter less than the draws of the detector, and filming takes longest
 
 @dataclass(frozen=True)
 class TwinModel:
-    """Everything that a twin is made from.
-
-    Attributes:
-        recording: the real recording: its rig, its frames, and which actors are annotated in which of them.
-        people: who is where in the recording.
-        detector: fitted detector.
-        annotation: fitted annotation, relative to the joints as the detector finds them: the films show these.
-        films: re-enactments that exist already, of seeds 0, 1, ...
-    """
+    """Everything that a twin is made from."""
 
     recording: AnnotatedRecording
+    """The real recording: its rig, its frames, and which actors are annotated in which of them."""
     people: People
+    """Who is where in the recording."""
     detector: DetectorSection
+    """Fitted detector."""
     annotation: AnnotationModel
+    """Fitted annotation, relative to the joints as the detector finds them: the films show these."""
     films: tuple[FilmedRecording, ...] = ()
+    """Re-enactments that exist already, of seeds 0, 1, ..."""
 
     @classmethod
     def of_fit(cls, recording: AnnotatedRecording, fitted: DetectorFit) -> Self:
@@ -100,25 +97,22 @@ TOLERANCE = 2.0
 
 @dataclass(frozen=True)
 class TwinComparison:
-    """Scores of variants on a recording and on its simulated twin.
-
-    Attributes:
-        name: name of the recording.
-        frames: number of frames of the recording, and of each twin.
-        seeds: seeds of the twins.
-        head: mapping to the head of SHELF14.
-        real: PCP on the recording by variant.
-        simulated: PCP on the twins by variant.
-        summaries: summaries of all scores, by "real" and "simulated", then by variant.
-    """
+    """Scores of variants on a recording and on its simulated twin."""
 
     name: str
+    """Name of the recording."""
     frames: int
+    """Number of frames of the recording, and of each twin."""
     seeds: tuple[int, ...]
+    """Seeds of the twins."""
     head: HeadMapping
+    """Mapping to the head of SHELF14."""
     real: Mapping[str, PcpInterval]
+    """PCP on the recording by variant."""
     simulated: Mapping[str, PcpInterval]
+    """PCP on the twins by variant."""
     summaries: Mapping[str, Mapping[str, Any]]
+    """Summaries of all scores, by "real" and "simulated", then by variant."""
 
     @property
     def largest_difference(self) -> float:

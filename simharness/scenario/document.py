@@ -25,19 +25,16 @@ _ESTIMATORS = ("method", "estimators")  # "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE
 
 @dataclass(frozen=True)
 class Document:
-    """Keys of a scenario file and its bases, before presets are resolved.
-
-    Attributes:
-        path: the file.
-        data: keys of the file, of its bases and of the command line; ``variants`` is written as ``method.variants``.
-        origins: origin of each key, a file or the command line.
-        folders: folders of the file and its bases, in which presets are looked for.
-    """
+    """Keys of a scenario file and its bases, before presets are resolved."""
 
     path: Path
+    """The file."""
     data: dict[str, Any]
+    """Keys of the file, of its bases and of the command line; ``variants`` is written as ``method.variants``."""
     origins: Origins
+    """Origin of each key, a file or the command line."""
     folders: tuple[Path, ...]
+    """Folders of the file and its bases, in which presets are looked for."""
 
 
 def find_scenario(name: Path | str, *, folder: Path = Path(), extended_by: Path | None = None) -> Path:

@@ -26,23 +26,20 @@ RANGE = ("from", "to", "steps", "scale")
 
 @dataclass(frozen=True)
 class PresetKind:
-    """Kind of preset.
-
-    Attributes:
-        section: section to which the presets belong.
-        key: key of the section that names a preset.
-        title: name of the kind in messages.
-        folder: name of the folder of the presets.
-        model: model of the section.
-        default: preset of scenarios that name none; "": no preset.
-    """
+    """Kind of preset."""
 
     section: str
+    """Section to which the presets belong."""
     key: str
+    """Key of the section that names a preset."""
     title: str
+    """Name of the kind in messages."""
     folder: str
+    """Name of the folder of the presets."""
     model: type[Section]
+    """Model of the section."""
     default: str
+    """Preset of scenarios that name none; "": no preset."""
 
     @property
     def shipped(self) -> Path:

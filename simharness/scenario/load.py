@@ -63,52 +63,46 @@ class StudyTooLarge(ScenarioError):
 
 @dataclass(frozen=True)
 class Setting:
-    """One combination of factors.
-
-    Attributes:
-        case: name of the case; "" where the file has no cases.
-        varied: where keys are swept one at a time, the dotted key that this setting varies, the first of paired keys;
-            "" for the base, and for combinations.
-        factors: every swept dotted key and its value in this setting, that of the base where it is not varied. None:
-            no value, or different values for the joints.
-        scenario: resolved scenario, with the first seed and all variants of the study.
-    """
+    """One combination of factors."""
 
     case: str
+    """Name of the case; "" where the file has no cases."""
     varied: str
+    """Where keys are swept one at a time, the dotted key that this setting varies, the first of paired keys; "" for the
+    base, and for combinations."""
     factors: Mapping[str, Value]
+    """Every swept dotted key and its value in this setting, that of the base where it is not varied. None: no value, or
+    different values for the joints."""
     scenario: Scenario
+    """Resolved scenario, with the first seed and all variants of the study."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """All trials of a scenario file.
-
-    Attributes:
-        name: name of the scenario.
-        description: description of the scenario.
-        seeds: seeds of every setting.
-        variants: variants of the method in every trial.
-        factors: dotted keys that are swept, in the order of the file.
-        one_at_a_time: whether each factor is varied alone.
-        settings: settings case by case; the last factor varies fastest.
-        gate: section [gate].
-        path: the file, or the name of a shipped scenario, as it was given.
-        base: the scenario without sweep and cases, at the first seed.
-        data: keys of the file, of its bases and of the command line, before presets and sweep are resolved.
-    """
+    """All trials of a scenario file."""
 
     name: str
+    """Name of the scenario."""
     description: str
+    """Description of the scenario."""
     seeds: tuple[int, ...]
+    """Seeds of every setting."""
     variants: tuple[str, ...]
+    """Variants of the method in every trial."""
     factors: tuple[str, ...]
+    """Dotted keys that are swept, in the order of the file."""
     one_at_a_time: bool
+    """Whether each factor is varied alone."""
     settings: tuple[Setting, ...]
+    """Settings case by case; the last factor varies fastest."""
     gate: GateSection
+    """Section [gate]."""
     path: Path
+    """The file, or the name of a shipped scenario, as it was given."""
     base: Scenario
+    """The scenario without sweep and cases, at the first seed."""
     data: Mapping[str, Any] = field(default_factory=dict)
+    """Keys of the file, of its bases and of the command line, before presets and sweep are resolved."""
 
     @property
     def trials(self) -> int:
@@ -122,44 +116,38 @@ class Study:
 
 @dataclass(frozen=True)
 class ScenarioCase:
-    """Named change of the base; the base itself in a file without cases.
-
-    Attributes:
-        name: name of the case; "" where the file has no cases.
-        data: keys of the scenario file with the changes.
-        origins: origins of the keys.
-        changes: keys that the case changes.
-        scenario: resolved scenario.
-        values: values of all swept keys, dotted, where they are not varied.
-    """
+    """Named change of the base; the base itself in a file without cases."""
 
     name: str
+    """Name of the case; "" where the file has no cases."""
     data: dict[str, Any]
+    """Keys of the scenario file with the changes."""
     origins: Origins
+    """Origins of the keys."""
     changes: Mapping[str, Any]
+    """Keys that the case changes."""
     scenario: Scenario
+    """Resolved scenario."""
     values: Mapping[str, Value]
+    """Values of all swept keys, dotted, where they are not varied."""
 
 
 @dataclass(frozen=True)
 class ScenarioPlan:
-    """Resolved scenario file: the base scenario, and what is varied.
-
-    Attributes:
-        document: keys of the file and its bases.
-        base: the scenario without sweep and cases; its seed is the first one.
-        seeds: seeds of every setting.
-        sweep: factors and their values.
-        cases: at least one case.
-        gate: section [gate].
-    """
+    """Resolved scenario file: the base scenario, and what is varied."""
 
     document: Document
+    """Keys of the file and its bases."""
     base: Scenario
+    """The scenario without sweep and cases; its seed is the first one."""
     seeds: Sequence[int]
+    """Seeds of every setting."""
     sweep: Sweep
+    """Factors and their values."""
     cases: tuple[ScenarioCase, ...]
+    """At least one case."""
     gate: GateSection
+    """Section [gate]."""
 
     @property
     def settings(self) -> int:

@@ -39,15 +39,12 @@ NOT_VARIED: dict[layers.Key, str] = {
 
 @dataclass(frozen=True)
 class Axis:
-    """Keys that are varied together; most often a single key.
-
-    Attributes:
-        keys: dotted keys, (k,).
-        values: values of the keys, (steps, k).
-    """
+    """Keys that are varied together; most often a single key."""
 
     keys: tuple[str, ...]
+    """Dotted keys, (k,)."""
     values: tuple[tuple[Value, ...], ...]
+    """Values of the keys, (steps, k)."""
 
     def others(self, base: Mapping[str, Value]) -> list[tuple[Value, ...]]:
         """Return the values that differ from those of the base."""
@@ -57,17 +54,14 @@ class Axis:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Axes of a study.
-
-    Attributes:
-        axes: axes in the order of the file.
-        one_at_a_time: whether the settings are the base and each axis alone; else all combinations.
-        origins: origin of the values of each dotted key, for messages.
-    """
+    """Axes of a study."""
 
     axes: tuple[Axis, ...] = ()
+    """Axes in the order of the file."""
     one_at_a_time: bool = False
+    """Whether the settings are the base and each axis alone; else all combinations."""
     origins: Mapping[str, str] = field(default_factory=dict)
+    """Origin of the values of each dotted key, for messages."""
 
     @property
     def keys(self) -> tuple[str, ...]:

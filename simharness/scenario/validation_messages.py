@@ -106,19 +106,16 @@ def section_at(location: Sequence[str | int], root: type[BaseModel] = ScenarioFi
 
 @dataclass(frozen=True)
 class _List:
-    """Type of a list in a scenario file.
-
-    Attributes:
-        elements: types of the elements; one type of a list of any length.
-        names: names of the elements of a list of fixed length; () where they have none.
-        fixed: whether the length is fixed.
-        default: default of the field, where the list is the field's whole value.
-    """
+    """Type of a list in a scenario file."""
 
     elements: tuple[Any, ...]
+    """Types of the elements; one type of a list of any length."""
     names: tuple[str, ...]
+    """Names of the elements of a list of fixed length; () where they have none."""
     fixed: bool
+    """Whether the length is fixed."""
     default: Any = None
+    """Default of the field, where the list is the field's whole value."""
 
     def example(self, given: Any) -> str:
         """Return a valid value as TOML-like text, with as much of the given value as possible."""

@@ -39,30 +39,26 @@ _SEEN_OR_SELF_OCCLUDED = (Visibility.VISIBLE, Visibility.SELF_OCCLUDED)
 
 @dataclass(frozen=True)
 class Assessment:
-    """Scores and tables of one variant on one recording.
-
-    Attributes:
-        scores: all of :data:`simharness.scoring.catalogue.SCORES` except those of failures, in that order; None where
-            a score does not apply.
-        frames: a row for each frame: ``frame``, ``time`` (s); ``people``, ``estimates``, ``found``, ``missed``,
-            ``ghosts``; ``pcp`` (percent), ``mpjpe_mm``; ``pairs_correct``, ``pairs_wrong``, ``pairs_lost``,
-            ``violations``, ``merged``, ``split``; ``phantoms`` and the number of them that were ``admitted``; and
-            ``time_affinity_ms``, ``time_matching_ms``, ``time_reconstruction_ms``, ``time_ms``. Null, never NaN,
-            where a column does not apply.
-        people: a row for each frame and true person present in it: ``frame``, ``person``; ``found``, ``error_mm``
-            (mean over joints), ``pcp`` (percent); ``worst_joint``, the name of the estimated joint with the largest
-            error, and that error, ``worst_mm``; ``visible_views``, the number of views in which at least half of the
-            joints are visible or self-occluded. Errors are null where the person is missed.
-        errors: errors of all joints of all true people, (T, P, 17), metres: infinite where the estimate is missing, NaN
-            where the truth is. Input of :func:`simharness.scoring.joint_errors.pck`.
-        variant_scores: scores of every frame, for summaries.
-    """
+    """Scores and tables of one variant on one recording."""
 
     scores: Scores
+    """All of :data:`simharness.scoring.catalogue.SCORES` except those of failures, in that order; None where a score
+    does not apply."""
     frames: pl.DataFrame
+    """a row for each frame: ``frame``, ``time`` (s); ``people``, ``estimates``, ``found``, ``missed``, ``ghosts``;
+    ``pcp`` (percent), ``mpjpe_mm``; ``pairs_correct``, ``pairs_wrong``, ``pairs_lost``, ``violations``, ``merged``,
+    ``split``; ``phantoms`` and the number of them that were ``admitted``; and ``time_affinity_ms``,
+    ``time_matching_ms``, ``time_reconstruction_ms``, ``time_ms``. Null, never NaN, where a column does not apply."""
     people: pl.DataFrame
+    """a row for each frame and true person present in it: ``frame``, ``person``; ``found``, ``error_mm`` (mean over
+    joints), ``pcp`` (percent); ``worst_joint``, the name of the estimated joint with the largest error, and that error,
+    ``worst_mm``; ``visible_views``, the number of views in which at least half of the joints are visible or
+    self-occluded. Errors are null where the person is missed."""
     errors: Floats
+    """Errors of all joints of all true people, (T, P, 17), metres: infinite where the estimate is missing, NaN where
+    the truth is. Input of :func:`simharness.scoring.joint_errors.pck`."""
     variant_scores: VariantScores
+    """Scores of every frame, for summaries."""
 
 
 def assess(recording: Recording, estimates: Sequence[Estimate], *, whole: WholeBodyInput | None = None) -> Assessment:

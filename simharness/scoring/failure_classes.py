@@ -59,23 +59,20 @@ class FailureKind(StrEnum):
 
 @dataclass(frozen=True)
 class Failure:
-    """Wrong person or ghost in one frame.
-
-    Attributes:
-        frame: index of the frame.
-        person: index of the true person; -1 for a ghost.
-        estimate: index of the estimate paired with the person, or of the ghost; -1 where the person has no estimate.
-        kind: class of the failure.
-        joints: indices of the displaced joints in COCO-17; empty where the person has no estimate.
-        error_mm: mean error of the joints that the pair shares, mm; None without a pair.
-    """
+    """Wrong person or ghost in one frame."""
 
     frame: int
+    """Index of the frame."""
     person: int
+    """Index of the true person; -1 for a ghost."""
     estimate: int
+    """Index of the estimate paired with the person, or of the ghost; -1 where the person has no estimate."""
     kind: FailureKind
+    """Class of the failure."""
     joints: tuple[int, ...]
+    """Indices of the displaced joints in COCO-17; empty where the person has no estimate."""
     error_mm: float | None
+    """Mean error of the joints that the pair shares, mm; None without a pair."""
 
 
 def find_failures(recording: Recording, estimates: Sequence[Estimate]) -> list[Failure]:

@@ -23,17 +23,14 @@ WHOLE_BODY_SCORES = tuple(f"{limb}_{kind}" for limb in LIMBS for kind in ("mm", 
 
 @dataclass(frozen=True)
 class WholeBodyInput:
-    """True and estimated people of T frames on a skeleton with feet or hands.
-
-    Attributes:
-        skeleton: the skeleton of J joints.
-        truth: true joints, (T, P, J, 3), metres; NaN where undefined.
-        joints: joints of the estimates of each frame, (n, J, 3), metres; NaN where missing.
-    """
+    """True and estimated people of T frames on a skeleton with feet or hands."""
 
     skeleton: Skeleton
+    """The skeleton of J joints."""
     truth: Floats
+    """True joints, (T, P, J, 3), metres; NaN where undefined."""
     joints: Sequence[Floats]
+    """Joints of the estimates of each frame, (n, J, 3), metres; NaN where missing."""
 
 
 def whole_body_scores(given: WholeBodyInput | None, partner: NDArray[np.int64]) -> dict[str, float | None]:

@@ -25,26 +25,23 @@ _FACE = slice(0, 5)  # nose, eyes and ears in COCO17, from which the two head jo
 
 @dataclass(frozen=True)
 class FrameScores:
-    """Scores of a variant in F frames with P people, the same people in the same order in all of them.
-
-    Attributes:
-        parts: state of every part of every true person, :class:`simharness.scoring.pcp.Part`, (F, P, 10).
-        partner: estimate paired one to one with each true person, (F, P); -1 where the person is missed or absent.
-        errors: distance of every joint from the estimate of its pair, (F, P, J), metres; NaN without a pair, or where
-            the truth or the estimate lacks the joint.
-        error: MPJPE of each pair over the joints that both have, (F, P), metres; NaN without a pair.
-        present: which people are in the frame, that is have at least one defined joint, (F, P).
-        estimates: number of estimates, (F,).
-        matching: counts of pairs of detections of each frame, F; None where the true person of a detection is unknown.
-    """
+    """Scores of a variant in F frames with P people, the same people in the same order in all of them."""
 
     parts: NDArray[np.int8]
+    """State of every part of every true person, :class:`simharness.scoring.pcp.Part`, (F, P, 10)."""
     partner: Integers
+    """Estimate paired one to one with each true person, (F, P); -1 where the person is missed or absent."""
     errors: Floats
+    """Distance of every joint from the estimate of its pair, (F, P, J), metres; NaN without a pair, or where the truth
+    or the estimate lacks the joint."""
     error: Floats
+    """MPJPE of each pair over the joints that both have, (F, P), metres; NaN without a pair."""
     present: Bools
+    """Which people are in the frame, that is have at least one defined joint, (F, P)."""
     estimates: Integers
+    """Number of estimates, (F,)."""
     matching: tuple[PairCounts, ...] | None = None
+    """Counts of pairs of detections of each frame, F; None where the true person of a detection is unknown."""
 
     def __len__(self) -> int:
         return len(self.estimates)
@@ -103,15 +100,12 @@ class FrameScores:
 
 @dataclass(frozen=True)
 class HeadRule:
-    """Rule for the head joints of estimates.
-
-    Attributes:
-        mapping: mapping from COCO17 to the head of SHELF14.
-        filled: whether missing joints of the face are first completed from the others (:func:`fill_face`).
-    """
+    """Rule for the head joints of estimates."""
 
     mapping: HeadMapping
+    """Mapping from COCO17 to the head of SHELF14."""
     filled: bool = False
+    """Whether missing joints of the face are first completed from the others (:func:`fill_face`)."""
 
     def __str__(self) -> str:
         return f"{self.mapping}, filled" if self.filled else self.mapping

@@ -15,17 +15,14 @@ from mvpose.checks import as_array
 
 @dataclass(frozen=True)
 class PairCounts:
-    """Counts of pairs of detections in different views; the counts of frames can be added.
-
-    Attributes:
-        correct: matched pairs that show the same person.
-        wrong: matched pairs that do not show the same person.
-        lost: pairs of views in which a person is detected in both, but no pair of the person's detections is matched.
-    """
+    """Counts of pairs of detections in different views; the counts of frames can be added."""
 
     correct: int
+    """Matched pairs that show the same person."""
     wrong: int
+    """Matched pairs that do not show the same person."""
     lost: int
+    """Pairs of views in which a person is detected in both, but no pair of the person's detections is matched."""
 
     def __add__(self, other: "PairCounts") -> "PairCounts":
         return PairCounts(self.correct + other.correct, self.wrong + other.wrong, self.lost + other.lost)
@@ -69,20 +66,17 @@ def count_pairs(view: ArrayLike, labels: ArrayLike, person: ArrayLike) -> PairCo
 
 @dataclass(frozen=True)
 class GroupCounts:
-    """Counts of how the detections of a frame are grouped into people.
-
-    Attributes:
-        merged: groups with detections of two or more true people.
-        split: true people with matched detections in several groups, if no single group covers all views in which the
-            person has matched detections. So a second detection of a person in one view is no split.
-        phantoms: detections that show no person.
-        admitted: phantoms that are in a group.
-    """
+    """Counts of how the detections of a frame are grouped into people."""
 
     merged: int
+    """Groups with detections of two or more true people."""
     split: int
+    """True people with matched detections in several groups, if no single group covers all views in which the person
+    has matched detections. So a second detection of a person in one view is no split."""
     phantoms: int
+    """Detections that show no person."""
     admitted: int
+    """Phantoms that are in a group."""
 
 
 def count_groups(view: ArrayLike, labels: ArrayLike, person: ArrayLike) -> GroupCounts:

@@ -19,17 +19,14 @@ LIMIT = 0.5
 
 @dataclass(frozen=True)
 class Pairing:
-    """True people of one frame and the estimates paired with them.
-
-    Attributes:
-        estimate: index of the estimate paired with each true person, (P,); -1 where the person is missed or absent.
-        error: MPJPE of each pair over the joints that both have, (P,), metres; NaN without a pair.
-        present: which of the P people are in the frame, that is have at least one defined joint, (P,).
-    """
+    """True people of one frame and the estimates paired with them."""
 
     estimate: NDArray[np.int64]
+    """Index of the estimate paired with each true person, (P,); -1 where the person is missed or absent."""
     error: NDArray[np.float64]
+    """MPJPE of each pair over the joints that both have, (P,), metres; NaN without a pair."""
     present: NDArray[np.bool_]
+    """Which of the P people are in the frame, that is have at least one defined joint, (P,)."""
 
 
 def pair(truth: ArrayLike, estimate: ArrayLike, *, limit: float = LIMIT) -> Pairing:

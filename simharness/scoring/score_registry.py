@@ -40,49 +40,43 @@ Better = Literal["higher", "lower"]
 
 @dataclass(frozen=True)
 class ScoreInfo:
-    """Description of a score.
-
-    Attributes:
-        key: name of its column in tables.
-        title: short name for headings.
-        unit: unit; empty for none.
-        about: explanation in one line.
-        better: direction of better values.
-        digits: digits after the decimal point.
-        target: best value where neither the greatest nor the least is best: ``better`` is the direction towards it
-            from the usual side, and values beyond it are worse again.
-        tolerance: largest loss of its mean that a gate does not call a regression by default, in its unit; None: no
-            gate compares it.
-    """
+    """Description of a score."""
 
     key: str
+    """Name of its column in tables."""
     title: str
+    """Short name for headings."""
     unit: str
+    """Unit; empty for none."""
     about: str
+    """Explanation in one line."""
     better: Better
+    """Direction of better values."""
     digits: int
+    """Digits after the decimal point."""
     target: float | None = None
+    """Best value where neither the greatest nor the least is best: ``better`` is the direction towards it from the
+    usual side, and values beyond it are worse again."""
     tolerance: float | None = None
+    """Largest loss of its mean that a gate does not call a regression by default, in its unit; None: no gate compares
+    it."""
 
 
 @dataclass(frozen=True)
 class ScoreInput:
-    """Input of a registered score.
-
-    Attributes:
-        recording: T frames, with the truth of P people.
-        estimates: estimates of the variant, T.
-        truth: true joints, (T, P, 17, 3), metres.
-        paired: joints of the estimate that is paired with each true person, (T, P, 17, 3), metres; NaN where the person
-            is missed or the joint was not placed.
-        partner: index of that estimate, (T, P); -1 where the person is missed.
-    """
+    """Input of a registered score."""
 
     recording: "Recording"
+    """T frames, with the truth of P people."""
     estimates: "tuple[Estimate, ...]"
+    """Estimates of the variant, T."""
     truth: Floats
+    """True joints, (T, P, 17, 3), metres."""
     paired: Floats
+    """Joints of the estimate that is paired with each true person, (T, P, 17, 3), metres; NaN where the person is
+    missed or the joint was not placed."""
     partner: NDArray[np.int64]
+    """Index of that estimate, (T, P); -1 where the person is missed."""
 
 
 ScoreFunction = Callable[[ScoreInput], float | None]
@@ -91,17 +85,14 @@ GroupFunction = Callable[[ScoreInput], Mapping[str, float | None]]
 
 @dataclass(frozen=True)
 class ScoreGroup:
-    """Scores that one function computes.
-
-    Attributes:
-        infos: their descriptions.
-        compute: function that returns their values by key; it may return more.
-        module: name of the module that registers them.
-    """
+    """Scores that one function computes."""
 
     infos: tuple[ScoreInfo, ...]
+    """Their descriptions."""
     compute: GroupFunction
+    """Function that returns their values by key; it may return more."""
     module: str
+    """Name of the module that registers them."""
 
 
 _registered: dict[str, ScoreGroup] = {}  # by the key of the first score

@@ -18,19 +18,16 @@ STAGES = ("affinity", "matching", "reconstruction", "total")
 
 @dataclass(frozen=True)
 class VariantScores:
-    """Scores of one variant in all frames.
-
-    Attributes:
-        frames: scores of the frames.
-        timings: ``Estimate.timings`` of every timed frame, seconds by stage.
-        tracking: scores over time, where people are tracked: :mod:`simharness.scoring.tracking.identity_figures`.
-        whole_body: scores of feet and hands, where the detector reports them: :mod:`simharness.scoring.feet_and_hands`.
-    """
+    """Scores of one variant in all frames."""
 
     frames: FrameScores
+    """Scores of the frames."""
     timings: tuple[Mapping[str, float], ...] = ()
+    """``Estimate.timings`` of every timed frame, seconds by stage."""
     tracking: Mapping[str, Any] | None = None
+    """Scores over time, where people are tracked: :mod:`simharness.scoring.tracking.identity_figures`."""
     whole_body: Mapping[str, float | None] | None = None
+    """Scores of feet and hands, where the detector reports them: :mod:`simharness.scoring.feet_and_hands`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "timings", tuple(self.timings))

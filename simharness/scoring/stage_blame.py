@@ -48,17 +48,14 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True)
 class Blamed:
-    """Failure and the stage to blame.
-
-    Attributes:
-        failure: the failure.
-        stage: first stage whose replacement by the truth removes it.
-        matching_alone: whether true labels of the real detections remove it; None for a method that takes no labels.
-    """
+    """Failure and the stage to blame."""
 
     failure: Failure
+    """The failure."""
     stage: Stage
+    """First stage whose replacement by the truth removes it."""
     matching_alone: bool | None
+    """Whether true labels of the real detections remove it; None for a method that takes no labels."""
 
 
 _WHOLE_PERSON = (FailureKind.MISSED, FailureKind.MERGED, FailureKind.SPLIT)
@@ -176,15 +173,12 @@ def true_labels(detections: Detections, truth: Truth) -> Integers:
 
 @dataclass(frozen=True)
 class LabelledPipeline:
-    """Pipeline with given labels in place of affinity and matching.
-
-    Attributes:
-        labels: label of each detection of its input, (m,).
-        reconstruction: as in :class:`mvpose.Pipeline`.
-    """
+    """Pipeline with given labels in place of affinity and matching."""
 
     labels: Integers
+    """Label of each detection of its input, (m,)."""
     reconstruction: Callable[[Rays, Integers, Skeleton], Poses]
+    """As in :class:`mvpose.Pipeline`."""
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Reconstruct the labelled people of one frame."""

@@ -39,34 +39,28 @@ the scenario."""
 
 @dataclass(frozen=True)
 class Unit:
-    """Unit of work: a trial and its requested variants, which share the detections.
-
-    Attributes:
-        trial: identity of the trial.
-        scenario: resolved scenario at its seed.
-        variants: variants of the method.
-        stored: stored parts of the trial.
-    """
+    """Unit of work: a trial and its requested variants, which share the detections."""
 
     trial: str
+    """Identity of the trial."""
     scenario: Scenario
+    """Resolved scenario at its seed."""
     variants: tuple[str, ...]
+    """Variants of the method."""
     stored: StoredTrial = field(default_factory=StoredTrial)
+    """Stored parts of the trial."""
 
 
 @dataclass(frozen=True)
 class TrialSuccess:
-    """Result of a finished unit.
-
-    Attributes:
-        unit: the unit.
-        output: results by variant, and archives to be stored.
-        seconds: duration.
-    """
+    """Result of a finished unit."""
 
     unit: Unit
+    """The unit."""
     output: TrialOutput
+    """Results by variant, and archives to be stored."""
     seconds: float
+    """Duration."""
 
     @property
     def parts(self) -> "tuple[TrialSuccess]":
@@ -76,24 +70,21 @@ class TrialSuccess:
 
 @dataclass(frozen=True)
 class TrialFailure:
-    """Failure of a unit.
-
-    Attributes:
-        unit: the unit.
-        error: message of the error, one line.
-        traceback: traceback; empty where there is none.
-        final: whether the unit would fail in the same way again.
-        deaths: number of workers that died while they ran it.
-        alone: results of the variants one by one, in the order of the unit, at least one of them a failure; empty where
-            the variants were not tried one by one.
-    """
+    """Failure of a unit."""
 
     unit: Unit
+    """The unit."""
     error: str
+    """Message of the error, one line."""
     traceback: str
+    """Traceback; empty where there is none."""
     final: bool = False
+    """Whether the unit would fail in the same way again."""
     deaths: int = 0
+    """Number of workers that died while they ran it."""
     alone: "tuple[TrialSuccess | TrialFailure, ...]" = ()
+    """Results of the variants one by one, in the order of the unit, at least one of them a failure; empty where the
+    variants were not tried one by one."""
 
     @property
     def parts(self) -> "tuple[TrialSuccess | TrialFailure, ...]":

@@ -13,28 +13,22 @@ from simharness.trial.variant_result import VariantResult
 
 @dataclass(frozen=True)
 class StoredTrial:
-    """Stored parts of a trial.
-
-    Attributes:
-        archive: detections, and estimates by variant.
-        failures: tables of failures by variant, where the code that makes them has not changed.
-    """
+    """Stored parts of a trial."""
 
     archive: TrialArchive = field(default_factory=TrialArchive)
+    """Detections, and estimates by variant."""
     failures: Mapping[str, pl.DataFrame] = field(default_factory=dict)
+    """Tables of failures by variant, where the code that makes them has not changed."""
 
 
 @dataclass(frozen=True)
 class TrialOutput:
-    """Parts of a trial to be stored.
-
-    Attributes:
-        results: results by variant.
-        archive: detections if they were simulated in this run, and the estimates of these variants.
-    """
+    """Parts of a trial to be stored."""
 
     results: Mapping[str, VariantResult]
+    """Results by variant."""
     archive: TrialArchive = field(default_factory=TrialArchive)
+    """Detections if they were simulated in this run, and the estimates of these variants."""
 
 
 def run_stored_trial(scenario: Scenario, variants: Sequence[str], stored: StoredTrial | None = None) -> TrialOutput:

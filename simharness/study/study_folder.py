@@ -46,21 +46,18 @@ from simharness.trial.identity import entry_identity, estimator_code, trial_iden
 
 @dataclass(frozen=True)
 class PlannedTrial:
-    """A trial of a study.
-
-    Attributes:
-        setting: setting of the study.
-        seed: seed of the trial.
-        scenario: resolved scenario at that seed.
-        trial: identity of the trial. Several settings may resolve to the same trial.
-        entries: identity of the entry of each variant.
-    """
+    """A trial of a study."""
 
     setting: Setting
+    """Setting of the study."""
     seed: int
+    """Seed of the trial."""
     scenario: Scenario
+    """Resolved scenario at that seed."""
     trial: str
+    """Identity of the trial. Several settings may resolve to the same trial."""
     entries: Mapping[str, str]
+    """Identity of the entry of each variant."""
 
 
 def plan(study: Study) -> list[PlannedTrial]:
@@ -97,23 +94,20 @@ class Tables:
 
 @dataclass(frozen=True)
 class Results:
-    """Results of a study.
-
-    Attributes:
-        info: content of ``study.json``.
-        trials: a row for each trial and variant.
-        frames: a row for each trial, variant and frame.
-        people: a row for each trial, variant, frame and true person.
-        failures: a row for each failure.
-        folder: the result folder.
-    """
+    """Results of a study."""
 
     info: Mapping[str, Any]
+    """Content of ``study.json``."""
     trials: pl.DataFrame
+    """a row for each trial and variant."""
     frames: pl.DataFrame
+    """a row for each trial, variant and frame."""
     people: pl.DataFrame
+    """a row for each trial, variant, frame and true person."""
     failures: pl.DataFrame
+    """a row for each failure."""
     folder: Path
+    """The result folder."""
 
     def scenario_of(self, trial: str) -> Scenario:
         """Return the resolved scenario of a trial, with its seed.

@@ -27,44 +27,38 @@ _STUDY = "simharness study"
 
 @dataclass(frozen=True)
 class FailedTrial:
-    """Trial in which at least one variant could not be measured.
-
-    Attributes:
-        trial: identity of the trial.
-        case: case of its setting.
-        factors: factors of its setting.
-        seed: seed of the trial.
-        variants: missing variants.
-        error: message of the error, with the names of the variants unless all variants have the same error.
-    """
+    """Trial in which at least one variant could not be measured."""
 
     trial: str
+    """Identity of the trial."""
     case: str
+    """Case of its setting."""
     factors: Mapping[str, Value]
+    """Factors of its setting."""
     seed: int
+    """Seed of the trial."""
     variants: tuple[str, ...]
+    """Missing variants."""
     error: str
+    """Message of the error, with the names of the variants unless all variants have the same error."""
 
 
 @dataclass(frozen=True)
 class StudyOutcome:
-    """Numbers of kept, run and failed trials of a study.
-
-    Attributes:
-        trials: number of trials; a trial that several settings share counts once.
-        kept: number of trials that were finished before.
-        run: number of trials that were finished in this run.
-        failed: the failed trials. Their variants that were measured are stored.
-        damaged: damaged entries of the store, which were run again.
-        seconds: duration of the run.
-    """
+    """Numbers of kept, run and failed trials of a study."""
 
     trials: int
+    """Number of trials; a trial that several settings share counts once."""
     kept: int
+    """Number of trials that were finished before."""
     run: int
+    """Number of trials that were finished in this run."""
     failed: tuple[FailedTrial, ...]
+    """The failed trials. Their variants that were measured are stored."""
     damaged: tuple[str, ...]
+    """Damaged entries of the store, which were run again."""
     seconds: float
+    """Duration of the run."""
 
 
 class Interrupted(KeyboardInterrupt):

@@ -61,25 +61,22 @@ class EntryState(Enum):
 
 @dataclass(frozen=True)
 class Entry:
-    """Stored result of one variant in one trial.
-
-    Attributes:
-        trial: identity of the trial, :func:`simharness.trial.identity.trial_identity`.
-        variant: name of the variant.
-        result: scores and tables.
-        seconds: cost: the time of the trial divided by the number of variants that were measured together.
-        estimates: archive of the estimates; empty where they are not stored.
-        scores_code: digest of the code that scored them.
-        failures_code: digest of the code that found the failures.
-    """
+    """Stored result of one variant in one trial."""
 
     trial: str
+    """Identity of the trial, :func:`simharness.trial.identity.trial_identity`."""
     variant: str
+    """Name of the variant."""
     result: VariantResult
+    """Scores and tables."""
     seconds: float
+    """Cost: the time of the trial divided by the number of variants that were measured together."""
     estimates: bytes = b""
+    """Archive of the estimates; empty where they are not stored."""
     scores_code: str = field(default_factory=lambda: code().scores)
+    """Digest of the code that scored them."""
     failures_code: str = field(default_factory=lambda: code().failures)
+    """Digest of the code that found the failures."""
 
     @property
     def state(self) -> EntryState:
@@ -272,17 +269,14 @@ class Store:
 
 @dataclass(frozen=True)
 class MergeResult:
-    """Result of a merge.
-
-    Attributes:
-        copied: number of copied entries.
-        present: number of entries that were in the target before.
-        damaged: damaged files, which were not copied.
-    """
+    """Result of a merge."""
 
     copied: int
+    """Number of copied entries."""
     present: int
+    """Number of entries that were in the target before."""
     damaged: tuple[Path, ...]
+    """Damaged files, which were not copied."""
 
 
 def merge(sources: Sequence[Path], into: Path) -> MergeResult:

@@ -35,15 +35,12 @@ from simharness.trial.stages.detected_sequence import DetectedSequence
 
 @dataclass(frozen=True)
 class TrialArchive:
-    """Stored detections and estimates of a trial, so that it need not be simulated again.
-
-    Attributes:
-        detected: archive of detections and truth; empty where they cannot be restored.
-        estimates: archive of the estimates of each variant.
-    """
+    """Stored detections and estimates of a trial, so that it need not be simulated again."""
 
     detected: bytes = b""
+    """Archive of detections and truth; empty where they cannot be restored."""
     estimates: dict[str, bytes] = field(default_factory=dict)
+    """Archive of the estimates of each variant."""
 
 
 def pack_detected(detected: DetectedSequence) -> bytes:

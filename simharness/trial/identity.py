@@ -83,19 +83,16 @@ _SIZE = 16  # bytes of a digest, so that no two trials share one by chance
 
 @dataclass(frozen=True)
 class Code:
-    """Digests of the code that makes results, hexadecimal.
-
-    Attributes:
-        simulation: of the folders :data:`SIMULATION` and :data:`BORROWED`.
-        method: of ``mvpose`` without :data:`BESIDE_THE_METHOD`.
-        scores: of the folders :data:`SCORES`.
-        failures: of the folders :data:`FAILURES`.
-    """
+    """Digests of the code that makes results, hexadecimal."""
 
     simulation: str
+    """Of the folders :data:`SIMULATION` and :data:`BORROWED`."""
     method: str
+    """Of ``mvpose`` without :data:`BESIDE_THE_METHOD`."""
     scores: str
+    """Of the folders :data:`SCORES`."""
     failures: str
+    """Of the folders :data:`FAILURES`."""
 
 
 @functools.cache

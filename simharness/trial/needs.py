@@ -33,23 +33,20 @@ _LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_b
 
 @dataclass(frozen=True)
 class Needs:
-    """Estimated needs of a trial.
-
-    Attributes:
-        frames: number of frames.
-        views: number of cameras.
-        pictures: number of pictures, rendered or not.
-        memory: greatest memory of the process, bytes.
-        seconds: time on one core.
-        disk: results on disk, bytes.
-    """
+    """Estimated needs of a trial."""
 
     frames: int
+    """Number of frames."""
     views: int
+    """Number of cameras."""
     pictures: int
+    """Number of pictures, rendered or not."""
     memory: float
+    """Greatest memory of the process, bytes."""
     seconds: float
+    """Time on one core."""
     disk: float
+    """Results on disk, bytes."""
 
 
 def needs_of(scenario: Scenario) -> Needs:

@@ -77,29 +77,26 @@ _WHAT = "a file of a run"
 
 @dataclass(frozen=True)
 class Record:
-    """Complete run: input, truth, estimates and scores.
-
-    Attributes:
-        scenario: the resolved scenario.
-        rig: the believed cameras.
-        time: time of each frame, (T,), seconds.
-        detections: detections of each frame, T.
-        truth: truth of each frame, T.
-        estimates: estimates of each variant for each frame, T.
-        scores: a row for each frame and variant.
-        summary: the headline scores.
-        whole_body: arrays of people with feet and hands, as in `whole_body.npz`; empty where there are none.
-    """
+    """Complete run: input, truth, estimates and scores."""
 
     scenario: Scenario
+    """The resolved scenario."""
     rig: Rig
+    """The believed cameras."""
     time: NDArray[np.float64]
+    """Time of each frame, (T,), seconds."""
     detections: tuple[Detections, ...]
+    """Detections of each frame, T."""
     truth: tuple[Truth, ...]
+    """Truth of each frame, T."""
     estimates: Mapping[str, tuple[Estimate, ...]]
+    """Estimates of each variant for each frame, T."""
     scores: pl.DataFrame
+    """a row for each frame and variant."""
     summary: Mapping[str, Any]
+    """The headline scores."""
     whole_body: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    """Arrays of people with feet and hands, as in `whole_body.npz`; empty where there are none."""
 
     def __post_init__(self) -> None:
         counts = {len(self.time), len(self.detections), len(self.truth), *map(len, self.estimates.values())}

@@ -46,44 +46,38 @@ _GOALS: tuple[str, ...] = get_args(Goal)
 
 @dataclass(frozen=True)
 class Known:
-    """Results of stages that need not run again.
-
-    Attributes:
-        detected: detections and truth of the trial; None where they have to be simulated.
-        estimates: estimates by variant. They need the detections that they were made from.
-        failures: table of failures by variant, from the last requested stage.
-    """
+    """Results of stages that need not run again."""
 
     detected: DetectedSequence | None = None
+    """Detections and truth of the trial; None where they have to be simulated."""
     estimates: Mapping[str, Sequence[Estimate]] = field(default_factory=dict)
+    """Estimates by variant. They need the detections that they were made from."""
     failures: Mapping[str, pl.DataFrame] = field(default_factory=dict)
+    """Table of failures by variant, from the last requested stage."""
 
 
 @dataclass(frozen=True)
 class TrialResult:
-    """Result of a trial up to its goal.
-
-    Attributes:
-        scenario: the resolved scenario at its seed.
-        detected: detections, which the method was given, and the truth.
-        simulation: scene and views from which detections were made; None where detections were known.
-        pipelines: variants of the method by name.
-        estimates: estimates of each variant, one for each frame; empty before the goal ``estimate``.
-        whole: the same people with feet and hands, where the detector reports them; empty otherwise.
-        assessments: scores of each variant; empty before the goal ``score``.
-        failures: table of failures of each variant; empty before the goal ``classify``.
-        seconds: duration of each stage that ran.
-    """
+    """Result of a trial up to its goal."""
 
     scenario: Scenario
+    """The resolved scenario at its seed."""
     detected: DetectedSequence
+    """Detections, which the method was given, and the truth."""
     simulation: Simulation | None
+    """Scene and views from which detections were made; None where detections were known."""
     pipelines: Mapping[str, Estimator] = field(default_factory=dict)
+    """Variants of the method by name."""
     estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
+    """Estimates of each variant, one for each frame; empty before the goal ``estimate``."""
     whole: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
+    """The same people with feet and hands, where the detector reports them; empty otherwise."""
     assessments: Mapping[str, Assessment] = field(default_factory=dict)
+    """Scores of each variant; empty before the goal ``score``."""
     failures: Mapping[str, pl.DataFrame] = field(default_factory=dict)
+    """Table of failures of each variant; empty before the goal ``classify``."""
     seconds: Mapping[str, float] = field(default_factory=dict)
+    """Duration of each stage that ran."""
 
     @property
     def trial(self) -> Trial:

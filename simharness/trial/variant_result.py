@@ -11,20 +11,18 @@ import polars as pl
 class VariantResult:
     """Scores and tables of one variant of the method in one trial.
 
-    Attributes:
-        scores: by the keys of :data:`simharness.scoring.catalogue.SCORES`; None where a score does not apply.
-        frames: a row for each frame.
-        people: a row for each frame and true person.
-        failures: a row for each failure, with its kind and the stage to blame.
-
     Raises:
         ValueError: a score that is not finite.
     """
 
     scores: Mapping[str, float | None]
+    """By the keys of :data:`simharness.scoring.catalogue.SCORES`; None where a score does not apply."""
     frames: pl.DataFrame
+    """a row for each frame."""
     people: pl.DataFrame
+    """a row for each frame and true person."""
     failures: pl.DataFrame
+    """a row for each failure, with its kind and the stage to blame."""
 
     def __post_init__(self) -> None:
         if wrong := [key for key, score in self.scores.items() if score is not None and not math.isfinite(score)]:

@@ -24,16 +24,14 @@ _ROUNDING = 1e-6  # metres: closer points are the same
 class Floor:
     """Simple polygon on the floor.
 
-    Attributes:
-        outline: corners, (n, 2), metres; counter-clockwise, in whichever order they are given. The last one is joined
-            to the first.
-
     Raises:
         ValueError: fewer than three different corners, corners that are not finite or far away, sides that cross or
             touch, or no area.
     """
 
     outline: Floats
+    """Corners, (n, 2), metres; counter-clockwise, in whichever order they are given. The last one is joined to the
+    first."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outline", simple_outline(self.outline))
@@ -123,14 +121,12 @@ class Floor:
 class Volume(Floor):
     """Upright prism: a room, or the part of a room that cameras have to see.
 
-    Attributes:
-        height: height over the floor, metres.
-
     Raises:
         ValueError: see :class:`Floor`, or a height that is not positive.
     """
 
     height: float = HEIGHT
+    """Height over the floor, metres."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -23,20 +23,18 @@ class Panorama:
     It lights nothing (that is the sky of :class:`~simharness.types.lighting.LightSources`), and pixels that show
     it have neither depth nor id.
 
-    Attributes:
-        draw: function that returns the picture, sRGB, (h, w, 3) uint8: the azimuth grows with the column, from that of
-            -x counter-clockwise as seen from above once around, the elevation falls with the row from the zenith to
-            ``lowest``. It is called when a picture first shows the panorama.
-        emission: radiance that white in this picture stands for, linear RGB.
-        lowest: elevation of the lower edge, radians; below it, directions show the lowest row.
-
     Raises:
         ValueError: a lower edge that is not below the zenith, or a picture of another shape or type.
     """
 
     draw: Callable[[], NDArray[np.uint8]]
+    """Function that returns the picture, sRGB, (h, w, 3) uint8: the azimuth grows with the column, from that of -x
+    counter-clockwise as seen from above once around, the elevation falls with the row from the zenith to ``lowest``. It
+    is called when a picture first shows the panorama."""
     emission: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Radiance that white in this picture stands for, linear RGB."""
     lowest: float = -np.pi / 2
+    """Elevation of the lower edge, radians; below it, directions show the lowest row."""
 
     def __post_init__(self) -> None:
         if not -np.pi / 2 <= self.lowest < np.pi / 2:
@@ -78,26 +76,24 @@ class AreaLight:
     It lights the scene and does not show itself: what a camera sees of it is a mesh with ``Mesh.emission``. It casts no
     shadow, and light passes it from behind.
 
-    Attributes:
-        center: middle of the rectangle, metres.
-        right: from the middle to the middle of one side, metres.
-        up: from the middle to the middle of a neighbouring side, metres, perpendicular to ``right``. Light goes to the
-            side of ``right x up``.
-        radiance: radiance straight ahead.
-        focus: the radiance in a direction at an angle a to straight ahead is ``cos(a) ** focus`` of it: 0 for a panel
-            or a window, about 10 for a wide spot, 60 for a narrow one.
-        kind: "lamp", or "window": sunlight enters through windows.
-
     Raises:
         ValueError: a wrong shape or value.
     """
 
     center: Vector
+    """Middle of the rectangle, metres."""
     right: Vector
+    """From the middle to the middle of one side, metres."""
     up: Vector
+    """From the middle to the middle of a neighbouring side, metres, perpendicular to ``right``. Light goes to the side
+    of ``right x up``."""
     radiance: Vector
+    """Radiance straight ahead."""
     focus: float = 0.0
+    """The radiance in a direction at an angle a to straight ahead is ``cos(a) ** focus`` of it: 0 for a panel or a
+    window, about 10 for a wide spot, 60 for a narrow one."""
     kind: Literal["lamp", "window"] = "lamp"
+    """"lamp", or "window": sunlight enters through windows."""
 
     def __post_init__(self) -> None:
         _check_vectors(self, ("center", "right", "up", "radiance"))
@@ -129,16 +125,14 @@ class AreaLight:
 class Sun:
     """The sun. It shines where nothing is in its way: outdoors, and through windows.
 
-    Attributes:
-        direction: vector to the sun, of any length except 0; stored as a unit vector.
-        irradiance: irradiance of a surface that faces it.
-
     Raises:
         ValueError: a wrong shape or value, or a sun below the horizon.
     """
 
     direction: Vector
+    """Vector to the sun, of any length except 0; stored as a unit vector."""
     irradiance: Vector
+    """Irradiance of a surface that faces it."""
 
     def __post_init__(self) -> None:
         _check_vectors(self, ("direction", "irradiance"))
@@ -155,23 +149,21 @@ class Sun:
 class LightSources:
     """All sources of light of a scene, and how the cameras expose it.
 
-    Attributes:
-        areas: area lights.
-        sun: the sun, if it shines.
-        sky: radiance of the sky: what reaches a surface from directions in which nothing is in the way.
-        brightness: mean light of the scene in pictures, after automatic exposure: 1 shows an albedo about as bright as
-            it is. All sources are scaled to it together, so that only the ratios of their strengths matter.
-        balance: share by which automatic white balance removes the mean colour of the light, 0 to 1.
-
     Raises:
         ValueError: a wrong shape or value, or no light at all.
     """
 
     areas: tuple[AreaLight, ...] = ()
+    """Area lights."""
     sun: Sun | None = None
+    """The sun, if it shines."""
     sky: Vector = (0.0, 0.0, 0.0)
+    """Radiance of the sky: what reaches a surface from directions in which nothing is in the way."""
     brightness: float = 1.0
+    """Mean light of the scene in pictures, after automatic exposure: 1 shows an albedo about as bright as it is. All
+    sources are scaled to it together, so that only the ratios of their strengths matter."""
     balance: float = 0.7
+    """Share by which automatic white balance removes the mean colour of the light, 0 to 1."""
 
     def __post_init__(self) -> None:
         _check_vectors(self, ("sky",))
@@ -207,32 +199,29 @@ class Lighting:
     ``tint`` times its albedo; sRGB is approximated as the square root of linear light. Light of 1 shows the albedo
     unchanged, and brighter values are clipped.
 
-    Attributes:
-        direction: vector to the key light, of any length except 0; stored as a unit vector.
-        key: strength of the key light, which is far away (parallel rays).
-        sky: strength of the ambient light, most of it from above.
-        fill: strength of the light at the camera, which keeps surfaces in shadow from looking flat.
-        tint: colour of all light, linear, 0 to 1.
-        background: sRGB of pixels that show no surface, 0 to 1; light does not change it.
-        panorama: what these pixels show instead, as bright as light of 1 makes it without ``sources``; None for
-            ``background``.
-        sources: lamps, windows, sun and sky; None for the lighting in closed form.
-        mirror: mirror in which the meshes of the picture are reflected; ``sources`` are those before it.
-
     Raises:
         ValueError: a wrong shape, a direction of length 0 or below the horizon, a negative strength, or a colour
             outside 0..1.
     """
 
     direction: Vector = (0.38, 0.24, 0.89)  # high above, so that shadows are short
+    """Vector to the key light, of any length except 0; stored as a unit vector."""
     key: float = 0.62
+    """Strength of the key light, which is far away (parallel rays)."""
     sky: float = 0.40
+    """Strength of the ambient light, most of it from above."""
     fill: float = 0.12
+    """Strength of the light at the camera, which keeps surfaces in shadow from looking flat."""
     tint: Vector = (1.0, 1.0, 1.0)
+    """Colour of all light, linear, 0 to 1."""
     background: Vector = (0.82, 0.85, 0.88)
+    """SRGB of pixels that show no surface, 0 to 1; light does not change it."""
     sources: LightSources | None = None
+    """Lamps, windows, sun and sky; None for the lighting in closed form."""
     mirror: Mirror | None = None
+    """Mirror in which the meshes of the picture are reflected; ``sources`` are those before it."""
     panorama: Panorama | None = None
+    """What these pixels show instead, as bright as light of 1 makes it without ``sources``; None for ``background``."""
 
     def __post_init__(self) -> None:
         for entry in fields(self):

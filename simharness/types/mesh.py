@@ -34,25 +34,23 @@ class Finish:
     another vertex, towards which it points, so that it follows every pose. Where cloth becomes shorter along its grain
     than at rest, it folds.
 
-    Attributes:
-        materials: :class:`Material` of every face, (k,) int8.
-        toward: vertex to which the grain of each vertex points, itself where there is none, (n,) int32.
-        rest: distance to it at rest, metres, (n,) float32.
-        place: coordinate of the pattern, metres, (n,) float32: of hair across the strands, from 0 to ``around`` once
-            around the head; of cloth along the grain.
-        looseness: how deep cloth folds: 0 not at all, 1 as loose clothes, (n,) float32.
-        around: period of ``place``, metres.
-
     Raises:
         ValueError: a wrong shape, or a vertex that does not exist.
     """
 
     materials: NDArray[np.int8]
+    """:class:`Material` of every face, (k,) int8."""
     toward: NDArray[np.int32]
+    """Vertex to which the grain of each vertex points, itself where there is none, (n,) int32."""
     rest: NDArray[np.float32]
+    """Distance to it at rest, metres, (n,) float32."""
     place: NDArray[np.float32]
+    """Coordinate of the pattern, metres, (n,) float32: of hair across the strands, from 0 to ``around`` once around the
+    head; of cloth along the grain."""
     looseness: NDArray[np.float32]
+    """How deep cloth folds: 0 not at all, 1 as loose clothes, (n,) float32."""
     around: float = 0.6
+    """Period of ``place``, metres."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "materials", as_array(self.materials, ("k",), "materials", np.int8))
@@ -72,24 +70,6 @@ class Mesh:
 
     Faces are opaque from both sides, so a board may be a single sheet and a room may be seen from inside.
 
-    Attributes:
-        vertices: positions in metres, (n, 3) float32.
-        faces: vertex indices, (k, 3) int32, counter-clockwise as seen from outside.
-        colors: sRGB albedo of each face, 0 to 1, (k, 3) float32.
-        smooth: whether normals are interpolated over the faces (skin) or constant per face (boxes).
-        texture: image that multiplies ``colors``, sRGB, (h, w, 3) uint8; None for plain faces.
-        uv: texture coordinates of the three corners of each face, (k, 3, 2) float32: u to the right and v down, the
-            whole texture from 0 to 1; outside this range it repeats. Required with a texture, forbidden without.
-        parts: label of each face, -1 for none, (k,) int8; for a body the
-            :class:`simharness.world.humans.anatomy.Segment`. None if no face has a label.
-        still: whether the mesh stays where it is as long as the scene lasts: renderers draw it once for each camera
-            that stays too.
-        emission: radiance that the surface sends out, linear RGB, multiplied by ``colors`` and ``texture``: what a
-            picture shows of a lamp or a window. It lights nothing else (that is an
-            :class:`~simharness.types.lighting.AreaLight`), and only lighting with ``sources`` shows it.
-        finish: materials of the faces, and grain of hair and cloth. It changes colours alone, of moving meshes, in
-            lighting with ``sources``; None for a matte surface.
-
     Raises:
         ValueError: a wrong shape, a vertex or texture coordinate that is not finite, a face that refers to a missing
             vertex, a colour outside 0..1, a texture without pixels, an emission below 0, one of ``texture`` and
@@ -97,15 +77,31 @@ class Mesh:
     """
 
     vertices: NDArray[np.float32]
+    """Positions in metres, (n, 3) float32."""
     faces: NDArray[np.int32]
+    """Vertex indices, (k, 3) int32, counter-clockwise as seen from outside."""
     colors: NDArray[np.float32]
+    """SRGB albedo of each face, 0 to 1, (k, 3) float32."""
     smooth: bool = False
+    """Whether normals are interpolated over the faces (skin) or constant per face (boxes)."""
     texture: NDArray[np.uint8] | None = None
+    """Image that multiplies ``colors``, sRGB, (h, w, 3) uint8; None for plain faces."""
     uv: NDArray[np.float32] | None = None
+    """Texture coordinates of the three corners of each face, (k, 3, 2) float32: u to the right and v down, the whole
+    texture from 0 to 1; outside this range it repeats. Required with a texture, forbidden without."""
     parts: NDArray[np.int8] | None = None
+    """Label of each face, -1 for none, (k,) int8; for a body the :class:`simharness.world.humans.anatomy.Segment`. None
+    if no face has a label."""
     still: bool = False
+    """Whether the mesh stays where it is as long as the scene lasts: renderers draw it once for each camera that stays
+    too."""
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Radiance that the surface sends out, linear RGB, multiplied by ``colors`` and ``texture``: what a picture shows
+    of a lamp or a window. It lights nothing else (that is an :class:`~simharness.types.lighting.AreaLight`), and only
+    lighting with ``sources`` shows it."""
     finish: Finish | None = None
+    """Materials of the faces, and grain of hair and cloth. It changes colours alone, of moving meshes, in lighting with
+    ``sources``; None for a matte surface."""
 
     def __post_init__(self) -> None:
         vertices = _checked_vertices(self.vertices, "n")

@@ -10,17 +10,14 @@ from mvpose.arrays import Floats
 
 @dataclass(frozen=True)
 class Mirror:
-    """Glass of an upright mirror.
-
-    Attributes:
-        center: centre of the glass, (3,), metres.
-        normal: horizontal unit vector towards the reflecting side, (3,).
-        half: half the width and half the height, metres.
-    """
+    """Glass of an upright mirror."""
 
     center: tuple[float, float, float]
+    """Centre of the glass, (3,), metres."""
     normal: tuple[float, float, float]
+    """Horizontal unit vector towards the reflecting side, (3,)."""
     half: tuple[float, float]
+    """Half the width and half the height, metres."""
 
     def in_front(self, points: ArrayLike) -> Floats:
         """Return the signed distance of points (..., 3) to the plane of the glass, (...) metres; positive in front."""

@@ -16,16 +16,13 @@ from mvpose.wholebody.estimator import rows_of
 
 @dataclass(frozen=True)
 class OuterViews:
-    """Outer joints in the pictures that V cameras deliver: E joints of a skeleton beyond COCO17, in T frames.
-
-    Attributes:
-        pixels: pixel of each joint, (T, V, P, E, 2); NaN behind the camera, of absent people, in pictures that never
-            arrive, and of joints that the body model does not have.
-        visibility: :class:`simharness.types.views.Visibility`, (T, V, P, E) int8; OUTSIDE where the pixel is unknown.
-    """
+    """Outer joints in the pictures that V cameras deliver: E joints of a skeleton beyond COCO17, in T frames."""
 
     pixels: Floats
+    """Pixel of each joint, (T, V, P, E, 2); NaN behind the camera, of absent people, in pictures that never arrive, and
+    of joints that the body model does not have."""
     visibility: NDArray[np.int8]
+    """:class:`simharness.types.views.Visibility`, (T, V, P, E) int8; OUTSIDE where the pixel is unknown."""
 
     def __post_init__(self) -> None:
         set_arrays(self, pixels=("T", "V", "P", "E", 2), visibility=(("T", "V", "P", "E"), np.int8))
@@ -38,34 +35,28 @@ class OuterViews:
 
 @dataclass(frozen=True)
 class OuterTruth:
-    """True outer joints of a sequence.
-
-    Attributes:
-        skeleton: skeleton whose joints beyond COCO17 they are.
-        joints: in the world, (T, P, E, 3), metres; NaN of absent people and of joints that the body model does not
-            have.
-        views: the same joints in the pictures.
-    """
+    """True outer joints of a sequence."""
 
     skeleton: Skeleton
+    """Skeleton whose joints beyond COCO17 they are."""
     joints: Floats
+    """In the world, (T, P, E, 3), metres; NaN of absent people and of joints that the body model does not have."""
     views: OuterViews
+    """The same joints in the pictures."""
 
 
 @dataclass(frozen=True)
 class WholeFrame:
     """Detections and truth of one frame on a skeleton with feet and hands.
 
-    Attributes:
-        detections: the detections of the frame, in the order and with the body of those on COCO17.
-        joints: true joints, (P, J, 3), metres; NaN of absent people and of joints that the body model does not have.
-
     Raises:
         ValueError: joints of another skeleton than the detections.
     """
 
     detections: Detections
+    """The detections of the frame, in the order and with the body of those on COCO17."""
     joints: Floats
+    """True joints, (P, J, 3), metres; NaN of absent people and of joints that the body model does not have."""
 
     def __post_init__(self) -> None:
         set_arrays(self, joints=("P", len(self.detections.skeleton), 3))

@@ -19,21 +19,19 @@ _BEYOND = 1.0  # seconds before the first frame or after the last, at most
 class Recording:
     """Input of every variant of the method, and the truth that only the scorer sees.
 
-    Attributes:
-        time: times of the frames, (T,), seconds, evenly spaced.
-        rig: believed rig, V cameras: the calibration that the method is given.
-        detections: detections that the method is given, one for each frame.
-        truth: ground truth, one for each frame, all of the same P people in the same order. Its pixels are those of the
-            true rig.
-
     Raises:
         ValueError: no frame, different lengths, a skeleton other than COCO-17, or frames of different people.
     """
 
     time: NDArray[np.float64]
+    """Times of the frames, (T,), seconds, evenly spaced."""
     rig: Rig
+    """Believed rig, V cameras: the calibration that the method is given."""
     detections: tuple[Detections, ...]
+    """Detections that the method is given, one for each frame."""
     truth: tuple[Truth, ...]
+    """Ground truth, one for each frame, all of the same P people in the same order. Its pixels are those of the true
+    rig."""
 
     def __post_init__(self) -> None:
         for key in ("detections", "truth"):

@@ -29,21 +29,19 @@ LANDMARKS: tuple[str, ...] = (*COCO17.joints, "head_bottom", "head_top", "neck",
 class Sequence:
     """Ground truth of T frames with P people; P may be 0.
 
-    Attributes:
-        landmarks: positions of ``simharness.types.sequence.LANDMARKS`` in the world, (T, P, L, 3), metres; finite in
-            all frames: an absent person waits somewhere outside of the scene.
-        ids: numbers of the people, (P,) int.
-        time: times of the frames, (T,), seconds.
-        present: who is in the scene in each frame, (T, P); by default everyone in all frames.
-
     Raises:
         ValueError: a wrong shape or a value that is not finite.
     """
 
     landmarks: Floats
+    """Positions of ``simharness.types.sequence.LANDMARKS`` in the world, (T, P, L, 3), metres; finite in all frames: an
+    absent person waits somewhere outside of the scene."""
     ids: NDArray[np.int64]
+    """Numbers of the people, (P,) int."""
     time: Floats
+    """Times of the frames, (T,), seconds."""
     present: Bools = field(default_factory=lambda: np.zeros((0, 0), bool))
+    """Who is in the scene in each frame, (T, P); by default everyone in all frames."""
 
     def __post_init__(self) -> None:
         time = as_array(self.time, ("T",), "sequence time")

@@ -27,23 +27,20 @@ GOOD_BELOW, MISS_FROM = 1.14, 2.35
 
 @dataclass(frozen=True)
 class Truth:
-    """Ground truth of one frame: known to the scorer, never given to the method.
-
-    Attributes:
-        joints: COCO-17 joints in the world, (P, J, 3), metres; NaN of a person who is absent in the frame.
-        pixels: projections of the joints, (V, P, J, 2); NaN behind the camera, and of absent people.
-        visibility: :class:`simharness.types.views.Visibility`, (V, P, J); OUTSIDE of absent people.
-        boxes: x, y, width, height of each whole silhouette inside the image, (V, P, 4); zeros if it is outside.
-        person: true person of each detection of the frame, (m,), -1 for a phantom.
-        error: :class:`KeypointError` of each detected keypoint, (m, J).
-    """
+    """Ground truth of one frame: known to the scorer, never given to the method."""
 
     joints: NDArray[np.float64]
+    """COCO-17 joints in the world, (P, J, 3), metres; NaN of a person who is absent in the frame."""
     pixels: NDArray[np.float64]
+    """Projections of the joints, (V, P, J, 2); NaN behind the camera, and of absent people."""
     visibility: NDArray[np.int8]
+    """:class:`simharness.types.views.Visibility`, (V, P, J); OUTSIDE of absent people."""
     boxes: NDArray[np.float64]
+    """x, y, width, height of each whole silhouette inside the image, (V, P, 4); zeros if it is outside."""
     person: NDArray[np.int64]
+    """True person of each detection of the frame, (m,), -1 for a phantom."""
     error: NDArray[np.int8]
+    """:class:`KeypointError` of each detected keypoint, (m, J)."""
 
     @property
     def present(self) -> NDArray[np.bool_]:

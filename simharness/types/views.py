@@ -24,17 +24,14 @@ class Visibility(IntEnum):
 
 @dataclass(frozen=True)
 class LookalikeViews:
-    """Lookalikes in the pictures (:mod:`simharness.world.scene.lookalikes`); their number D may be 0.
-
-    Attributes:
-        names: names of the lookalikes, (D,).
-        pixels: pixels of their joints, (T, V, D, J, 2); NaN behind the camera.
-        visible: whether each joint is visible: inside the picture and not occluded, (T, V, D, J).
-    """
+    """Lookalikes in the pictures (:mod:`simharness.world.scene.lookalikes`); their number D may be 0."""
 
     names: tuple[str, ...] = ()
+    """Names of the lookalikes, (D,)."""
     pixels: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0, 0, 17, 2)))
+    """Pixels of their joints, (T, V, D, J, 2); NaN behind the camera."""
     visible: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0, 0, 17), bool))
+    """Whether each joint is visible: inside the picture and not occluded, (T, V, D, J)."""
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -53,26 +50,24 @@ class Views:
 
     A picture that never arrives has NaN pixels, visibility OUTSIDE and boxes of zeros, and so has a person who is
     absent while the picture is taken.
-
-    Attributes:
-        pixels: pixel of each joint, (T, V, P, J, 2); NaN behind the camera.
-        visibility: :class:`simharness.types.views.Visibility`, (T, V, P, J) int8.
-        boxes: x, y, width, height in pixels of the part of each silhouette inside the image, occlusion ignored,
-            (T, V, P, 4); zeros if no part is inside.
-        area_visible: number of pixels that show each person, (T, V, P).
-        source: frame in which the delivered picture was taken, (T, V): the frame itself, an earlier one if the camera
-            froze, -1 if nothing arrived. Counted from the first frame of the sequence.
-        previews: reduced colour pictures of some frames by frame number, one (h, w, 3) uint8 for each view.
-        lookalikes: the same of the lookalikes in the scene; none by default.
     """
 
     pixels: NDArray[np.float64]
+    """Pixel of each joint, (T, V, P, J, 2); NaN behind the camera."""
     visibility: NDArray[np.int8]
+    """:class:`simharness.types.views.Visibility`, (T, V, P, J) int8."""
     boxes: NDArray[np.float64]
+    """x, y, width, height in pixels of the part of each silhouette inside the image, occlusion ignored, (T, V, P, 4);
+    zeros if no part is inside."""
     area_visible: NDArray[np.int64]
+    """Number of pixels that show each person, (T, V, P)."""
     source: NDArray[np.int64]
+    """Frame in which the delivered picture was taken, (T, V): the frame itself, an earlier one if the camera froze, -1
+    if nothing arrived. Counted from the first frame of the sequence."""
     previews: Mapping[int, tuple[NDArray[np.uint8], ...]] = field(default_factory=dict)
+    """Reduced colour pictures of some frames by frame number, one (h, w, 3) uint8 for each view."""
     lookalikes: LookalikeViews = field(default_factory=LookalikeViews)
+    """The same of the lookalikes in the scene; none by default."""
 
     def __post_init__(self) -> None:
         set_arrays(

@@ -16,15 +16,12 @@ _WHAT = "a camera calibration"
 
 @dataclass(frozen=True)
 class CalibrationFile:
-    """A file of unknown format. Its content is parsed at most once, when a format looks at it.
-
-    Attributes:
-        path: the file.
-        expected: the expected content, for messages.
-    """
+    """A file of unknown format. Its content is parsed at most once, when a format looks at it."""
 
     path: Path
+    """The file."""
     expected: str = _WHAT
+    """The expected content, for messages."""
 
     @cached_property
     def content(self) -> bytes:
@@ -113,21 +110,18 @@ class Write(Protocol):
 
 @dataclass(frozen=True)
 class CalibrationFormat:
-    """A calibration format.
-
-    Attributes:
-        name: name in messages, with the kind of file: "VoxelPose (JSON)".
-        expects: content of a file, for the message about a file of no known format.
-        recognises: test of a file's content.
-        read: reader.
-        write: writer; None: the format is only read.
-    """
+    """A calibration format."""
 
     name: str
+    """Name in messages, with the kind of file: "VoxelPose (JSON)"."""
     expects: str
+    """Content of a file, for the message about a file of no known format."""
     recognises: Recognise
+    """Test of a file's content."""
     read: Read
+    """Reader."""
     write: Write | None = None
+    """Writer; None: the format is only read."""
 
 
 def _keys(entries: dict[str, Any]) -> str:

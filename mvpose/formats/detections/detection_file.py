@@ -23,21 +23,18 @@ _GREATEST_SCORE = 2.0  # heat maps and SimCC overshoot 1, mostly by a few per ce
 
 @dataclass(frozen=True)
 class PicturePeople:
-    """People in one picture.
-
-    Attributes:
-        keypoints: (n, J, 2), pixels; NaN where missing.
-        scores: (n, J), 0 to 1; 0 where missing.
-        boxes: x, y, width, height, (n, 4), pixels; NaN in the row of a person without box.
-        box_scores: (n,), 0 to 1; NaN for a person without one.
-        joints: the J joints.
-    """
+    """People in one picture."""
 
     keypoints: Floats
+    """(n, J, 2), pixels; NaN where missing."""
     scores: Floats
+    """(n, J), 0 to 1; 0 where missing."""
     boxes: Floats
+    """x, y, width, height, (n, 4), pixels; NaN in the row of a person without box."""
     box_scores: Floats
+    """(n,), 0 to 1; NaN for a person without one."""
     joints: JointNames = KNOWN["coco17"]
+    """The J joints."""
 
     def __len__(self) -> int:
         return len(self.scores)
@@ -97,23 +94,20 @@ class DetectionFile:
 
 @dataclass(frozen=True)
 class DetectionFormat:
-    """Format of detections of one camera.
-
-    Attributes:
-        title: name in messages: "OpenPose".
-        recognises: test of a file.
-        read: reader: people by the number of the picture, on the skeleton of the file, given the declared one or None.
-        of_picture: test whether a recognised file holds one picture; its folder then holds those of one camera.
-        complete: whether pictures without people are in the files, too, so that they count the frames.
-        suffixes: endings of files.
-    """
+    """Format of detections of one camera."""
 
     title: str
+    """Name in messages: "OpenPose"."""
     recognises: Callable[[DetectionFile], bool]
+    """Test of a file."""
     read: Callable[[DetectionFile, JointNames | None], Mapping[int, PicturePeople]]
+    """Reader: people by the number of the picture, on the skeleton of the file, given the declared one or None."""
     of_picture: Callable[[DetectionFile], bool] = lambda file: False
+    """Test whether a recognised file holds one picture; its folder then holds those of one camera."""
     complete: bool = True
+    """Whether pictures without people are in the files, too, so that they count the frames."""
     suffixes: tuple[str, ...] = (".json",)
+    """Endings of files."""
 
 
 def picture_people(

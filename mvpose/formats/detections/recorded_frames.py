@@ -31,40 +31,34 @@ Numbering = Callable[[Sequence[int]], Mapping[int, int]]
 
 @dataclass(frozen=True)
 class ViewPeople:
-    """People of one camera.
-
-    Attributes:
-        source: where they were read.
-        pictures: by the number of the frame, increasing.
-        complete: whether pictures without people are among them.
-        kind: the format of the files: "OpenPose", "COCO", "MMPose" or "RTMLib".
-    """
+    """People of one camera."""
 
     source: Source
+    """Where they were read."""
     pictures: Mapping[int, PicturePeople]
+    """By the number of the frame, increasing."""
     complete: bool
+    """Whether pictures without people are among them."""
     kind: str
+    """The format of the files: "OpenPose", "COCO", "MMPose" or "RTMLib"."""
 
 
 @dataclass(frozen=True)
 class RecordedFrames:
-    """Detections of all cameras in all frames.
-
-    Attributes:
-        numbers: number of each frame in the files, (T,), increasing.
-        pictures: for each camera its pictures by frame; a frame without entry has no picture of this camera.
-        assignment: which source belongs to which camera.
-        kinds: layout of the files of each camera.
-        skeleton: joints of the detections.
-        notes: what was decided about the skeleton of the files, for the user.
-    """
+    """Detections of all cameras in all frames."""
 
     numbers: Integers
+    """Number of each frame in the files, (T,), increasing."""
     pictures: tuple[dict[int, PicturePeople], ...]
+    """For each camera its pictures by frame; a frame without entry has no picture of this camera."""
     assignment: Assignment
+    """Which source belongs to which camera."""
     kinds: tuple[str, ...]
+    """Layout of the files of each camera."""
     skeleton: Skeleton = COCO17
+    """Joints of the detections."""
     notes: tuple[str, ...] = ()
+    """What was decided about the skeleton of the files, for the user."""
 
     def __len__(self) -> int:
         return len(self.numbers)

@@ -31,15 +31,12 @@ _APART = 0.1  # by which the best must be better than the next
 
 @dataclass(frozen=True)
 class SkeletonChoice:
-    """Skeletons of the joints of files.
-
-    Attributes:
-        by_count: skeleton by the number of joints.
-        notes: what was decided, for the user.
-    """
+    """Skeletons of the joints of files."""
 
     by_count: dict[int, JointNames]
+    """Skeleton by the number of joints."""
     notes: tuple[str, ...] = ()
+    """What was decided, for the user."""
 
     def named(self, picture: PicturePeople) -> JointNames:
         """Return the skeleton of a picture; of one that names its joints its own."""

@@ -25,17 +25,14 @@ _KINDS = "OpenPose folders, COCO or AlphaPose results, MMPose predictions or RTM
 
 @dataclass(frozen=True)
 class Source:
-    """Detections of one camera.
-
-    Attributes:
-        name: what the folder or file is called, without the usual affixes: "cam1" of ``cam1_json``.
-        path: the folder of files for one picture each, or the file.
-        recognised: whether a file is of a known format, and not one of settings beside them.
-    """
+    """Detections of one camera."""
 
     name: str
+    """What the folder or file is called, without the usual affixes: "cam1" of ``cam1_json``."""
     path: Path
+    """The folder of files for one picture each, or the file."""
     recognised: bool = True
+    """Whether a file is of a known format, and not one of settings beside them."""
 
 
 def find_sources(paths: Sequence[Path]) -> list[Source]:
@@ -116,17 +113,14 @@ def _source(path: Path) -> Source:
 
 @dataclass(frozen=True)
 class Assignment:
-    """Source of each camera.
-
-    Attributes:
-        sources: one for each camera, in the order of the rig.
-        by_name: whether names agree; False: the cameras and the sources have the same number only.
-        unused: sources of no camera.
-    """
+    """Source of each camera."""
 
     sources: tuple[Source, ...]
+    """One for each camera, in the order of the rig."""
     by_name: bool
+    """Whether names agree; False: the cameras and the sources have the same number only."""
     unused: tuple[Source, ...] = ()
+    """Sources of no camera."""
 
     def text(self, cameras: Sequence[str]) -> str:
         """Return the assignment in one line, for a message."""

@@ -17,26 +17,24 @@ class Hierarchy:
     """Nodes of one person and their motion in all T frames of a recording.
 
     Before and after the time in which the person is seen, its first and last poses are held.
-
-    Attributes:
-        identity: identity of the person.
-        names: names of the N nodes, parents before children: segments, then the joints on them as "Nose", "LEye".
-        parents: index of the parent of each node, (N,); -1 for the root.
-        offsets: from the parent to the node, (N, 3), metres.
-        tips: from a node without children to its end, (N, 3), metres; NaN for nodes with children.
-        root: place of the root, (T, 3), metres.
-        rotations: rotation of every node relative to its parent, (T, N, 3, 3).
-        seen: frames from the first to the last in which the person is seen.
     """
 
     identity: int
+    """Identity of the person."""
     names: tuple[str, ...]
+    """Names of the N nodes, parents before children: segments, then the joints on them as "Nose", "LEye"."""
     parents: tuple[int, ...]
+    """Index of the parent of each node, (N,); -1 for the root."""
     offsets: Floats
+    """From the parent to the node, (N, 3), metres."""
     tips: Floats
+    """From a node without children to its end, (N, 3), metres; NaN for nodes with children."""
     root: Floats
+    """Place of the root, (T, 3), metres."""
     rotations: Floats
+    """Rotation of every node relative to its parent, (T, N, 3, 3)."""
     seen: slice
+    """Frames from the first to the last in which the person is seen."""
 
     def turned(self, axes: Floats) -> "Hierarchy":
         """Return the hierarchy in other axes of the world: ``axes`` (3, 3) is the rotation to them."""

@@ -38,18 +38,16 @@ _WINDOW = 100  # frames in which the earlier place of a joint is looked for
 class OutputLimits:
     """OutputLimits of what results hold.
 
-    Attributes:
-        max_error: largest expected error of a joint, metres: half of such joints should be nearer to the truth.
-        max_speed: largest speed of arms and legs, m/s; that of trunk and head is half of it.
-        min_frames: fewest frames of a person; of a shorter recording all.
-
     Raises:
         ValueError: a limit that is not above 0.
     """
 
     max_error: float = LARGEST_ERROR
+    """Largest expected error of a joint, metres: half of such joints should be nearer to the truth."""
     max_speed: float = FASTEST
+    """Largest speed of arms and legs, m/s; that of trunk and head is half of it."""
     min_frames: int = 5
+    """Fewest frames of a person; of a shorter recording all."""
 
     def __post_init__(self) -> None:
         for key, value in vars(self).items():
@@ -59,21 +57,18 @@ class OutputLimits:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What was left out of the results of a recording, for its files and its page.
-
-    Attributes:
-        limits: the limits.
-        ids: identities of the n people before.
-        counts: joints that each rule left out of each person, (4, n), in the order of the rules.
-        present: joints of each person before, (n,).
-        frames: frames in which each person was there before, (n,).
-    """
+    """What was left out of the results of a recording, for its files and its page."""
 
     limits: OutputLimits
+    """The limits."""
     ids: Integers
+    """Identities of the n people before."""
     counts: Integers
+    """Joints that each rule left out of each person, (4, n), in the order of the rules."""
     present: Integers
+    """Joints of each person before, (n,)."""
     frames: Integers
+    """Frames in which each person was there before, (n,)."""
 
     @property
     def people(self) -> Integers:

@@ -28,21 +28,18 @@ METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 0.01, "mm": 0.001, "inch
 
 @dataclass(frozen=True)
 class PeopleFiles:
-    """Files of people, and what is known about them.
-
-    Attributes:
-        paths: one or more files (of Panoptic the folder); of formats that hold one person, one for each person.
-        skeleton: joints of files that do not name them; None: those that are usual in the format.
-        up: axis that points up in files that do not say it; None: the convention of the format.
-        rate: frames per second of files that do not say it; None: not known.
-        numbers: numbers of the wanted frames, (F,); a reader may leave out others. None: all.
-    """
+    """Files of people, and what is known about them."""
 
     paths: tuple[Path, ...]
+    """One or more files (of Panoptic the folder); of formats that hold one person, one for each person."""
     skeleton: JointNames | None = None
+    """Joints of files that do not name them; None: those that are usual in the format."""
     up: Up | None = None
+    """Axis that points up in files that do not say it; None: the convention of the format."""
     rate: float | None = None
+    """Frames per second of files that do not say it; None: not known."""
     numbers: Integers | None = None
+    """Numbers of the wanted frames, (F,); a reader may leave out others. None: all."""
 
     def single(self) -> Path:
         """Return the path of a format that holds all people in one file.
@@ -130,19 +127,17 @@ def identity_of(path: Path) -> int:
 class Options:
     """Choices that formats leave open.
 
-    Attributes:
-        up: axis that points up in the files; None: the convention of each format (y in TRC and BVH, z in the others).
-            glTF files have y up and Panoptic files have y down always.
-        units: unit of TRC files.
-        together: C3D files: all people in one file, with labels such as ``P3:LHip``, instead of a file for each.
-
     Raises:
         ValueError: an unknown axis or unit.
     """
 
     up: Up | None = None
+    """Axis that points up in the files; None: the convention of each format (y in TRC and BVH, z in the others). glTF
+    files have y up and Panoptic files have y down always."""
     units: Literal["m", "mm"] = "m"
+    """Unit of TRC files."""
     together: bool = False
+    """C3D files: all people in one file, with labels such as ``P3:LHip``, instead of a file for each."""
 
     def __post_init__(self) -> None:
         if self.up not in (None, *AXES):
@@ -153,15 +148,12 @@ class Options:
 
 @dataclass(frozen=True)
 class Export:
-    """People to be written, and the choices of the user.
-
-    Attributes:
-        people: people of a recording.
-        options: choices that formats leave open.
-    """
+    """People to be written, and the choices of the user."""
 
     people: People
+    """People of a recording."""
     options: Options
+    """Choices that formats leave open."""
 
     def axes(self, usual: Up) -> Floats:
         """Return the rotation from our axes to those of a file, (3, 3), for a format with a usual up axis."""

@@ -34,25 +34,22 @@ from mvpose.recording import People
 
 @dataclass(frozen=True)
 class PeopleFormat:
-    """Format of people over time.
-
-    Attributes:
-        files: names of its files, for help texts.
-        write: function that yields, for each file, its name relative to the folder and its content; None: only read.
-        read: function that reads people; None: only written.
-        found: pattern of its files in a folder, whose ending is that of a single file; "": not searched for.
-        in_folder: whether the reader takes the folder with its files.
-        requires: packages that it imports.
-        install: what ``pip install`` needs for these packages.
-    """
+    """Format of people over time."""
 
     files: str
+    """Names of its files, for help texts."""
     write: Callable[[Export], Iterator[tuple[str, bytes]]] | None = None
+    """Function that yields, for each file, its name relative to the folder and its content; None: only read."""
     read: Callable[[PeopleFiles], People] | None = None
+    """Function that reads people; None: only written."""
     found: str = ""
+    """Pattern of its files in a folder, whose ending is that of a single file; "": not searched for."""
     in_folder: bool = False
+    """Whether the reader takes the folder with its files."""
     requires: tuple[str, ...] = ()
+    """Packages that it imports."""
     install: str = "mvpose[recordings]"
+    """What ``pip install`` needs for these packages."""
 
 
 FORMATS: dict[str, PeopleFormat] = {

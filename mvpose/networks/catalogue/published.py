@@ -18,32 +18,29 @@ PACKAGE_LICENCE = "package/LICENSE"
 
 @dataclass(frozen=True, kw_only=True)
 class PublishedNetwork:
-    """Network of a package.
-
-    Attributes:
-        name: name by which commands know it.
-        summary: what it finds.
-        licence: licence and owner of the weights.
-        source: where the owner published them.
-        members: files of the package, graph and weights, with their SHA-256.
-        pictures: operation of the graph that the pictures replace.
-        outputs: operations that become outputs, by their new names.
-        sigmoid: outputs that the graph leaves as logits.
-        card: model card.
-        probe: mean and standard deviation of each output for the picture of :func:`.fetch.probe_picture`, as
-            TensorFlow computes them.
-    """
+    """Network of a package."""
 
     name: str
+    """Name by which commands know it."""
     summary: str
+    """What it finds."""
     licence: str
+    """Licence and owner of the weights."""
     source: str
+    """Where the owner published them."""
     members: Mapping[str, str]
+    """Files of the package, graph and weights, with their SHA-256."""
     pictures: str
+    """Operation of the graph that the pictures replace."""
     outputs: Mapping[str, str]
+    """Operations that become outputs, by their new names."""
     sigmoid: Sequence[str] = ()
+    """Outputs that the graph leaves as logits."""
     card: Card
+    """Model card."""
     probe: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    """Mean and standard deviation of each output for the picture of :func:`.fetch.probe_picture`, as TensorFlow
+    computes them."""
 
 
 def _published(name: str, entry: dict[str, Any]) -> PublishedNetwork:

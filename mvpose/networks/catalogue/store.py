@@ -11,15 +11,12 @@ _ENDING = ".onnx"
 
 @dataclass(frozen=True)
 class StoredNetwork:
-    """Network on this machine.
-
-    Attributes:
-        name: its name.
-        path: its ONNX file.
-    """
+    """Network on this machine."""
 
     name: str
+    """Its name."""
     path: Path
+    """Its ONNX file."""
 
 
 def own_folder() -> Path:

@@ -15,32 +15,26 @@ _TYPES = {"float32": "<f4", "float16": "<f2", "int32": "<i4", "uint8": "u1", "ui
 
 @dataclass(frozen=True)
 class GraphNode:
-    """Operation of a graph.
-
-    Attributes:
-        name: its name.
-        kind: kind of operation, as TensorFlow calls it.
-        inputs: names of the operations and weights that it takes.
-        attributes: its attributes: numbers, lists of numbers, texts and types.
-    """
+    """Operation of a graph."""
 
     name: str
+    """Its name."""
     kind: str
+    """Kind of operation, as TensorFlow calls it."""
     inputs: tuple[str, ...]
+    """Names of the operations and weights that it takes."""
     attributes: Mapping[str, Any]
+    """Its attributes: numbers, lists of numbers, texts and types."""
 
 
 @dataclass(frozen=True)
 class GraphModel:
-    """Graph with its weights.
-
-    Attributes:
-        nodes: operations by name; constants are in ``weights``.
-        weights: constants by name, float32 or int64.
-    """
+    """Graph with its weights."""
 
     nodes: Mapping[str, GraphNode]
+    """Operations by name; constants are in ``weights``."""
     weights: Mapping[str, NDArray[Any]]
+    """Constants by name, float32 or int64."""
 
     def between(self, start: str, ends: Iterable[str]) -> list[GraphNode]:
         """Return the operations from the output of one to those of others, each after those that it takes.

@@ -26,51 +26,45 @@ _BYTES_PER_PIXEL = 4 + 4 + 4 + 2 + 3 + 2 + 4
 
 @dataclass(frozen=True)
 class LitBackground:
-    """Picture of the still meshes in one light.
-
-    Attributes:
-        lighting: the light.
-        light: what the shadow maps cover, or the light of the sources.
-        rgb: picture without the shadows of anything that moves, (h, w, 3) uint8.
-        shadow_place: place of each pixel in the shadow maps, (h, w) uint16: see
-            :func:`~simharness.capture.rendering.shadow_maps.shadow_places`; empty with sources.
-        shadow_depth: inverse depth of each pixel from the light, (h, w) float32; empty with sources.
-        runs: runs of pixels over the blocks of :class:`~simharness.capture.rendering.lit_scene.ShadowGrid`, (n, 5): see
-            :func:`~simharness.capture.rendering.shaded_pixels.runs_below`; empty without sources.
-    """
+    """Picture of the still meshes in one light."""
 
     lighting: Lighting
+    """The light."""
     light: LightView | RoomLight
+    """What the shadow maps cover, or the light of the sources."""
     rgb: NDArray[np.uint8]
+    """Picture without the shadows of anything that moves, (h, w, 3) uint8."""
     shadow_place: NDArray[np.uint16]
+    """Place of each pixel in the shadow maps, (h, w) uint16: see
+    :func:`~simharness.capture.rendering.shadow_maps.shadow_places`; empty with sources."""
     shadow_depth: NDArray[np.float32]
+    """Inverse depth of each pixel from the light, (h, w) float32; empty with sources."""
     runs: NDArray[np.int32]
+    """Runs of pixels over the blocks of :class:`~simharness.capture.rendering.lit_scene.ShadowGrid`, (n, 5): see
+    :func:`~simharness.capture.rendering.shaded_pixels.runs_below`; empty without sources."""
 
 
 @dataclass
 class Background:
-    """Picture of the still meshes.
-
-    Attributes:
-        to_rays: matrix, (3, 3), such that ``center + depth * to_rays @ (x, y, 1)`` is the point at a pixel.
-        inverse_depth: inverse depth, 1/m, (h, w) float32; 0 without a surface.
-        triangle: visible face, (h, w) int32; -1 without a surface.
-        corners: homogeneous pixel coordinates of the vertices, (n, 3).
-        depth: depth, metres, (h, w) float32; +inf without a surface.
-        labels: what the faces are labelled with, (k + 1,): see
-            :attr:`~simharness.capture.rendering.scene_topology.SceneTopology.mesh`.
-        ids: label of each pixel, (h, w).
-        lit: the same in the light of the latest request.
-    """
+    """Picture of the still meshes."""
 
     to_rays: NDArray[np.float64]
+    """Matrix, (3, 3), such that ``center + depth * to_rays @ (x, y, 1)`` is the point at a pixel."""
     inverse_depth: NDArray[np.float32]
+    """Inverse depth, 1/m, (h, w) float32; 0 without a surface."""
     triangle: NDArray[np.int32]
+    """Visible face, (h, w) int32; -1 without a surface."""
     corners: NDArray[np.float64]
+    """Homogeneous pixel coordinates of the vertices, (n, 3)."""
     depth: NDArray[np.float32]
+    """Depth, metres, (h, w) float32; +inf without a surface."""
     labels: NDArray[np.int16]
+    """What the faces are labelled with, (k + 1,): see
+    :attr:`~simharness.capture.rendering.scene_topology.SceneTopology.mesh`."""
     ids: NDArray[np.int16]
+    """Label of each pixel, (h, w)."""
     lit: LitBackground | None = None
+    """The same in the light of the latest request."""
 
     @property
     def nbytes(self) -> int:

@@ -17,17 +17,14 @@ DEEPEST = 64
 
 
 class BoxTree(NamedTuple):
-    """Tree of k triangles.
-
-    Attributes:
-        boxes: lowest, then highest coordinates of the nodes, (m, 6).
-        links: the first of two children, that follow each other, and 0; or the first triangle and their number, (m, 2).
-        triangles: a corner and the edges to the other two, (k, 9).
-    """
+    """Tree of k triangles."""
 
     boxes: NDArray[np.float32]
+    """Lowest, then highest coordinates of the nodes, (m, 6)."""
     links: NDArray[np.int32]
+    """The first of two children, that follow each other, and 0; or the first triangle and their number, (m, 2)."""
     triangles: NDArray[np.float32]
+    """a corner and the edges to the other two, (k, 9)."""
 
 
 @njit(cache=True, error_model="numpy")

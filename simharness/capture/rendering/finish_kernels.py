@@ -85,25 +85,22 @@ _LOCKS, _STRANDS = _strand_tables()
 
 
 class FinishArrays(NamedTuple):
-    """Finishes of moving meshes in a pose and light, for one camera; of m faces and v vertices.
-
-    Attributes:
-        material: material of the faces, (m,) int8; empty where all surfaces are matte.
-        figure: mesh of the faces, (m,) int16.
-        lights: light around the meshes, see :func:`.finishes.figure_light`, (meshes, 7).
-        pixel: size of a pixel at each mesh, metres, (meshes,) float32.
-        grain: see :func:`.finishes.grain_of`, (v, 4).
-        place: see :class:`simharness.types.mesh.Finish`, (v,).
-        around: period of the place of hair, metres.
-    """
+    """Finishes of moving meshes in a pose and light, for one camera; of m faces and v vertices."""
 
     material: NDArray[np.int8]
+    """Material of the faces, (m,) int8; empty where all surfaces are matte."""
     figure: NDArray[np.int16]
+    """Mesh of the faces, (m,) int16."""
     lights: NDArray[np.float32]
+    """Light around the meshes, see :func:`.finishes.figure_light`, (meshes, 7)."""
     pixel: NDArray[np.float32]
+    """Size of a pixel at each mesh, metres, (meshes,) float32."""
     grain: NDArray[np.float32]
+    """See :func:`.finishes.grain_of`, (v, 4)."""
     place: NDArray[np.float32]
+    """See :class:`simharness.types.mesh.Finish`, (v,)."""
     around: float
+    """Period of the place of hair, metres."""
 
 
 @njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})

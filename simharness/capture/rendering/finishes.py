@@ -81,19 +81,16 @@ class Finishes:
 
 @dataclass(frozen=True)
 class PosedFinishes:
-    """Finishes in one pose and light.
-
-    Attributes:
-        finishes: what does not change.
-        lights: light around the meshes, see :func:`figure_light`, (meshes, 7).
-        grain: direction of the grain and slope of folds at the vertices, (v, 4).
-        middles: middles of the meshes, (meshes, 3).
-    """
+    """Finishes in one pose and light."""
 
     finishes: Finishes
+    """What does not change."""
     lights: Floats
+    """Light around the meshes, see :func:`figure_light`, (meshes, 7)."""
     grain: Floats
+    """Direction of the grain and slope of folds at the vertices, (v, 4)."""
     middles: Floats
+    """Middles of the meshes, (meshes, 3)."""
 
     @classmethod
     def in_pose(

@@ -18,33 +18,27 @@ SKY, DARK = -1, -2  # what a ray meets: nothing; the back of a surface
 
 
 class SourceArrays(NamedTuple):
-    """Sources of light as the kernels take them.
-
-    Attributes:
-        areas: area lights: centre, right, up, radiance, focus, (m, 13).
-        windows: which of them are windows, (m,) bool.
-        sun: unit direction to the sun and its irradiance, (6,).
-    """
+    """Sources of light as the kernels take them."""
 
     areas: NDArray[np.float64]
+    """Area lights: centre, right, up, radiance, focus, (m, 13)."""
     windows: NDArray[np.bool_]
+    """Which of them are windows, (m,) bool."""
     sun: NDArray[np.float64]
+    """Unit direction to the sun and its irradiance, (6,)."""
 
 
 class SampledFaces(NamedTuple):
-    """Faces that rays may meet, and their light samples.
-
-    Attributes:
-        order: index of the face of each triangle of the tree.
-        face_normals: unit normals of the faces, (k, 3).
-        corner_samples: see :class:`.light_samples.LightSamples`.
-        divisions: see :class:`.light_samples.LightSamples`.
-    """
+    """Faces that rays may meet, and their light samples."""
 
     order: NDArray[np.int64]
+    """Index of the face of each triangle of the tree."""
     face_normals: NDArray[np.float32]
+    """Unit normals of the faces, (k, 3)."""
     corner_samples: NDArray[np.int32]
+    """See :class:`.light_samples.LightSamples`."""
     divisions: NDArray[np.int32]
+    """See :class:`.light_samples.LightSamples`."""
 
 
 @njit(cache=True, error_model="numpy")

@@ -29,24 +29,21 @@ _NUDGE = 2e-3  # share of the way to the middle of the triangle, so that rays do
 
 @dataclass(frozen=True)
 class LightSamples:
-    """Light samples of k triangles.
-
-    Attributes:
-        places: positions, (n, 3) float32.
-        normals: unit normals, (n, 3) float32.
-        albedo: linear albedo, (n, 3) float32.
-        apart: distance to the neighbours, metres, (n,) float32.
-        corner_samples: samples of the corners of each triangle; with more than one division the first is that of the
-            lattice, (k, 3) int32.
-        divisions: divisions of the sides of each triangle, (k,) int32.
-    """
+    """Light samples of k triangles."""
 
     places: Floats
+    """Positions, (n, 3) float32."""
     normals: Floats
+    """Unit normals, (n, 3) float32."""
     albedo: Floats
+    """Linear albedo, (n, 3) float32."""
     apart: Floats
+    """Distance to the neighbours, metres, (n,) float32."""
     corner_samples: NDArray[np.int32]
+    """Samples of the corners of each triangle; with more than one division the first is that of the lattice, (k, 3)
+    int32."""
     divisions: NDArray[np.int32]
+    """Divisions of the sides of each triangle, (k,) int32."""
 
 
 def light_samples(

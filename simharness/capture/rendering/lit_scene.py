@@ -35,25 +35,22 @@ _HEIGHTS = np.array([0.0, 0.5, 1.1, 1.9], np.float32)  # metres, of the maps abo
 
 @dataclass(frozen=True)
 class MovingSamples:
-    """Light samples of the moving meshes of a scene.
-
-    Attributes:
-        of_vertex: vertex of each sample, (n,) int32.
-        of_face: face whose normal it has, -1 for that of the vertex, (n,) int32.
-        spans: first and end of the samples of each mesh, (meshes, 2).
-        corner_samples: samples of the corners of the faces, (k, 3) int32.
-        divisions: divisions of the faces, (k,): none, unlike those of still meshes.
-        group: part of a body that each vertex belongs to, (v,) int32.
-        ranges: first and end of the parts of each mesh, (meshes, 2).
-    """
+    """Light samples of the moving meshes of a scene."""
 
     of_vertex: NDArray[np.int32]
+    """Vertex of each sample, (n,) int32."""
     of_face: NDArray[np.int32]
+    """Face whose normal it has, -1 for that of the vertex, (n,) int32."""
     spans: NDArray[np.int64]
+    """First and end of the samples of each mesh, (meshes, 2)."""
     corner_samples: NDArray[np.int32]
+    """Samples of the corners of the faces, (k, 3) int32."""
     divisions: NDArray[np.int32]
+    """Divisions of the faces, (k,): none, unlike those of still meshes."""
     group: NDArray[np.int32]
+    """Part of a body that each vertex belongs to, (v,) int32."""
     ranges: NDArray[np.int64]
+    """First and end of the parts of each mesh, (meshes, 2)."""
 
     @classmethod
     def from_meshes(cls, meshes: tuple[Mesh, ...]) -> "MovingSamples":
@@ -99,17 +96,14 @@ def _lists(count: int) -> tuple[list[NDArray], ...]:
 
 @dataclass(frozen=True)
 class ShadowGrid:
-    """Cells of the maps of shadows: around the probes.
-
-    Attributes:
-        corner: x and y of the corner, (2,).
-        cell: side of a cell, metres.
-        shape: rows and columns.
-    """
+    """Cells of the maps of shadows: around the probes."""
 
     corner: NDArray[np.float64]
+    """x and y of the corner, (2,)."""
     cell: float
+    """Side of a cell, metres."""
     shape: tuple[int, int]
+    """Rows and columns."""
 
     @classmethod
     def around_probes(cls, room: RoomLight) -> "ShadowGrid":
@@ -130,21 +124,18 @@ class ShadowGrid:
 
 @dataclass(frozen=True, eq=False)
 class LitScene:
-    """Light of a scene at one time.
-
-    Attributes:
-        geometry: triangles of the scene.
-        lighting: its lighting, with sources.
-        room: light of its still meshes.
-        samples: light samples of the moving meshes.
-        finishes: finishes of the moving meshes; None if all are matte.
-    """
+    """Light of a scene at one time."""
 
     geometry: SceneGeometry
+    """Triangles of the scene."""
     lighting: Lighting
+    """Its lighting, with sources."""
     room: RoomLight
+    """Light of its still meshes."""
     samples: MovingSamples
+    """Light samples of the moving meshes."""
     finishes: Finishes | None
+    """Finishes of the moving meshes; None if all are matte."""
 
     @classmethod
     def in_light(cls, geometry: SceneGeometry, lighting: Lighting, last: "LitScene | None" = None) -> "LitScene | None":

@@ -45,33 +45,27 @@ def light_at(
 
 
 class MovingMeshes(NamedTuple):
-    """Moving meshes of a scene at a time.
-
-    Attributes:
-        vertices: vertices, (v, 3).
-        face_normals: unit normals of the faces, (k, 3).
-        vertex_normals: unit normals of the vertices, (v, 3).
-    """
+    """Moving meshes of a scene at a time."""
 
     vertices: NDArray[np.float32]
+    """Vertices, (v, 3)."""
     face_normals: NDArray[np.float32]
+    """Unit normals of the faces, (k, 3)."""
     vertex_normals: NDArray[np.float32]
+    """Unit normals of the vertices, (v, 3)."""
 
 
 class AirLight(NamedTuple):
-    """Light at the nodes of a grid in the air.
-
-    Attributes:
-        origin: position of the first node, (3,).
-        step: distances between nodes, (3,).
-        every: light of all sources by the six directions, (nx, ny, nz, 18).
-        straight: luminance of what comes straight from area lights and sun, (nx, ny, nz, 6).
-    """
+    """Light at the nodes of a grid in the air."""
 
     origin: NDArray[np.float64]
+    """Position of the first node, (3,)."""
     step: NDArray[np.float64]
+    """Distances between nodes, (3,)."""
     every: NDArray[np.float32]
+    """Light of all sources by the six directions, (nx, ny, nz, 18)."""
     straight: NDArray[np.float32]
+    """Luminance of what comes straight from area lights and sun, (nx, ny, nz, 6)."""
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})

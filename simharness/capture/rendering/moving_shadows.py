@@ -27,39 +27,33 @@ _SEEN = 0.985  # share of the light: what is less dark cannot be seen
 
 
 class ShadowLayer(NamedTuple):
-    """Map at one height of the share of the light that bodies leave to surfaces that face up.
-
-    Attributes:
-        left: the share, (rows, columns) float32.
-        corner: x and y of the corner of the map, (2,).
-        cell: side of a cell, metres.
-        z: height, metres.
-    """
+    """Map at one height of the share of the light that bodies leave to surfaces that face up."""
 
     left: NDArray[np.float32]
+    """The share, (rows, columns) float32."""
     corner: NDArray[np.float64]
+    """x and y of the corner of the map, (2,)."""
     cell: float
+    """Side of a cell, metres."""
     z: float
+    """Height, metres."""
 
 
 class UpwardLight(NamedTuple):
-    """Light of a room on surfaces that face up.
-
-    Attributes:
-        areas: area lights with the luminance of their radiance: centre, right, up, luminance, focus, (m, 11).
-        sun: unit direction to the sun and luminance of its irradiance, (4,).
-        origin: origin of the probes, (3,).
-        step: distances of the probes, (3,).
-        every: luminance of all light at the probes, (nx, ny, nz, 1).
-        shares: share of area lights and sun that still meshes leave, (nx, ny, nz, areas + 1).
-    """
+    """Light of a room on surfaces that face up."""
 
     areas: NDArray[np.float64]
+    """Area lights with the luminance of their radiance: centre, right, up, luminance, focus, (m, 11)."""
     sun: NDArray[np.float64]
+    """Unit direction to the sun and luminance of its irradiance, (4,)."""
     origin: NDArray[np.float64]
+    """Origin of the probes, (3,)."""
     step: NDArray[np.float64]
+    """Distances of the probes, (3,)."""
     every: NDArray[np.float32]
+    """Luminance of all light at the probes, (nx, ny, nz, 1)."""
     shares: NDArray[np.float32]
+    """Share of area lights and sun that still meshes leave, (nx, ny, nz, areas + 1)."""
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})

@@ -21,20 +21,17 @@ class Unavailable(RuntimeError):
 
 @dataclass(frozen=True)
 class Image:
-    """Rendered image. Rows are y, columns x; integer indices are pixel centres.
-
-    Attributes:
-        rgb: colours, (h, w, 3) uint8; zeros if no colour was requested.
-        depth: distance along the optical axis, metres, (h, w) float32; +inf without a surface.
-        ids: index of the visible mesh, (h, w) int16; -1 without a surface.
-        parts: label of the visible face from ``Mesh.parts``, (h, w) int8; -1 without a label or surface. None if
-            not requested.
-    """
+    """Rendered image. Rows are y, columns x; integer indices are pixel centres."""
 
     rgb: NDArray[np.uint8]
+    """Colours, (h, w, 3) uint8; zeros if no colour was requested."""
     depth: NDArray[np.float32]
+    """Distance along the optical axis, metres, (h, w) float32; +inf without a surface."""
     ids: NDArray[np.int16]
+    """Index of the visible mesh, (h, w) int16; -1 without a surface."""
     parts: NDArray[np.int8] | None = None
+    """Label of the visible face from ``Mesh.parts``, (h, w) int8; -1 without a label or surface. None if not
+    requested."""
 
     def __post_init__(self) -> None:
         shape = self.depth.shape

@@ -50,21 +50,18 @@ _KEPT = 2
 
 @dataclass(frozen=True)
 class Probes:
-    """Light at the nodes of a grid in the air.
-
-    Attributes:
-        origin: position of the first node, (3,).
-        step: distances between nodes along x, y, z, (3,).
-        every: irradiance by all light of surfaces that face +x, -x, +y, -y, +z, -z, (nx, ny, nz, 6, 3).
-        straight: luminance of the irradiance by area lights and sun alone, (nx, ny, nz, 6).
-        shares: share of each area light, and last of the sun, that nothing still blocks, (nx, ny, nz, areas + 1).
-    """
+    """Light at the nodes of a grid in the air."""
 
     origin: NDArray[np.float64]
+    """Position of the first node, (3,)."""
     step: NDArray[np.float64]
+    """Distances between nodes along x, y, z, (3,)."""
     every: Floats
+    """Irradiance by all light of surfaces that face +x, -x, +y, -y, +z, -z, (nx, ny, nz, 6, 3)."""
     straight: Floats
+    """Luminance of the irradiance by area lights and sun alone, (nx, ny, nz, 6)."""
     shares: Floats
+    """Share of each area light, and last of the sun, that nothing still blocks, (nx, ny, nz, areas + 1)."""
 
     @property
     def air(self) -> AirLight:
@@ -74,19 +71,16 @@ class Probes:
 
 @dataclass(frozen=True)
 class RoomLight:
-    """Light of the still meshes of a scene, exposed: 1 shows an albedo about as bright as it is.
-
-    Attributes:
-        samples: samples on the still surfaces.
-        light: irradiance there, (n, 3).
-        probes: light in the air.
-        exposure: factor of the radiance of all sources, by exposure and white balance, (3,).
-    """
+    """Light of the still meshes of a scene, exposed: 1 shows an albedo about as bright as it is."""
 
     samples: LightSamples
+    """Samples on the still surfaces."""
     light: Floats
+    """Irradiance there, (n, 3)."""
     probes: Probes
+    """Light in the air."""
     exposure: Floats
+    """Factor of the radiance of all sources, by exposure and white balance, (3,)."""
 
 
 _kept: list[tuple[LightSources, tuple[Mesh, ...], RoomLight]] = []

@@ -82,17 +82,14 @@ class StillGeometry:
 
 @dataclass(eq=False)
 class SceneGeometry:
-    """Triangles of a scene at their positions; what only shading needs is computed on first use.
-
-    Attributes:
-        topology: faces of all meshes, those of still meshes first.
-        meshes: meshes in the order of the topology.
-        still: triangles of the still meshes.
-    """
+    """Triangles of a scene at their positions; what only shading needs is computed on first use."""
 
     topology: SceneTopology
+    """Faces of all meshes, those of still meshes first."""
     meshes: tuple[Mesh, ...]
+    """Meshes in the order of the topology."""
     still: StillGeometry
+    """Triangles of the still meshes."""
     _shadows: Shadows | None = field(default=None, init=False, repr=False)
 
     @classmethod

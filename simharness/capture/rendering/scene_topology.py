@@ -17,15 +17,12 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class SceneTopology:
-    """Faces of a scene with n vertices and k faces in total.
-
-    Attributes:
-        meshes: meshes in the order of their faces, those that are still first.
-        order: index of each of them in the scene, (meshes,); empty: in this order.
-    """
+    """Faces of a scene with n vertices and k faces in total."""
 
     meshes: tuple[Mesh, ...]
+    """Meshes in the order of their faces, those that are still first."""
     order: tuple[int, ...] = ()
+    """Index of each of them in the scene, (meshes,); empty: in this order."""
 
     def matches(self, meshes: Sequence[Mesh], order: Sequence[int]) -> bool:
         """Return whether meshes are the same except for their vertex positions."""

@@ -21,39 +21,33 @@ _U, _V, _Z, _LEFT, _ONE, _TWO, _THREE, _FOUR, _MEMORY = (_PIXELS * row for row i
 
 
 class BlockGrid(NamedTuple):
-    """Blocks of a map of the floor.
-
-    Attributes:
-        corner: x and y of the corner of the map, (2,).
-        side: side of a block, metres.
-        rows: number of blocks along y.
-        columns: number of blocks along x.
-    """
+    """Blocks of a map of the floor."""
 
     corner: NDArray[np.float64]
+    """x and y of the corner of the map, (2,)."""
     side: float
+    """Side of a block, metres."""
     rows: int
+    """Number of blocks along y."""
     columns: int
+    """Number of blocks along x."""
 
 
 class ShadowLayers(NamedTuple):
-    """Share of the light that moving bodies leave to still surfaces that face up.
-
-    Attributes:
-        corner: x and y of the corner of the maps, (2,).
-        cell: size of a cell of ``fine``; a cell of ``coarse`` is twice as large.
-        fine: share on the floor, (rows, columns) float32.
-        coarse: share at several heights, (heights, rows / 2, columns / 2) float32.
-        heights: these heights, (heights,) float32.
-        touched: blocks in which anything is dark, (blocks + 1,).
-    """
+    """Share of the light that moving bodies leave to still surfaces that face up."""
 
     corner: NDArray[np.float64]
+    """x and y of the corner of the maps, (2,)."""
     cell: float
+    """Size of a cell of ``fine``; a cell of ``coarse`` is twice as large."""
     fine: NDArray[np.float32]
+    """Share on the floor, (rows, columns) float32."""
     coarse: NDArray[np.float32]
+    """Share at several heights, (heights, rows / 2, columns / 2) float32."""
     heights: NDArray[np.float32]
+    """These heights, (heights,) float32."""
     touched: NDArray[np.bool_]
+    """Blocks in which anything is dark, (blocks + 1,)."""
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})

@@ -52,21 +52,18 @@ _CUBE, _SQUARE, _PLAIN = np.float32(0.305306011), np.float32(0.682171111), np.fl
 
 
 class DistantLight(NamedTuple):
-    """Lighting in closed form as the kernels take it.
-
-    Attributes:
-        direction: unit direction to the key light, (3,).
-        strengths: strengths of key, sky and fill light, (3,).
-        gains: 255 times the factor of the light colour on the albedo, sRGB, (3,).
-        projection: projection into the shadow maps, (3, 4).
-        bias: least lead in inverse depth of what shades a surface that faces the light.
-    """
+    """Lighting in closed form as the kernels take it."""
 
     direction: NDArray[np.float64]
+    """Unit direction to the key light, (3,)."""
     strengths: NDArray[np.float64]
+    """Strengths of key, sky and fill light, (3,)."""
     gains: NDArray[np.float64]
+    """255 times the factor of the light colour on the albedo, sRGB, (3,)."""
     projection: NDArray[np.float64]
+    """Projection into the shadow maps, (3, 4)."""
     bias: float
+    """Least lead in inverse depth of what shades a surface that faces the light."""
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
@@ -203,21 +200,18 @@ def _light(
 
 
 class FaceLight(NamedTuple):
-    """Light that some faces of a scene get and give.
-
-    Attributes:
-        emission: radiance of the faces, times which the albedo is shown, (m, 3).
-        exposure: factor on it, (3,) float32.
-        light: irradiance at the light samples, (n, 3) float32.
-        corner_samples: samples of the faces, (m, 3); see :class:`.light_samples.LightSamples`.
-        divisions: divisions of the faces, (m,).
-    """
+    """Light that some faces of a scene get and give."""
 
     emission: NDArray[np.float32]
+    """Radiance of the faces, times which the albedo is shown, (m, 3)."""
     exposure: NDArray[np.float32]
+    """Factor on it, (3,) float32."""
     light: NDArray[np.float32]
+    """Irradiance at the light samples, (n, 3) float32."""
     corner_samples: NDArray[np.int32]
+    """Samples of the faces, (m, 3); see :class:`.light_samples.LightSamples`."""
     divisions: NDArray[np.int32]
+    """Divisions of the faces, (m,)."""
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})

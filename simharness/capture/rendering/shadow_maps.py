@@ -24,17 +24,14 @@ _LIGHT_DISTANCE = 1000.0  # in radii of what the map covers: rays are almost par
 
 @dataclass(frozen=True)
 class LightView:
-    """View of a distant light on a box of the scene.
-
-    Attributes:
-        direction: unit vector to the light.
-        middle: centre of the box, metres.
-        radius: half the diagonal of the box, metres.
-    """
+    """View of a distant light on a box of the scene."""
 
     direction: tuple[float, float, float]
+    """Unit vector to the light."""
     middle: tuple[float, float, float]
+    """Centre of the box, metres."""
     radius: float
+    """Half the diagonal of the box, metres."""
 
     @classmethod
     def on_box(cls, direction: tuple[float, float, float], low: Floats, high: Floats) -> "LightView":
@@ -60,15 +57,12 @@ class LightView:
 
 
 class ShadowMap(NamedTuple):
-    """Shadow map of a distant light.
-
-    Attributes:
-        nearest: inverse depth from the light of the first surface, (s, s) float32, 0 if there is none.
-        blocks: highest inverse depth in every block of the map.
-    """
+    """Shadow map of a distant light."""
 
     nearest: Floats
+    """Inverse depth from the light of the first surface, (s, s) float32, 0 if there is none."""
     blocks: Floats
+    """Highest inverse depth in every block of the map."""
 
 
 NO_SHADOW = ShadowMap(
@@ -79,17 +73,14 @@ NO_SHADOW = ShadowMap(
 
 @dataclass(frozen=True)
 class Shadows:
-    """Shadow maps of a scene.
-
-    Attributes:
-        light: view of the light.
-        still: map of the still meshes.
-        moving: map of the other meshes.
-    """
+    """Shadow maps of a scene."""
 
     light: LightView
+    """View of the light."""
     still: ShadowMap
+    """Map of the still meshes."""
     moving: ShadowMap
+    """Map of the other meshes."""
 
     @cached_property
     def nearest(self) -> Floats:

@@ -48,56 +48,47 @@ _MASK = np.uint64((1 << 20) - 1)
 
 
 class FaceArrays(NamedTuple):
-    """Faces of a scene as the shading kernels take them: k faces with n vertices.
-
-    Attributes:
-        faces: vertex indices, (k, 3) uint32.
-        colors: sRGB albedo, (k, 3) float32.
-        smooth: whether to interpolate vertex normals, (k,) bool.
-        face_normals: unit normals of the faces, (k, 3) float32.
-        vertex_normals: unit normals of the vertices, (n, 3) float32.
-        texture: index of each face's texture, -1 for none, (k,) int16.
-        uv: texture coordinates of the corners, (k, 3, 2) float32; ignored if no face has a texture.
-        texels: texels of all textures at all mipmap levels, (m,) uint64, see :func:`packed`.
-        pyramids: first texel, height and width of every level of every texture, (textures, levels, 3); each level has
-            a border of one texel, copied from the opposite side.
-    """
+    """Faces of a scene as the shading kernels take them: k faces with n vertices."""
 
     faces: NDArray[np.uint32]
+    """Vertex indices, (k, 3) uint32."""
     colors: NDArray[np.float32]
+    """SRGB albedo, (k, 3) float32."""
     smooth: NDArray[np.bool_]
+    """Whether to interpolate vertex normals, (k,) bool."""
     face_normals: NDArray[np.float32]
+    """Unit normals of the faces, (k, 3) float32."""
     vertex_normals: NDArray[np.float32]
+    """Unit normals of the vertices, (n, 3) float32."""
     texture: NDArray[np.int16]
+    """Index of each face's texture, -1 for none, (k,) int16."""
     uv: NDArray[np.float32]
+    """Texture coordinates of the corners, (k, 3, 2) float32; ignored if no face has a texture."""
     texels: NDArray[np.uint64]
+    """Texels of all textures at all mipmap levels, (m,) uint64, see :func:`packed`."""
     pyramids: NDArray[np.int64]
+    """First texel, height and width of every level of every texture, (textures, levels, 3); each level has a border of
+    one texel, copied from the opposite side."""
 
 
 class DrawnPixels(NamedTuple):
-    """What pixels show.
-
-    Attributes:
-        triangle: visible face or -1, (h, w) int32.
-        inverse_depth: inverse depth, 1/m, (h, w) float32; 0 without a face.
-        corners: homogeneous pixel coordinates of the vertices, (n, 3).
-    """
+    """What pixels show."""
 
     triangle: NDArray[np.int32]
+    """Visible face or -1, (h, w) int32."""
     inverse_depth: NDArray[np.float32]
+    """Inverse depth, 1/m, (h, w) float32; 0 without a face."""
     corners: NDArray[np.float64]
+    """Homogeneous pixel coordinates of the vertices, (n, 3)."""
 
 
 class PixelRays(NamedTuple):
-    """Rays of a camera: ``center + depth * to_rays @ (x, y, 1)`` is the point at a pixel.
-
-    Attributes:
-        center: camera centre in the world, (3,).
-        to_rays: matrix, (3, 3).
-    """
+    """Rays of a camera: ``center + depth * to_rays @ (x, y, 1)`` is the point at a pixel."""
 
     center: NDArray[np.float64]
+    """Camera centre in the world, (3,)."""
     to_rays: NDArray[np.float64]
+    """Matrix, (3, 3)."""
 
 
 @njit(cache=True)

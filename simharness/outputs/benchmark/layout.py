@@ -43,15 +43,12 @@ PEOPLE = "openpose/{camera}/{camera}_{frame:08d}_keypoints.json"
 
 @dataclass(frozen=True)
 class Layout:
-    """Paths of a sequence.
-
-    Attributes:
-        folder: folder of the sequence.
-        name: name of the sequence, used in the names of calibration files; the folder may have another name.
-    """
+    """Paths of a sequence."""
 
     folder: Path
+    """Folder of the sequence."""
     name: str
+    """Name of the sequence, used in the names of calibration files; the folder may have another name."""
 
     @property
     def calibration(self) -> Path:

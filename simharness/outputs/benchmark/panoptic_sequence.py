@@ -48,18 +48,16 @@ _FINER = 2  # samples per pixel along each axis, against aliasing
 class ExportPlan:
     """Content and place of an exported sequence.
 
-    Attributes:
-        folder: folder of the sequence; an earlier export there is replaced.
-        every: step between written frames; files are numbered by frame.
-        pictures: whether pictures are written.
-
     Raises:
         ValueError: the folder exists and is no export, or cannot be created; ``every`` below 1.
     """
 
     folder: Path
+    """Folder of the sequence; an earlier export there is replaced."""
     every: int = 1
+    """Step between written frames; files are numbered by frame."""
     pictures: bool = True
+    """Whether pictures are written."""
 
     def __post_init__(self) -> None:
         if self.every < 1:

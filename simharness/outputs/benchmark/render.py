@@ -41,24 +41,22 @@ _MOSAIC_WIDTH = 1920  # largest width, pixels
 class RenderPlan:
     """Content and format of rendered files.
 
-    Attributes:
-        video: one MP4 for each camera instead of one PNG for each picture.
-        overlay: layers drawn into the pictures, of ``LAYERS``.
-        channels: images written beside every picture as PNG, of ``CHANNELS``. depth: 16 bits, millimetres, 0 for no
-            surface. ids: 8 bits, person + 1, 255 for objects and the room, 0 for none. parts: 8 bits,
-            :class:`simharness.world.humans.anatomy.Segment` + 1, 0 where there is no body.
-        every: step between rendered frames.
-        finer: samples per pixel along each axis.
-
     Raises:
         ValueError: an unknown layer or channel, channels of a video, or ``every`` below 1.
     """
 
     video: bool = False
+    """One MP4 for each camera instead of one PNG for each picture."""
     overlay: frozenset[str] = frozenset()
+    """Layers drawn into the pictures, of ``LAYERS``."""
     channels: frozenset[str] = frozenset()
+    """Images written beside every picture as PNG, of ``CHANNELS``. depth: 16 bits, millimetres, 0 for no surface. ids:
+    8 bits, person + 1, 255 for objects and the room, 0 for none. parts: 8 bits,
+    :class:`simharness.world.humans.anatomy.Segment` + 1, 0 where there is no body."""
     every: int = 1
+    """Step between rendered frames."""
     finer: int = 2
+    """Samples per pixel along each axis."""
 
     def __post_init__(self) -> None:
         for option, given, known in (("--overlay", self.overlay, LAYERS), ("--also", self.channels, CHANNELS)):

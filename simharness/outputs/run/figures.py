@@ -29,19 +29,16 @@ Draw = Callable[[Record, str], str | None]
 
 @dataclass(frozen=True)
 class RunFigure:
-    """A registered figure.
-
-    Attributes:
-        title: heading.
-        caption: what the figure shows, a sentence; ``{variant}`` stands for the name of the variant.
-        draw: function of the run and of the variant to show; returns SVG, or None without data.
-        finding: function of the same that returns what the figure shows, a sentence, or an empty text.
-    """
+    """A registered figure."""
 
     title: str
+    """Heading."""
     caption: str
+    """What the figure shows, a sentence; ``{variant}`` stands for the name of the variant."""
     draw: Draw
+    """Function of the run and of the variant to show; returns SVG, or None without data."""
     finding: Callable[[Record, str], str] | None = None
+    """Function of the same that returns what the figure shows, a sentence, or an empty text."""
 
 
 @dataclass(frozen=True)

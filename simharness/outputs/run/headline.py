@@ -12,21 +12,18 @@ from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES
 
 @dataclass(frozen=True)
 class Column:
-    """A headline score.
-
-    Attributes:
-        title: short name for the head of a table.
-        unit: unit of the number; empty for a count or a ratio.
-        about: explanation in one line.
-        value: function that returns the number from a variant's summary, or None where it does not apply.
-        digits: decimals.
-    """
+    """A headline score."""
 
     title: str
+    """Short name for the head of a table."""
     unit: str
+    """Unit of the number; empty for a count or a ratio."""
     about: str
+    """Explanation in one line."""
     value: Callable[[Mapping[str, Any]], float | None]
+    """Function that returns the number from a variant's summary, or None where it does not apply."""
     digits: int
+    """Decimals."""
 
     def number(self, scores: Mapping[str, Any]) -> str:
         """Return the number of a variant without its unit."""

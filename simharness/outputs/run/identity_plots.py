@@ -30,24 +30,21 @@ _MOST_GHOST_ROWS = 8
 
 @dataclass(frozen=True)
 class Identities:
-    """Identities of one variant.
-
-    Attributes:
-        time: times of the frames, (T,), seconds.
-        frames: people and identities.
-        pairs: the pairs of both in each frame, by which switches are counted.
-        paths: roots of the true people from above, (T, P, 2), metres; NaN where absent.
-        places: roots of the estimates of each frame from above, (k, 2), metres.
-        colors: colour of each of the K identities: that of the person that it stands for, others after those; grey for
-            an identity that never is a person's.
-    """
+    """Identities of one variant."""
 
     time: Floats
+    """Times of the frames, (T,), seconds."""
     frames: TrackedFrames
+    """People and identities."""
     pairs: ClearMot
+    """The pairs of both in each frame, by which switches are counted."""
     paths: Floats
+    """Roots of the true people from above, (T, P, 2), metres; NaN where absent."""
     places: tuple[Floats, ...]
+    """Roots of the estimates of each frame from above, (k, 2), metres."""
     colors: tuple[Color, ...]
+    """Colour of each of the K identities: that of the person that it stands for, others after those; grey for an
+    identity that never is a person's."""
 
     @property
     def ghosts(self) -> "list[tuple[int, Labels]]":

@@ -42,17 +42,14 @@ _JPEG_QUALITY = 88
 
 @dataclass(frozen=True)
 class PagePicture:
-    """Picture on a page.
-
-    Attributes:
-        title: heading.
-        caption: description.
-        rgb: pixels, (h, w, 3) uint8.
-    """
+    """Picture on a page."""
 
     title: str
+    """Heading."""
     caption: str
+    """Description."""
     rgb: Rgb = field(repr=False)
+    """Pixels, (h, w, 3) uint8."""
 
     def png(self) -> bytes:
         """Return the picture as a PNG file, without loss."""
@@ -245,17 +242,14 @@ _LEAST_RATE = 1.0  # pictures per second: players show nothing of a slower film 
 
 @dataclass(frozen=True)
 class RunFilm:
-    """Film of a run.
-
-    Attributes:
-        caption: description for the page.
-        mp4: contents of the MP4 file.
-        poster: first picture, (h, w, 3).
-    """
+    """Film of a run."""
 
     caption: str
+    """Description for the page."""
     mp4: bytes
+    """Contents of the MP4 file."""
     poster: Rgb
+    """First picture, (h, w, 3)."""
 
     @property
     def uri(self) -> str:

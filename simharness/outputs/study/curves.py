@@ -29,24 +29,21 @@ from simharness.study.study_folder import Results
 
 @dataclass(frozen=True)
 class Factor:
-    """A swept key with its trials.
-
-    Attributes:
-        key: dotted key of the scenario.
-        values: swept values: ascending where they are numbers, else in the order of the study.
-        numeric: whether the values are numbers.
-        rows: trials of the study: all of a grid; of a one-at-a-time sweep, those that vary this key, and the base.
-        along: keys that change together with this one.
-        over: other keys that vary among the trials of one value, with their values: a score is the mean over them.
-            These are the other factors of a grid, and ``case`` where several cases are pooled.
-    """
+    """A swept key with its trials."""
 
     key: str
+    """Dotted key of the scenario."""
     values: tuple[Any, ...]
+    """Swept values: ascending where they are numbers, else in the order of the study."""
     numeric: bool
+    """Whether the values are numbers."""
     rows: pl.DataFrame = field(repr=False)
+    """Trials of the study: all of a grid; of a one-at-a-time sweep, those that vary this key, and the base."""
     along: tuple[str, ...] = ()
+    """Keys that change together with this one."""
     over: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
+    """Other keys that vary among the trials of one value, with their values: a score is the mean over them. These are
+    the other factors of a grid, and ``case`` where several cases are pooled."""
 
     def table(self, variant: str, score: str) -> Floats:
         """Return the score of a variant by seed and value, (n, k): means over the other keys, NaN without data."""
@@ -138,25 +135,22 @@ def grid(first: Factor, second: Factor, variant: str, score: str) -> Floats | No
 
 @dataclass(frozen=True)
 class FactorBreakingPoint:
-    """Breaking point of one variant along one factor.
-
-    Attributes:
-        factor: key of the factor.
-        variant: name of the variant.
-        score: key of the score.
-        threshold: last value of the score that is still good.
-        rising: whether the score gets worse as the factor grows; else it gets worse as the factor shrinks.
-        point: value of the factor at the threshold; the ends of its interval are ascending.
-        swept: lowest and highest value of the factor.
-    """
+    """Breaking point of one variant along one factor."""
 
     factor: str
+    """Key of the factor."""
     variant: str
+    """Name of the variant."""
     score: str
+    """Key of the score."""
     threshold: float
+    """Last value of the score that is still good."""
     rising: bool
+    """Whether the score gets worse as the factor grows; else it gets worse as the factor shrinks."""
     point: BreakingPoint
+    """Value of the factor at the threshold; the ends of its interval are ascending."""
     swept: tuple[float, float]
+    """Lowest and highest value of the factor."""
 
 
 def breaking_along(

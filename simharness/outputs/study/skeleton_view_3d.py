@@ -28,23 +28,20 @@ from simharness.types.truth import Truth
 
 @dataclass(frozen=True)
 class Replay:
-    """Scene, truth, detections and estimates of one variant in a trial.
-
-    Attributes:
-        trial: the built scenario.
-        variant: variant of the method.
-        time: time of each frame, (T,), seconds.
-        truth: truth of each frame, T.
-        detections: detections of each frame, T.
-        estimates: estimates of the variant for each frame, T.
-    """
+    """Scene, truth, detections and estimates of one variant in a trial."""
 
     trial: Trial
+    """The built scenario."""
     variant: str
+    """Variant of the method."""
     time: NDArray[np.float64]
+    """Time of each frame, (T,), seconds."""
     truth: tuple[Truth, ...]
+    """Truth of each frame, T."""
     detections: tuple[Detections, ...]
+    """Detections of each frame, T."""
     estimates: tuple[Estimate, ...]
+    """Estimates of the variant for each frame, T."""
 
     def owners(self, frame: int) -> NDArray[np.int64]:
         """Return the true person of each estimate of a frame, (n,), -1 for a ghost."""

@@ -30,40 +30,34 @@ _NAMED = 5  # failures of a frame that its caption names
 
 @dataclass(frozen=True)
 class WorstFrame:
-    """A frame of a trial with the result of one variant.
-
-    Attributes:
-        trial: identity of the trial.
-        variant: name of the variant.
-        frame: frame index.
-        cost: sum of the errors of people, and 500 for every missed person or ghost, in millimetres.
-        setting: case, factors and seed of the trial, by name.
-    """
+    """A frame of a trial with the result of one variant."""
 
     trial: str
+    """Identity of the trial."""
     variant: str
+    """Name of the variant."""
     frame: int
+    """Frame index."""
     cost: float
+    """Sum of the errors of people, and 500 for every missed person or ghost, in millimetres."""
     setting: Mapping[str, Any]
+    """Case, factors and seed of the trial, by name."""
 
 
 @dataclass(frozen=True)
 class WorstFramePictures:
-    """Pictures of a worst frame.
-
-    Attributes:
-        picture: mosaic of the views.
-        view: 3D view of the people over time.
-        setting: setting of the trial in one line.
-        trial: identity of the trial.
-        command: command that renders the trial again; empty where no command gives the same scenario.
-    """
+    """Pictures of a worst frame."""
 
     picture: PagePicture
+    """Mosaic of the views."""
     view: View3D
+    """3D view of the people over time."""
     setting: str
+    """Setting of the trial in one line."""
     trial: str
+    """Identity of the trial."""
     command: str
+    """Command that renders the trial again; empty where no command gives the same scenario."""
 
 
 def worst_frames(results: Results, *, count: int = SHOWN) -> list[WorstFrame]:

@@ -53,21 +53,18 @@ MEASUREMENTS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Row:
-    """Row of a table of verdicts.
-
-    Attributes:
-        title: first cell.
-        cells: further cells.
-        state: state of the verdict.
-        note: small text under the title.
-        count: number of figures that the row stands for.
-    """
+    """Row of a table of verdicts."""
 
     title: str
+    """First cell."""
     cells: tuple[str, ...]
+    """Further cells."""
     state: str
+    """State of the verdict."""
     note: str = ""
+    """Small text under the title."""
     count: int = 1
+    """Number of figures that the row stands for."""
 
 
 GROUP_COLUMNS = ("hold", "unclear", "fail", "real", "simulated", "difference", "bound")

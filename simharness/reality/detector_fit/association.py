@@ -27,29 +27,25 @@ _MIN_JOINTS = 3  # reported limb joints needed to associate a detection
 
 @dataclass(frozen=True)
 class Association:
-    """People shown by the detections.
-
-    Attributes:
-        keypoints: keypoints of each known person in each view, (T, V, P, 17, 2); NaN where not detected or not
-            reported.
-        scores: scores of these keypoints, (T, V, P, 17); 0 where not reported.
-        duplicates: number of further detections of each known person, (T, V, P).
-        consensus: joints of each known person, triangulated robustly from the detections, (T, P, 17, 3) metres; NaN
-            where detections do not agree.
-        unannotated: joints of people without annotation, (T, N, 17, 3) metres; NaN in frames with fewer of them.
-        fragments: number of detections with too few limb joints to be associated, (T, V).
-        false: number of detections that show no person, (T, V).
-        false_scores: scores of their keypoints, (T, V, F, 17); 0 where not reported or where there are fewer.
-    """
+    """People shown by the detections."""
 
     keypoints: Floats
+    """Keypoints of each known person in each view, (T, V, P, 17, 2); NaN where not detected or not reported."""
     scores: Floats
+    """Scores of these keypoints, (T, V, P, 17); 0 where not reported."""
     duplicates: NDArray[np.int64]
+    """Number of further detections of each known person, (T, V, P)."""
     consensus: Floats
+    """Joints of each known person, triangulated robustly from the detections, (T, P, 17, 3) metres; NaN where
+    detections do not agree."""
     unannotated: Floats
+    """Joints of people without annotation, (T, N, 17, 3) metres; NaN in frames with fewer of them."""
     fragments: NDArray[np.int64]
+    """Number of detections with too few limb joints to be associated, (T, V)."""
     false: NDArray[np.int64]
+    """Number of detections that show no person, (T, V)."""
     false_scores: Floats
+    """Scores of their keypoints, (T, V, F, 17); 0 where not reported or where there are fewer."""
 
     @property
     def detected(self) -> Bools:

@@ -25,26 +25,23 @@ _NEAREST = 0.1  # metres: smallest depth
 
 @dataclass(frozen=True)
 class Consensus:
-    """Joints on which the views agree.
-
-    Attributes:
-        joints: joints from all views that agree, (T, P, 17, 3) metres; NaN with fewer than two.
-        agrees: which keypoints support the consensus, (T, V, P, 17).
-        predicted: joints from the other views that agree, projected into each view, (T, V, P, 17, 2) pixels; NaN with
-            fewer than two other views.
-        noise: variance of the prediction per axis, (T, V, P, 17), as a multiple of the variance of a keypoint, both in
-            units of OKS sigma x sqrt(area); NaN where not reported or not predicted.
-        variance: variance of the joints per axis if keypoints are off by one unit (standard deviation), (T, P, 17)
-            square metres; NaN with fewer than two views.
-        scale: mean square size of one unit at the joint over the views that agree, (T, P, 17) square metres.
-    """
+    """Joints on which the views agree."""
 
     joints: Floats
+    """Joints from all views that agree, (T, P, 17, 3) metres; NaN with fewer than two."""
     agrees: Bools
+    """Which keypoints support the consensus, (T, V, P, 17)."""
     predicted: Floats
+    """Joints from the other views that agree, projected into each view, (T, V, P, 17, 2) pixels; NaN with fewer than
+    two other views."""
     noise: Floats
+    """Variance of the prediction per axis, (T, V, P, 17), as a multiple of the variance of a keypoint, both in units of
+    OKS sigma x sqrt(area); NaN where not reported or not predicted."""
     variance: Floats
+    """Variance of the joints per axis if keypoints are off by one unit (standard deviation), (T, P, 17) square metres;
+    NaN with fewer than two views."""
     scale: Floats
+    """Mean square size of one unit at the joint over the views that agree, (T, P, 17) square metres."""
 
 
 def find_consensus(rig: Rig, keypoints: Floats, unit: Floats) -> Consensus:

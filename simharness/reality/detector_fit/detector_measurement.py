@@ -75,21 +75,18 @@ class MeasuredValue:
 
 @dataclass(frozen=True)
 class MeasuredDetector:
-    """Measured parameters of a detector.
-
-    Attributes:
-        name: name of the sample.
-        frames: number of frames.
-        people: mean number of measured people in a frame.
-        kind: kind of the detector.
-        values: measured values by key of ``[detector]``; also ``share.`` and ``size.``.
-    """
+    """Measured parameters of a detector."""
 
     name: str
+    """Name of the sample."""
     frames: int
+    """Number of frames."""
     people: float
+    """Mean number of measured people in a frame."""
     kind: DetectorKind
+    """Kind of the detector."""
     values: Mapping[str, MeasuredValue]
+    """Measured values by key of ``[detector]``; also ``share.`` and ``size.``."""
 
     def with_values(self, values: Mapping[str, float]) -> "MeasuredDetector":
         """Return the measurement with calibrated values; intervals keep their distances from them as ratios."""

@@ -120,39 +120,36 @@ class BoneSums(NamedTuple):
 
 
 class FrameSums(NamedTuple):
-    """Sums of all that the parameters of a detector are estimated from.
-
-    Attributes:
-        classes: joints that each class of errors could have taken and took, by occlusion class and kind, (..., 3, 9).
-        face: joints of the face that nobody else hides, and those not reported, by kind and bearing, (..., 3, 12).
-        size: limb joints that are reported, and those not good, by tercile of the person's size, (..., 3).
-        size_drop: limb joints that may be dropped, and those dropped, by tercile, (..., 3).
-        miss: misses of limbs.
-        scatter: good keypoints.
-        jitter: jitters.
-        dependence: joints taken together.
-        scores: scores.
-        people: people missed and detected.
-        false: false detections.
-        bones: lengths of limbs.
-        border: limb joints outside of the images by distance from the border, (..., B), and those reported, (...).
-        outside: the same joints by kind, (..., 9).
-    """
+    """Sums of all that the parameters of a detector are estimated from."""
 
     classes: Mapping[str, Trials]
+    """Joints that each class of errors could have taken and took, by occlusion class and kind, (..., 3, 9)."""
     face: Trials
+    """Joints of the face that nobody else hides, and those not reported, by kind and bearing, (..., 3, 12)."""
     size: Trials
+    """Limb joints that are reported, and those not good, by tercile of the person's size, (..., 3)."""
     size_drop: Trials
+    """Limb joints that may be dropped, and those dropped, by tercile, (..., 3)."""
     miss: MissSums
+    """Misses of limbs."""
     scatter: ScatterSums
+    """Good keypoints."""
     jitter: JitterSums
+    """Jitters."""
     dependence: DependenceSums
+    """Joints taken together."""
     scores: ScoreHistograms
+    """Scores."""
     people: PeopleSums
+    """People missed and detected."""
     false: FalseSums
+    """False detections."""
     bones: BoneSums
+    """Lengths of limbs."""
     border: Trials
+    """Limb joints outside of the images by distance from the border, (..., B), and those reported, (...)."""
     outside: Trials
+    """The same joints by kind, (..., 9)."""
 
     def total(self) -> "FrameSums":
         """Return the sums over all frames, as one resample."""

@@ -60,23 +60,20 @@ _FARTHEST = 1.6  # largest change of a logit or a logarithm in all: what is meas
 
 @dataclass(frozen=True)
 class DetectorFit:
-    """Fitted detector and annotation of a recording.
-
-    Attributes:
-        real: measurement of the detector.
-        annotation: errors of the truth, and the bias of the detector against all annotators.
-        people: who is where in the recording.
-        film: re-enactment of the recording, which shows what hides what.
-        profile: [detector] parameters at which the simulated detector errs alike.
-        text: the profile as a file.
-    """
+    """Fitted detector and annotation of a recording."""
 
     real: MeasuredDetector
+    """Measurement of the detector."""
     annotation: AnnotationFit
+    """Errors of the truth, and the bias of the detector against all annotators."""
     people: People
+    """Who is where in the recording."""
     film: FilmedRecording
+    """Re-enactment of the recording, which shows what hides what."""
     profile: DetectorSection
+    """[detector] parameters at which the simulated detector errs alike."""
     text: str
+    """The profile as a file."""
 
 
 def fit(

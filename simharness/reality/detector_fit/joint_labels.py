@@ -43,52 +43,49 @@ _HALF = len(LIMB_JOINTS) // 2  # limb joints in the picture from which a person 
 
 @dataclass(frozen=True)
 class LabelledJoints:
-    """Labels of every joint of every known person in every view.
-
-    Attributes:
-        time: times of the frames, (T,) seconds.
-        step: seconds between consecutive frames.
-        kind: kind of the detector.
-        known: people who are measured, (T, P).
-        association: people shown by the detections.
-        consensus: joints on which the views agree.
-        boxes: boxes of the people, (T, V, P, 4).
-        unit: OKS sigma x sqrt(area), (T, V, P, 17) pixels.
-        target: joints as the other views place them, or as the sample where they do not, (T, V, P, 17, 2) pixels.
-        occlusion: occlusion class estimated from skeletons, (T, V, P, 17): VISIBLE, SELF_OCCLUDED or OCCLUDED.
-        bearing: bin of the bearing of the camera from the head, to the left of straight ahead, (T, V, P).
-        inside: joints inside of the image, as the sample places them, (T, V, P, 17).
-        beyond: distance of joints outside of the image from its border, units, (T, V, P, 17).
-        expected: people who should be detected, (T, V, P): known people with half of the limb joints in the picture.
-        error: :class:`KeypointError`, (T, V, P, 17); ABSENT where not reported or where the views do not agree.
-        risk: for each of CLASSES, the joints that it could have taken, (T, V, P, 17).
-        taken: for each of CLASSES, the joints that it took, (T, V, P, 17).
-        chance: for swap and inversion, the misses opposite to the place of that error, (T, V, P, 17): as many are
-            expected to fall on the place by chance.
-        residual: keypoint minus target, units, without the noise of the target, (T, V, P, 17, 2); NaN where unknown.
-        axes: right and down in the picture as directions in the world, (T, V, P, 2, 3).
-    """
+    """Labels of every joint of every known person in every view."""
 
     time: Floats
+    """Times of the frames, (T,) seconds."""
     step: float
+    """Seconds between consecutive frames."""
     kind: DetectorKind
+    """Kind of the detector."""
     known: Bools
+    """People who are measured, (T, P)."""
     association: Association
+    """People shown by the detections."""
     consensus: Consensus
+    """Joints on which the views agree."""
     boxes: Floats
+    """Boxes of the people, (T, V, P, 4)."""
     unit: Floats
+    """OKS sigma x sqrt(area), (T, V, P, 17) pixels."""
     target: Floats
+    """Joints as the other views place them, or as the sample where they do not, (T, V, P, 17, 2) pixels."""
     occlusion: NDArray[np.int8]
+    """Occlusion class estimated from skeletons, (T, V, P, 17): VISIBLE, SELF_OCCLUDED or OCCLUDED."""
     bearing: NDArray[np.int64]
+    """Bin of the bearing of the camera from the head, to the left of straight ahead, (T, V, P)."""
     inside: Bools
+    """Joints inside of the image, as the sample places them, (T, V, P, 17)."""
     beyond: Floats
+    """Distance of joints outside of the image from its border, units, (T, V, P, 17)."""
     expected: Bools
+    """People who should be detected, (T, V, P): known people with half of the limb joints in the picture."""
     error: NDArray[np.int8]
+    """:class:`KeypointError`, (T, V, P, 17); ABSENT where not reported or where the views do not agree."""
     risk: Mapping[str, Bools]
+    """For each of CLASSES, the joints that it could have taken, (T, V, P, 17)."""
     taken: Mapping[str, Bools]
+    """For each of CLASSES, the joints that it took, (T, V, P, 17)."""
     chance: Mapping[str, Bools]
+    """For swap and inversion, the misses opposite to the place of that error, (T, V, P, 17): as many are expected to
+    fall on the place by chance."""
     residual: Floats
+    """Keypoint minus target, units, without the noise of the target, (T, V, P, 17, 2); NaN where unknown."""
     axes: Floats
+    """Right and down in the picture as directions in the world, (T, V, P, 2, 3)."""
 
 
 def label_joints(sample: Sample) -> LabelledJoints:

@@ -19,34 +19,32 @@ from simharness.reality.people_tracks import LIMB_JOINTS, annotated
 class Sample:
     """Frames in which it is known who is where, and the detections in them.
 
-    Attributes:
-        name: name of the recording.
-        rig: the V cameras.
-        time: times of the frames, (T,) seconds, increasing.
-        reference: joints of the people, COCO-17, (T, P, 17, 3) metres; NaN where unknown. All limb joints of a person
-            (``LIMB_JOINTS``) are known, or none. They say who is where and what hides what; residuals are measured
-            against the consensus of the views.
-        detections: detections of each of the T frames.
-        kind: kind of the detector.
-        staged: the same joints of the bodies that re-enact the people, (T, P, 17, 3) metres; NaN where nobody does.
-            They say where heads point and what is outside of the pictures. None: the reference.
-        occlusion: occlusion class of each joint as rendered of these bodies, (T, V, P, 17). None: estimated with
-            capsules about the skeletons.
-        measured: people whose detections are measured in each frame, (T, P); the others only hide them. None: all.
-
     Raises:
         ValueError: shapes that do not fit, or a person with some known and some unknown limb joints.
     """
 
     name: str
+    """Name of the recording."""
     rig: Rig
+    """The V cameras."""
     time: Floats
+    """Times of the frames, (T,) seconds, increasing."""
     reference: Floats
+    """Joints of the people, COCO-17, (T, P, 17, 3) metres; NaN where unknown. All limb joints of a person
+    (``LIMB_JOINTS``) are known, or none. They say who is where and what hides what; residuals are measured against the
+    consensus of the views."""
     detections: tuple[Detections, ...]
+    """Detections of each of the T frames."""
     kind: DetectorKind = "bottom-up"
+    """Kind of the detector."""
     staged: Floats | None = None
+    """The same joints of the bodies that re-enact the people, (T, P, 17, 3) metres; NaN where nobody does. They say
+    where heads point and what is outside of the pictures. None: the reference."""
     occlusion: NDArray[np.int8] | None = None
+    """Occlusion class of each joint as rendered of these bodies, (T, V, P, 17). None: estimated with capsules about the
+    skeletons."""
     measured: Bools | None = None
+    """People whose detections are measured in each frame, (T, P); the others only hide them. None: all."""
 
     def __post_init__(self) -> None:
         set_arrays(self, time=("T",), reference=("T", "P", len(COCO17), 3))

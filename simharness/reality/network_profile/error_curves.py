@@ -28,19 +28,16 @@ _LAGS = 5
 
 
 class ErrorCurve(NamedTuple):
-    """Share of something by circumstance.
-
-    Attributes:
-        title: what is counted.
-        axis: what it depends on.
-        labels: name of each bin, B of them.
-        counts: trials and events, (B,) each.
-    """
+    """Share of something by circumstance."""
 
     title: str
+    """What is counted."""
     axis: str
+    """What it depends on."""
     labels: tuple[str, ...]
+    """Name of each bin, B of them."""
     counts: Trials
+    """Trials and events, (B,) each."""
 
     @property
     def share(self) -> Floats:

@@ -44,33 +44,27 @@ _FEWEST = 20  # errors of a kind of joint, in both, below which rates are not co
 
 @dataclass(frozen=True)
 class SceneCheck:
-    """Scores of one scene with each detector.
-
-    Attributes:
-        case: condition of the scene.
-        scores: score by detector, variant and key.
-        subsets: PCP by detector, variant and cameras.
-        errors: joints and errors by detector and class, (9,) each.
-    """
+    """Scores of one scene with each detector."""
 
     case: str
+    """Condition of the scene."""
     scores: Mapping[str, Mapping[str, Mapping[str, float]]]
+    """Score by detector, variant and key."""
     subsets: Mapping[str, Mapping[str, Mapping[tuple[int, ...], float]]]
+    """PCP by detector, variant and cameras."""
     errors: Mapping[str, Mapping[str, Trials]]
+    """Joints and errors by detector and class, (9,) each."""
 
 
 class CheckedFigure(NamedTuple):
-    """A figure of the network, and by how much that of a simulated detector differs from it.
-
-    Attributes:
-        network: its mean over the scenes.
-        difference: simulated minus network, paired by scene; of rates of errors their ratio.
-        bound: largest difference that is accepted; None where none is.
-    """
+    """A figure of the network, and by how much that of a simulated detector differs from it."""
 
     network: float
+    """Its mean over the scenes."""
     difference: Interval
+    """Simulated minus network, paired by scene; of rates of errors their ratio."""
     bound: float | None = None
+    """Largest difference that is accepted; None where none is."""
 
     @property
     def verdict(self) -> str:
@@ -85,17 +79,14 @@ class CheckedFigure(NamedTuple):
 
 @dataclass(frozen=True)
 class ProfileCheck:
-    """Comparison of detectors with the network.
-
-    Attributes:
-        scenes: results of each scene.
-        detectors: names of the simulated detectors, the fitted profile first.
-        variants: variants of the method.
-    """
+    """Comparison of detectors with the network."""
 
     scenes: tuple[SceneCheck, ...]
+    """Results of each scene."""
     detectors: tuple[str, ...]
+    """Names of the simulated detectors, the fitted profile first."""
     variants: tuple[str, ...]
+    """Variants of the method."""
 
     def score(self, detector: str, variant: str, key: str, *, case: str | None = None) -> CheckedFigure:
         """Return a score of a variant; in one condition or in all."""

@@ -70,27 +70,24 @@ _FACTORS = (
 
 @dataclass(frozen=True)
 class NetworkProfile:
-    """Fitted profile of a network.
-
-    Attributes:
-        name: name of the profile.
-        scenes: the scenes that it is fitted to.
-        bias: offset of the network's joints by kind, (9, 3) metres.
-        measured: measurement of the network.
-        labels: labels of the network.
-        simulated: labels of a simulated detector with the profile, in the same scenes.
-        detector: the profile.
-        text: the profile as a file.
-    """
+    """Fitted profile of a network."""
 
     name: str
+    """Name of the profile."""
     scenes: tuple[ProfiledScene, ...]
+    """The scenes that it is fitted to."""
     bias: Floats
+    """Offset of the network's joints by kind, (9, 3) metres."""
     measured: MeasuredDetector
+    """Measurement of the network."""
     labels: LabelledJoints
+    """Labels of the network."""
     simulated: LabelledJoints
+    """Labels of a simulated detector with the profile, in the same scenes."""
     detector: DetectorSection
+    """The profile."""
     text: str
+    """The profile as a file."""
 
     @property
     def kind(self) -> DetectorKind:

@@ -28,25 +28,22 @@ from simharness.types.views import Views
 
 @dataclass(frozen=True)
 class ProfiledScene:
-    """One scene in pictures, and what a network finds in them.
-
-    Attributes:
-        case: name of its condition; "" in a study without cases.
-        scenario: its scenario, with the seed.
-        sequence: true poses, T frames of P people.
-        views: truth in the pictures of V cameras.
-        rig: true rig.
-        believed: rig that the method is given.
-        found: detections of the network and their truth, T.
-    """
+    """One scene in pictures, and what a network finds in them."""
 
     case: str
+    """Name of its condition; "" in a study without cases."""
     scenario: Scenario
+    """Its scenario, with the seed."""
     sequence: PoseSequence
+    """True poses, T frames of P people."""
     views: Views
+    """Truth in the pictures of V cameras."""
     rig: Rig
+    """True rig."""
     believed: Rig
+    """Rig that the method is given."""
     found: tuple[Detected, ...]
+    """Detections of the network and their truth, T."""
 
     def simulated(self, config: DetectorSection, *, draw: int = 0) -> tuple[Detected, ...]:
         """Return the detections of a simulated detector in the same pictures, T.

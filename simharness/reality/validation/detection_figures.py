@@ -73,29 +73,25 @@ class Ratio(NamedTuple):
 
 @dataclass(frozen=True)
 class DetectionFigures:
-    """Figures of the detections of a recording of F frames.
-
-    Attributes:
-        ratios: ratios by key: ``affinity.different`` (share of pairs of detections of different people, in different
-            views, with an affinity above 0.5), ``affinity.same`` (share of pairs of one person below 0.5), ``behind``
-            (share of limb joints of annotated people in the pictures that another person hides), ``ears`` (share of
-            ears that fewer than two views report), ``tree.CHILD|PARENT`` (share of missing children where the parent
-            is missing), ``missing.KIND`` (share of joints in the picture that detections of annotated people do not
-            report), ``detected`` (share of people in a picture who are detected), ``phantoms`` (detections of nobody,
-            per view and frame), ``others`` (people who are not annotated, per frame).
-        bones: length of every bone of every actor, (F, A, 2 sides, 4), mm, from joints triangulated from all
-            detections; NaN where unknown. In the order of :data:`BONES`.
-        true_bones: the same from the truth.
-        affinities: histograms over :data:`AFFINITY_EDGES` of pairs of the "same" and of "different" people; each sums
-            to 1.
-        scores: 10, 50 and 90 % quantiles of the scores of reported limb joints.
-    """
+    """Figures of the detections of a recording of F frames."""
 
     ratios: Mapping[str, Ratio]
+    """Ratios by key: ``affinity.different`` (share of pairs of detections of different people, in different views, with
+    an affinity above 0.5), ``affinity.same`` (share of pairs of one person below 0.5), ``behind`` (share of limb joints
+    of annotated people in the pictures that another person hides), ``ears`` (share of ears that fewer than two views
+    report), ``tree.CHILD|PARENT`` (share of missing children where the parent is missing), ``missing.KIND`` (share of
+    joints in the picture that detections of annotated people do not report), ``detected`` (share of people in a picture
+    who are detected), ``phantoms`` (detections of nobody, per view and frame), ``others`` (people who are not
+    annotated, per frame)."""
     bones: Floats
+    """Length of every bone of every actor, (F, A, 2 sides, 4), mm, from joints triangulated from all detections; NaN
+    where unknown. In the order of :data:`BONES`."""
     true_bones: Floats
+    """The same from the truth."""
     affinities: Mapping[str, Floats]
+    """Histograms over :data:`AFFINITY_EDGES` of pairs of the "same" and of "different" people; each sums to 1."""
     scores: tuple[float, ...]
+    """10, 50 and 90 % quantiles of the scores of reported limb joints."""
 
     def values(self) -> dict[str, float]:
         """Return all numbers by key; also ``bones.BONE`` and ``true_bones.BONE``, mm, and ``score.q10`` and so on."""
@@ -108,24 +104,21 @@ class DetectionFigures:
 
 @dataclass(frozen=True)
 class ShownPeople:
-    """Detections of a recording by the annotated person whom they show.
-
-    Attributes:
-        recording: the recording.
-        reference: limb joints of the actors, COCO-17, (F, A, 17, 3) metres; NaN where not annotated, and in the face.
-        association: detections by actor.
-        triangulated: joints of the actors, the points nearest to the rays of all views, each of equal weight,
-            (F, A, 17, 3) metres; NaN with fewer than two views. They are not robust on purpose: they show gross errors.
-        inside: which joints lie on the pictures, (F, V, A, 17).
-        behind: which of these are hidden by another person, (F, V, A, 17).
-    """
+    """Detections of a recording by the annotated person whom they show."""
 
     recording: AnnotatedRecording
+    """The recording."""
     reference: Floats
+    """Limb joints of the actors, COCO-17, (F, A, 17, 3) metres; NaN where not annotated, and in the face."""
     association: Association
+    """Detections by actor."""
     triangulated: Floats
+    """Joints of the actors, the points nearest to the rays of all views, each of equal weight, (F, A, 17, 3) metres;
+    NaN with fewer than two views. They are not robust on purpose: they show gross errors."""
     inside: Bools
+    """Which joints lie on the pictures, (F, V, A, 17)."""
     behind: Bools
+    """Which of these are hidden by another person, (F, V, A, 17)."""
 
     @property
     def annotated(self) -> Bools:

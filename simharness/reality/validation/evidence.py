@@ -26,17 +26,14 @@ Figure = Callable[[Sums], "Floats | float"]
 
 @dataclass(frozen=True)
 class Compared:
-    """One figure of a recording and of its twins.
-
-    Attributes:
-        real: the recording's, with the interval of a block bootstrap over time.
-        twin: mean over the twins, with the interval of a bootstrap over twins.
-        twins: figure of each twin.
-    """
+    """One figure of a recording and of its twins."""
 
     real: Interval
+    """The recording's, with the interval of a block bootstrap over time."""
     twin: Interval
+    """Mean over the twins, with the interval of a bootstrap over twins."""
     twins: tuple[float, ...] = ()
+    """Figure of each twin."""
 
     @property
     def difference(self) -> float:
@@ -70,18 +67,15 @@ class Compared:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Sums of a recording, of its resamples and of its twins.
-
-    Attributes:
-        real: sums of the recording.
-        resamples: sums of R bootstrap resamples of its frames; the same resamples for all changes and variants, so
-            that differences between them are paired.
-        twins: sums of each twin.
-    """
+    """Sums of a recording, of its resamples and of its twins."""
 
     real: Sums
+    """Sums of the recording."""
     resamples: Sums
+    """Sums of R bootstrap resamples of its frames; the same resamples for all changes and variants, so that differences
+    between them are paired."""
     twins: tuple[Sums, ...]
+    """Sums of each twin."""
 
     @classmethod
     def of_tallies(

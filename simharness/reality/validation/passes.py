@@ -29,24 +29,22 @@ class ScoreSums:
     """Sums of a variant's scores over frames, by the H rules of ``RULES``.
 
     The leading axes (...) are the frames, the resamples of a bootstrap, or absent.
-
-    Attributes:
-        correct: number of correct parts of each scored actor, (..., H, S).
-        defined: number of parts that the truth defines, (..., H, S).
-        error: sum over pairs of the MPJPE, (..., H), mm.
-        found: number of pairs of true and estimated people, (..., H).
-        people: number of annotated people, (...).
-        estimates: number of estimates, (...).
-        frames: number of frames, (...).
     """
 
     correct: Floats
+    """Number of correct parts of each scored actor, (..., H, S)."""
     defined: Floats
+    """Number of parts that the truth defines, (..., H, S)."""
     error: Floats
+    """Sum over pairs of the MPJPE, (..., H), mm."""
     found: Floats
+    """Number of pairs of true and estimated people, (..., H)."""
     people: Floats
+    """Number of annotated people, (...)."""
     estimates: Floats
+    """Number of estimates, (...)."""
     frames: Floats
+    """Number of frames, (...)."""
 
     @classmethod
     def of_scores(cls, scores: ByRule, actors: Sequence[int]) -> "ScoreSums":
@@ -140,13 +138,10 @@ class Unchanged:
 
 @dataclass(frozen=True)
 class CameraSubset:
-    """Restriction of a recording to some cameras.
-
-    Attributes:
-        views: indices of the cameras.
-    """
+    """Restriction of a recording to some cameras."""
 
     views: tuple[int, ...]
+    """Indices of the cameras."""
 
     def __call__(self, recording: AnnotatedRecording) -> AnnotatedRecording:
         """Return the recording of these cameras."""

@@ -24,19 +24,16 @@ _MOST_PHANTOMS = 16  # of a view and frame; a rate of 2 exceeds it once in 10^10
 
 @dataclass(frozen=True)
 class Treatment:
-    """Errors of one kind and level, as a change of a recording (:class:`.RecordingChange`).
-
-    Attributes:
-        kind: key of :data:`KINDS`.
-        level: size, in the unit of the kind.
-        draw: number of the draw.
-        seed: seed of all draws.
-    """
+    """Errors of one kind and level, as a change of a recording (:class:`.RecordingChange`)."""
 
     kind: str
+    """Key of :data:`KINDS`."""
     level: float
+    """Size, in the unit of the kind."""
     draw: int = 0
+    """Number of the draw."""
     seed: int = 0
+    """Seed of all draws."""
 
     def __call__(self, recording: AnnotatedRecording) -> AnnotatedRecording:
         """Return the treated recording, with the same frames and the same truth."""
@@ -49,21 +46,18 @@ class Treatment:
 
 @dataclass(frozen=True)
 class TreatmentKind:
-    """Kind of treatments.
-
-    Attributes:
-        title: name in tables and plots.
-        unit: unit of the level.
-        levels: levels of a validation, ascending.
-        apply: function of a recording and a treatment, which returns the treated recording.
-        calibration: whether it changes the calibration, the same in all frames; else the detections.
-    """
+    """Kind of treatments."""
 
     title: str
+    """Name in tables and plots."""
     unit: str
+    """Unit of the level."""
     levels: tuple[float, ...]
+    """Levels of a validation, ascending."""
     apply: Callable[[AnnotatedRecording, Treatment], AnnotatedRecording]
+    """Function of a recording and a treatment, which returns the treated recording."""
     calibration: bool = False
+    """Whether it changes the calibration, the same in all frames; else the detections."""
 
 
 def _noise(recording: AnnotatedRecording, treatment: Treatment) -> AnnotatedRecording:

@@ -43,26 +43,23 @@ from simharness.scoring.frame_scores import RULES, ByRule, FrameScores, HeadRule
 
 @dataclass(frozen=True)
 class ValidationPlan:
-    """Extent of a validation.
-
-    Attributes:
-        every: every n-th annotated frame of the recording is used.
-        twin_every: the same for subsets and treatments of twins, of which there are several; all else takes every
-            frame that ``every`` leaves.
-        draws: number of draws of calibration errors.
-        detection_draws: number of draws of the errors of detections.
-        treated: whether treatments are compared.
-        variants: names of presets.
-        workers: number of processes.
-    """
+    """Extent of a validation."""
 
     every: int = 1
+    """Every n-th annotated frame of the recording is used."""
     twin_every: int = 3
+    """The same for subsets and treatments of twins, of which there are several; all else takes every frame that
+    ``every`` leaves."""
     draws: int = 10
+    """Number of draws of calibration errors."""
     detection_draws: int = 3
+    """Number of draws of the errors of detections."""
     treated: bool = True
+    """Whether treatments are compared."""
     variants: tuple[str, ...] = VARIANTS
+    """Names of presets."""
     workers: int = 1
+    """Number of processes."""
 
 
 QUICK = ValidationPlan(every=3, twin_every=6, draws=4, detection_draws=2)
@@ -71,43 +68,40 @@ QUICK = ValidationPlan(every=3, twin_every=6, draws=4, detection_draws=2)
 
 @dataclass(frozen=True)
 class Validation:
-    """Comparison of a recording with its twins, and verdicts.
-
-    Attributes:
-        recording: the recording, with the frames that were used.
-        twins: number of twins.
-        twin_frames: number of frames of a twin, mean.
-        plan: extent.
-        variants: scores by variant, key and rule for the head.
-        medians: median MPJPE by variant, mm.
-        parts: PCP of each group of parts by variant.
-        contrasts: differences of PCP by pair of variants and rule.
-        subsets: PCP with some of the cameras, missing joints of the face filled from the others.
-        subsets_as_is: the same as the method left them.
-        responses: losses by treatment, level and variant.
-        bases: PCP without a treatment in the frames that are treated, real and simulated, by variant, percent.
-        joints: errors by joint, of the first variant.
-        measured: measurements of the detections.
-        affinities: histograms of affinities, of the recording and mean of the twins.
-        verdicts: verdicts.
-    """
+    """Comparison of a recording with its twins, and verdicts."""
 
     recording: AnnotatedRecording
+    """The recording, with the frames that were used."""
     twins: int
+    """Number of twins."""
     twin_frames: float
+    """Number of frames of a twin, mean."""
     plan: ValidationPlan
+    """Extent."""
     variants: Mapping[str, Mapping[str, Mapping[HeadRule, Compared]]]
+    """Scores by variant, key and rule for the head."""
     medians: Mapping[str, Compared]
+    """Median MPJPE by variant, mm."""
     parts: Mapping[str, Mapping[str, Compared]]
+    """PCP of each group of parts by variant."""
     contrasts: Mapping[tuple[str, str], Mapping[HeadRule, Compared]]
+    """Differences of PCP by pair of variants and rule."""
     subsets: variant_comparison.SubsetComparison
+    """PCP with some of the cameras, missing joints of the face filled from the others."""
     subsets_as_is: variant_comparison.SubsetComparison
+    """The same as the method left them."""
     responses: Sequence[variant_comparison.DoseResponse]
+    """Losses by treatment, level and variant."""
     bases: Mapping[str, tuple[float, float]]
+    """PCP without a treatment in the frames that are treated, real and simulated, by variant, percent."""
     joints: variant_comparison.JointDifficulty
+    """Errors by joint, of the first variant."""
     measured: Mapping[str, Compared]
+    """Measurements of the detections."""
     affinities: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    """Histograms of affinities, of the recording and mean of the twins."""
     verdicts: Sequence[BoundVerdict] = field(default=())
+    """Verdicts."""
 
     @property
     def failed(self) -> list[BoundVerdict]:
@@ -250,15 +244,12 @@ _PREDICTED = ("pcp", "subsets")  # groups of verdicts that hold for other frames
 
 @dataclass(frozen=True)
 class HalfPrediction:
-    """Prediction of one half of a recording from a fit to the other.
-
-    Attributes:
-        half: the predicted half.
-        validation: the half beside its twins, without treatments.
-    """
+    """Prediction of one half of a recording from a fit to the other."""
 
     half: str
+    """The predicted half."""
     validation: Validation
+    """The half beside its twins, without treatments."""
 
     @property
     def verdicts(self) -> list[BoundVerdict]:

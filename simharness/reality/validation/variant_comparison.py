@@ -128,31 +128,28 @@ _FILLED = RULES[2]
 
 @dataclass(frozen=True)
 class DoseResponse:
-    """What one treatment costs one variant; means over draws.
-
-    Attributes:
-        kind: key of the treatment.
-        level: its level.
-        variant: the variant.
-        loss: PCP without the treatment minus PCP with it, points.
-        loss_filled: the same with missing joints of the face filled from the others.
-        ghosts: ghosts per frame with the treatment minus without.
-        recall: recall without the treatment minus with it, 0 to 1.
-        mpjpe: MPJPE with the treatment minus without, mm.
-        draws: loss of each of n draws, in reality and, mean over twins, in simulation, (2, n), points.
-        resamples: loss of each draw in R bootstrap resamples of reality, (R, n), points.
-    """
+    """What one treatment costs one variant; means over draws."""
 
     kind: str
+    """Key of the treatment."""
     level: float
+    """Its level."""
     variant: str
+    """The variant."""
     loss: Compared
+    """PCP without the treatment minus PCP with it, points."""
     loss_filled: Compared
+    """The same with missing joints of the face filled from the others."""
     ghosts: Compared
+    """Ghosts per frame with the treatment minus without."""
     recall: Compared
+    """Recall without the treatment minus with it, 0 to 1."""
     mpjpe: Compared
+    """MPJPE with the treatment minus without, mm."""
     draws: Floats
+    """Loss of each of n draws, in reality and, mean over twins, in simulation, (2, n), points."""
     resamples: Floats
+    """Loss of each draw in R bootstrap resamples of reality, (R, n), points."""
 
     @property
     def rank(self) -> Interval:
@@ -252,21 +249,18 @@ def subset_curve(sums: Sums, variant: str, *, rule: HeadRule = FILLED) -> dict[i
 
 @dataclass(frozen=True)
 class SubsetComparison:
-    """PCP with some of the cameras, in reality and in twins.
-
-    Attributes:
-        curves: PCP, percent, by number of cameras and variant; mean over the subsets.
-        gains: PCP of ``full`` minus that of ``fast``, points, by number of cameras.
-        sampled: camera counts of which only a sample of the subsets was tried.
-        single: PCP of each subset by variant: the recording's and the mean of the twins'.
-        ranks: Spearman's correlation of reality and twins over the pairs of cameras, by variant.
-    """
+    """PCP with some of the cameras, in reality and in twins."""
 
     curves: Mapping[int, Mapping[str, Compared]]
+    """PCP, percent, by number of cameras and variant; mean over the subsets."""
     gains: Mapping[int, Compared]
+    """PCP of ``full`` minus that of ``fast``, points, by number of cameras."""
     sampled: tuple[int, ...]
+    """Camera counts of which only a sample of the subsets was tried."""
     single: Mapping[str, Mapping[tuple[int, ...], tuple[float, float]]]
+    """PCP of each subset by variant: the recording's and the mean of the twins'."""
     ranks: Mapping[str, Interval]
+    """Spearman's correlation of reality and twins over the pairs of cameras, by variant."""
 
     def mean_difference(self, variant: str) -> float:
         """Return the mean over camera counts of the absolute difference between twins and reality, points."""

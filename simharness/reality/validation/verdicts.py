@@ -45,39 +45,36 @@ GROUPS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Bounds:
-    """Largest accepted differences between twins and reality.
-
-    Attributes:
-        pcp: PCP of a variant, points, with every rule for the head.
-        no_3dps: PCP of ``full`` minus that of ``no-3dps``, points.
-        mpjpe: MPJPE of a variant, as a share of reality's.
-        subsets: PCP of a variant with fewer cameras, points; mean over camera counts of the absolute difference.
-        gains: PCP of ``full`` minus that of ``fast``, points, by number of cameras; the last holds for more cameras.
-        subset_rank: least rank correlation over pairs of cameras.
-        loss: loss of PCP by a treatment, points.
-        loss_share: the same as a share of reality's loss; the larger of the two counts.
-        draw_rank: least rank correlation over draws of calibration errors.
-        bones: least and greatest ratio of the variation of triangulated bones, twins to reality.
-        tree: share of missing children of missing parents, for bottom-up detectors.
-        ears: share of ears that fewer than two views report: 2 % on Shelf, where 0.6 % are measured.
-        behind: share of joints hidden by other people.
-        ambiguous: share of ambiguous pairs of detections, as a share of reality's.
-    """
+    """Largest accepted differences between twins and reality."""
 
     pcp: float = 1.5
+    """PCP of a variant, points, with every rule for the head."""
     no_3dps: float = 1.0
+    """PCP of ``full`` minus that of ``no-3dps``, points."""
     mpjpe: float = 0.15
+    """MPJPE of a variant, as a share of reality's."""
     subsets: float = 2.5
+    """PCP of a variant with fewer cameras, points; mean over camera counts of the absolute difference."""
     gains: tuple[tuple[int, float], ...] = ((2, 3.0), (3, 1.5), (4, 1.0))
+    """PCP of ``full`` minus that of ``fast``, points, by number of cameras; the last holds for more cameras."""
     subset_rank: float = 0.85
+    """Least rank correlation over pairs of cameras."""
     loss: float = 2.0
+    """Loss of PCP by a treatment, points."""
     loss_share: float = 0.2
+    """The same as a share of reality's loss; the larger of the two counts."""
     draw_rank: float = 0.8
+    """Least rank correlation over draws of calibration errors."""
     bones: tuple[float, float] = (0.75, 1.33)
+    """Least and greatest ratio of the variation of triangulated bones, twins to reality."""
     tree: float = 0.01
+    """Share of missing children of missing parents, for bottom-up detectors."""
     ears: float = 0.014
+    """Share of ears that fewer than two views report: 2 % on Shelf, where 0.6 % are measured."""
     behind: float = 0.02
+    """Share of joints hidden by other people."""
     ambiguous: float = 1 / 3
+    """Share of ambiguous pairs of detections, as a share of reality's."""
 
     def gain(self, cameras: int) -> float:
         """Return the bound of ``full`` minus ``fast`` with so many cameras."""
@@ -105,23 +102,20 @@ class VerdictState(StrEnum):
 
 @dataclass(frozen=True)
 class BoundVerdict:
-    """Verdict on one figure.
-
-    Attributes:
-        group: key of the group of figures that share a bound: ``pcp``, ``dose`` and so on.
-        name: dotted name of the figure, unique in a validation.
-        real: figure of the recording; NaN where the figure is a correlation of both.
-        twin: figure of the twins.
-        bound: bound as text.
-        state: state.
-    """
+    """Verdict on one figure."""
 
     group: str
+    """Key of the group of figures that share a bound: ``pcp``, ``dose`` and so on."""
     name: str
+    """Dotted name of the figure, unique in a validation."""
     real: float
+    """Figure of the recording; NaN where the figure is a correlation of both."""
     twin: float
+    """Figure of the twins."""
     bound: str
+    """Bound as text."""
     state: VerdictState
+    """State."""
 
     @property
     def difference(self) -> float:

@@ -42,19 +42,16 @@ _EPSILON = float(np.finfo(float).eps)  # a similarity at the threshold counts
 
 @dataclass(frozen=True)
 class IdentityScores:
-    """Identities of the true people over the whole sequence.
-
-    Attributes:
-        track: index into ``TrackedFrames.ids`` of the identity of each true person, (P,); -1 for none.
-        right: number of frames in which the estimate of a person's identity is within the distance (IDTP).
-        missed: number of all other frames of true people (IDFN).
-        false: number of all other estimates (IDFP).
-    """
+    """Identities of the true people over the whole sequence."""
 
     track: NDArray[np.int64]
+    """Index into ``TrackedFrames.ids`` of the identity of each true person, (P,); -1 for none."""
     right: int
+    """Number of frames in which the estimate of a person's identity is within the distance (IDTP)."""
     missed: int
+    """Number of all other frames of true people (IDFN)."""
     false: int
+    """Number of all other estimates (IDFP)."""
 
     @property
     def f1(self) -> float:
@@ -158,19 +155,16 @@ THRESHOLDS: Floats = np.arange(0.05, 0.99, 0.05)
 
 @dataclass(frozen=True)
 class Hota:
-    """HOTA and its parts at each of the 19 thresholds, all 0 to 1 and (19,).
-
-    Attributes:
-        detection: DetA.
-        association: AssA.
-        location: LocA.
-        pairs: number of pairs, TP.
-    """
+    """HOTA and its parts at each of the 19 thresholds, all 0 to 1 and (19,)."""
 
     detection: Floats
+    """DetA."""
     association: Floats
+    """AssA."""
     location: Floats
+    """LocA."""
     pairs: NDArray[np.int64]
+    """Number of pairs, TP."""
 
     @property
     def hota(self) -> Floats:
@@ -224,22 +218,19 @@ _KEPT = 1000.0  # weight of a pair of the frame before: more than all similariti
 
 @dataclass(frozen=True)
 class ClearMot:
-    """Pairs of people and identities in each frame, and what they count.
-
-    Attributes:
-        track: index into ``TrackedFrames.ids`` of the identity that each true person is paired with, (T, P);
-            :data:`MISSED` where it has none, :data:`ABSENT` where the person is not there.
-        switched: where a person's identity is another one than the last time, (T, P).
-        fragmentations: how often people are paired again after frames without a pair.
-        missed: number of people without a pair in all frames.
-        false: number of estimates without a pair in all frames.
-    """
+    """Pairs of people and identities in each frame, and what they count."""
 
     track: NDArray[np.int64]
+    """Index into ``TrackedFrames.ids`` of the identity that each true person is paired with, (T, P); :data:`MISSED`
+    where it has none, :data:`ABSENT` where the person is not there."""
     switched: NDArray[np.bool_]
+    """Where a person's identity is another one than the last time, (T, P)."""
     fragmentations: int
+    """How often people are paired again after frames without a pair."""
     missed: int
+    """Number of people without a pair in all frames."""
     false: int
+    """Number of estimates without a pair in all frames."""
 
     @property
     def switches(self) -> int:

@@ -28,21 +28,18 @@ DISTANCES = (0.25, 0.5, 1.0)
 
 @dataclass(frozen=True)
 class TrackedFrames:
-    """True people and estimated identities of T frames.
-
-    Attributes:
-        people: number of true people P, present or not.
-        ids: the K different identities in ascending order, (K,).
-        present: for each frame, the g true people who are in it, (g,), ascending.
-        tracks: for each frame, the index into ``ids`` of each of its k estimates, (k,), all different.
-        distances: for each frame, distances between them, (g, k), metres; infinite where they cannot be compared.
-    """
+    """True people and estimated identities of T frames."""
 
     people: int
+    """Number of true people P, present or not."""
     ids: Labels
+    """The K different identities in ascending order, (K,)."""
     present: tuple[Labels, ...]
+    """For each frame, the g true people who are in it, (g,), ascending."""
     tracks: tuple[Labels, ...]
+    """For each frame, the index into ``ids`` of each of its k estimates, (k,), all different."""
     distances: tuple[Floats, ...]
+    """For each frame, distances between them, (g, k), metres; infinite where they cannot be compared."""
 
     def __len__(self) -> int:
         """T, the number of frames."""

@@ -50,25 +50,22 @@ def _unchanged(scenario: Scenario) -> Scenario:
 
 @dataclass(frozen=True)
 class Cause:
-    """Cause of a lost score.
-
-    Attributes:
-        name: name for command lines and files.
-        title: name for people.
-        mended: what the system has when the cause is mended, for users who decide what to buy or mend.
-        change: function that takes the cause out of a scenario.
-        reveals: visibility of joints that become visible; None: of none.
-        labels: whether the true labels replace affinity and matching.
-        camera: whether the rig has one more camera.
-    """
+    """Cause of a lost score."""
 
     name: str
+    """Name for command lines and files."""
     title: str
+    """Name for people."""
     mended: str
+    """What the system has when the cause is mended, for users who decide what to buy or mend."""
     change: Callable[[Scenario], Scenario] = _unchanged
+    """Function that takes the cause out of a scenario."""
     reveals: Visibility | None = None
+    """Visibility of joints that become visible; None: of none."""
     labels: bool = False
+    """Whether the true labels replace affinity and matching."""
     camera: bool = False
+    """Whether the rig has one more camera."""
 
 
 def _sections(scenario: Scenario, **changes: dict[str, Any]) -> Scenario:

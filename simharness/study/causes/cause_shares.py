@@ -52,19 +52,16 @@ CANDIDATES = 4
 
 @dataclass(frozen=True)
 class Share:
-    """What one cause costs.
-
-    Attributes:
-        cause: name of the cause (:data:`simharness.study.causes.cause_catalogue.CAUSES`).
-        share: Shapley value, points of the score.
-        alone: gain if this cause alone is mended, points.
-        last: gain if it is mended after all others, points.
-    """
+    """What one cause costs."""
 
     cause: str
+    """Name of the cause (:data:`simharness.study.causes.cause_catalogue.CAUSES`)."""
     share: Interval
+    """Shapley value, points of the score."""
     alone: Interval
+    """Gain if this cause alone is mended, points."""
     last: Interval
+    """Gain if it is mended after all others, points."""
 
     @property
     def about(self) -> Cause:
@@ -74,19 +71,16 @@ class Share:
 
 @dataclass(frozen=True)
 class Mending:
-    """The fewest causes whose mending restores the score, or comes nearest to that.
-
-    Attributes:
-        causes: names of the causes, the largest share first.
-        score: score with these mended.
-        gain: difference to the score as it is, points.
-        restored: their share of the gain of mending all causes, 0 to 1; it may be a little above 1.
-    """
+    """The fewest causes whose mending restores the score, or comes nearest to that."""
 
     causes: tuple[str, ...]
+    """Names of the causes, the largest share first."""
     score: Interval
+    """Score with these mended."""
     gain: Interval
+    """Difference to the score as it is, points."""
     restored: float
+    """Their share of the gain of mending all causes, 0 to 1; it may be a little above 1."""
 
     @property
     def about(self) -> tuple[Cause, ...]:
@@ -96,33 +90,30 @@ class Mending:
 
 @dataclass(frozen=True)
 class Blame:
-    """Result of :func:`blame`. Intervals are over the seeds; a single seed has none.
-
-    Attributes:
-        scenario: name of the scenario.
-        setting: what was changed in it, for people; empty where nothing was.
-        variant: variant of the method.
-        score: key of the score.
-        seeds: the seeds.
-        before: the score as it is.
-        after: the score with all causes mended.
-        rest: what is lost with all causes mended, points.
-        shares: shares, the largest first; a gain is positive where the score becomes better.
-        mending: the fewest causes that restore the score; None where nothing is to be gained.
-        absent: names of the causes that the scenario does not have.
-    """
+    """Result of :func:`blame`. Intervals are over the seeds; a single seed has none."""
 
     scenario: str
+    """Name of the scenario."""
     setting: str
+    """What was changed in it, for people; empty where nothing was."""
     variant: str
+    """Variant of the method."""
     score: str
+    """Key of the score."""
     seeds: tuple[int, ...]
+    """The seeds."""
     before: Interval
+    """The score as it is."""
     after: Interval
+    """The score with all causes mended."""
     rest: Interval
+    """What is lost with all causes mended, points."""
     shares: tuple[Share, ...]
+    """Shares, the largest first; a gain is positive where the score becomes better."""
     mending: Mending | None
+    """The fewest causes that restore the score; None where nothing is to be gained."""
     absent: tuple[str, ...]
+    """Names of the causes that the scenario does not have."""
 
     def json(self) -> dict[str, Any]:
         """Return the result, JSON-ready; an interval has its mean, its ends and the number of seeds."""
@@ -255,21 +246,18 @@ def blame(
 
 @dataclass(frozen=True)
 class _Game:
-    """Causes as players, at every seed; trials are kept between calls in one process.
-
-    Attributes:
-        scenario: the scenario.
-        variant: variant of the method.
-        score: key of the score.
-        seeds: the seeds.
-        names: names of the n causes; a coalition is a bit mask of them.
-    """
+    """Causes as players, at every seed; trials are kept between calls in one process."""
 
     scenario: Scenario
+    """The scenario."""
     variant: str
+    """Variant of the method."""
     score: str
+    """Key of the score."""
     seeds: tuple[int, ...]
+    """The seeds."""
     names: tuple[str, ...]
+    """Names of the n causes; a coalition is a bit mask of them."""
 
     def play(self, workers: int, advance: Any) -> tuple[Floats, Floats]:
         """Return worths of no cause, all, each alone, all but each, (seeds, 2 + 2n), and the values (seeds, n)."""

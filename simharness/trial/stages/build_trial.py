@@ -22,21 +22,18 @@ from simharness.world.scene.build import Scene, build
 
 @dataclass(frozen=True)
 class Trial:
-    """Built and checked scenario.
-
-    Attributes:
-        scenario: the resolved scenario at its seed.
-        scene: the compiled scene with its people and their motions.
-        exposures: time and true camera of every picture, and the believed calibration.
-        pipelines: variants of the method, by name.
-        descriptors: settings of drawn descriptors; None where none are drawn.
-    """
+    """Built and checked scenario."""
 
     scenario: Scenario
+    """The resolved scenario at its seed."""
     scene: Scene
+    """The compiled scene with its people and their motions."""
     exposures: ExposureSchedule
+    """Time and true camera of every picture, and the believed calibration."""
     pipelines: Mapping[str, Estimator]
+    """Variants of the method, by name."""
     descriptors: DescriptorSettings | None
+    """Settings of drawn descriptors; None where none are drawn."""
 
 
 def build_trial(scenario: Scenario) -> Trial:

@@ -24,18 +24,16 @@ class CaptureFrames:
     """Frame function that captures frames of a scene.
 
     It carries the renderer's name and not the renderer: a GL context cannot be sent to another process.
-
-    Attributes:
-        scenario: the scenario that names the renderer and the sensor.
-        scene: the built scene.
-        exposures: time and camera of every picture.
-        previews: frames whose colour pictures are kept.
     """
 
     scenario: Scenario
+    """The scenario that names the renderer and the sensor."""
     scene: Scene
+    """The built scene."""
     exposures: ExposureSchedule
+    """Time and camera of every picture."""
     previews: frozenset[int]
+    """Frames whose colour pictures are kept."""
 
     def __call__(self, frames: range) -> Views:
         """Return the views of these frames."""
@@ -61,17 +59,14 @@ class CaptureFrames:
 
 @dataclass(frozen=True)
 class FilmOuterJoints:
-    """Frame function that films joints beyond COCO17, such as feet and hands.
-
-    Attributes:
-        scene: the built scene.
-        exposures: time and camera of every picture.
-        skeleton: the skeleton that has them.
-    """
+    """Frame function that films joints beyond COCO17, such as feet and hands."""
 
     scene: Scene
+    """The built scene."""
     exposures: ExposureSchedule
+    """Time and camera of every picture."""
     skeleton: Skeleton
+    """The skeleton that has them."""
 
     def __call__(self, frames: range) -> OuterViews:
         """Return the joints in the pictures of these frames."""

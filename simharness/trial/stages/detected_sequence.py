@@ -11,17 +11,14 @@ from simharness.types.recording import Recording
 
 @dataclass(frozen=True)
 class DetectedSequence:
-    """Detections and truth of T frames, and the believed cameras: the input of estimation and scoring.
-
-    Attributes:
-        time: time of each frame, (T,), seconds.
-        rig: the believed cameras.
-        frames: detections, truth and heat map peaks of each frame, T.
-    """
+    """Detections and truth of T frames, and the believed cameras: the input of estimation and scoring."""
 
     time: Floats
+    """Time of each frame, (T,), seconds."""
     rig: Rig
+    """The believed cameras."""
     frames: tuple[Detected, ...]
+    """Detections, truth and heat map peaks of each frame, T."""
 
     @cached_property
     def recording(self) -> Recording:

@@ -25,16 +25,14 @@ class EstimateFrames:
     """Frame function that runs variants on frames. Heat maps are drawn frame by frame, for variants that read them.
 
     All variants share the cameras and the detections, so that a change of either is an error.
-
-    Attributes:
-        rig: the believed cameras.
-        detected: all frames.
-        pipelines: variants by name.
     """
 
     rig: Rig
+    """The believed cameras."""
     detected: tuple[Detected, ...]
+    """All frames."""
     pipelines: Mapping[str, Estimator]
+    """Variants by name."""
 
     def __call__(self, frames: range, variants: Sequence[str] | None = None) -> dict[str, list[Estimate]]:
         """Return the estimates of variants for these frames.

@@ -86,14 +86,12 @@ class UserEstimator:
     It gets copies of cameras and detections, so that it cannot change those of other variants. Its estimates are
     checked, and their total time is measured here, because an estimator that wraps a pipeline returns the timings of
     the pipeline without its added time.
-
-    Attributes:
-        name: name of the variant.
-        place: "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE".
     """
 
     name: str
+    """Name of the variant."""
     place: str
+    """"FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE"."""
 
     @property
     def loaded(self) -> Estimator:

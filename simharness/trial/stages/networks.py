@@ -28,19 +28,16 @@ from simharness.world.scene.playback import Playback
 
 @dataclass(frozen=True)
 class ReadFrames:
-    """Frame function that lets the networks of a scenario read its pictures. Each process opens them separately.
-
-    Attributes:
-        scenario: the scenario that names the networks.
-        scene: the built scene.
-        exposures: time and camera of every picture.
-        detected: simulated detections of all frames.
-    """
+    """Frame function that lets the networks of a scenario read its pictures. Each process opens them separately."""
 
     scenario: Scenario
+    """The scenario that names the networks."""
     scene: Scene
+    """The built scene."""
     exposures: ExposureSchedule
+    """Time and camera of every picture."""
     detected: tuple[Detected, ...]
+    """Simulated detections of all frames."""
 
     @staticmethod
     def needed(scenario: Scenario) -> bool:

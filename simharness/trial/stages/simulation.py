@@ -20,19 +20,16 @@ from simharness.world.scene.playback import simulate
 
 @dataclass(frozen=True)
 class Simulation:
-    """Scene, true poses and views of a simulated trial, which stored detections do not have.
-
-    Attributes:
-        trial: the built scenario.
-        sequence: the true poses.
-        views: the truth in the pictures, with previews where they were requested.
-        outer: true feet and hands, where the detector reports them.
-    """
+    """Scene, true poses and views of a simulated trial, which stored detections do not have."""
 
     trial: Trial
+    """The built scenario."""
     sequence: Sequence
+    """The true poses."""
     views: Views
+    """The truth in the pictures, with previews where they were requested."""
     outer: OuterTruth | None = None
+    """True feet and hands, where the detector reports them."""
 
 
 def capture_trial(trial: Trial, stages: Stages, *, workers: int = 1, previews: Collection[int] = ()) -> Simulation:

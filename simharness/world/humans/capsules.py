@@ -49,24 +49,21 @@ class Capsule:
 
 @dataclass(frozen=True)
 class _Patch:
-    """Region of skin that moves rigidly, and the initial layout of its capsules.
-
-    Attributes:
-        bone: bone that carries the capsules.
-        bones: bones that move this skin; none of them turns relative to ``bone``.
-        count: number of capsules.
-        layout: "stacked": one above the other, each along the wider axis of its slice; "chained": end to end between
-            the heads of two bones; "beside": next to each other, all parallel to the line between the two heads.
-        ends: the two bones whose heads give the line of the layout.
-        span: start and end of a chain, as fractions of that line.
-    """
+    """Region of skin that moves rigidly, and the initial layout of its capsules."""
 
     bone: str
+    """Bone that carries the capsules."""
     bones: tuple[str, ...]
+    """Bones that move this skin; none of them turns relative to ``bone``."""
     count: int
+    """Number of capsules."""
     layout: Literal["stacked", "chained", "beside"]
+    """"stacked": one above the other, each along the wider axis of its slice; "chained": end to end between the heads
+    of two bones; "beside": next to each other, all parallel to the line between the two heads."""
     ends: tuple[str, str] = ("", "")
+    """The two bones whose heads give the line of the layout."""
     span: tuple[float, float] = (0.0, 1.0)
+    """Start and end of a chain, as fractions of that line."""
 
 
 _TRUNK = (

@@ -46,17 +46,14 @@ _BREAK = 0.025  # length of wide trousers that lies on the shoe, metres
 
 @dataclass(frozen=True)
 class SurfaceColors:
-    """Colours and texture of a dressed body of k faces, in the form of :class:`simharness.types.mesh.Mesh`.
-
-    Attributes:
-        colors: albedo of every face, white where the texture gives the whole colour, (k, 3) float32.
-        texture: texture of the clothes, (h, w, 3) uint8, or None if all are plain.
-        uv: texture coordinates of the corners of every face, (k, 3, 2) float32, or None without a texture.
-    """
+    """Colours and texture of a dressed body of k faces, in the form of :class:`simharness.types.mesh.Mesh`."""
 
     colors: NDArray[np.float32]
+    """Albedo of every face, white where the texture gives the whole colour, (k, 3) float32."""
     texture: NDArray[np.uint8] | None = None
+    """Texture of the clothes, (h, w, 3) uint8, or None if all are plain."""
     uv: NDArray[np.float32] | None = None
+    """Texture coordinates of the corners of every face, (k, 3, 2) float32, or None without a texture."""
 
 
 def paint(body: Body, look: Look) -> SurfaceColors:

@@ -27,21 +27,18 @@ _LID, _LID_SHADE = 0.005, 0.72  # height of the shadow of the upper lid on the e
 
 @dataclass(frozen=True)
 class Expression:
-    """Expression of a face.
-
-    Attributes:
-        open: half the height of the opening between the lips, metres.
-        shown: colour of the opening.
-        reach: half its width, metres.
-        corner: how far the corners of the mouth are drawn out and up, metres, (2,); zeros for none.
-        frown: metres by which the inner ends of the brows reach lower.
-    """
+    """Expression of a face."""
 
     open: float = 0.0
+    """Half the height of the opening between the lips, metres."""
     shown: Color = _THROAT
+    """Colour of the opening."""
     reach: float = 0.0
+    """Half its width, metres."""
     corner: tuple[float, float] = (0.0, 0.0)
+    """How far the corners of the mouth are drawn out and up, metres, (2,); zeros for none."""
     frown: float = 0.0
+    """Metres by which the inner ends of the brows reach lower."""
 
 
 EXPRESSIONS: Mapping[str, Expression] = MappingProxyType(

@@ -22,19 +22,16 @@ from simharness.world.humans.capsules import Capsule, fit_capsules
 
 @dataclass(frozen=True)
 class Inertial:
-    """Inertial parameters of a bone in its frame at rest.
-
-    Attributes:
-        bone: name of the bone.
-        mass: kilograms.
-        center: centre of mass, (3,) metres.
-        tensor: inertia tensor about the centre of mass, (3, 3) kg m2.
-    """
+    """Inertial parameters of a bone in its frame at rest."""
 
     bone: str
+    """Name of the bone."""
     mass: float
+    """Kilograms."""
     center: Floats
+    """Centre of mass, (3,) metres."""
     tensor: Floats
+    """Inertia tensor about the centre of mass, (3, 3) kg m2."""
 
 
 @dataclass(frozen=True)
@@ -181,19 +178,16 @@ _LIMB = {
 
 @dataclass(frozen=True)
 class Hinge:
-    """One degree of freedom.
-
-    Attributes:
-        name: name in ``DOFS``.
-        bone: bone that it moves.
-        axis: axis in the neutral pose, (3,).
-        range: least and greatest angle, radians.
-    """
+    """One degree of freedom."""
 
     name: str
+    """Name in ``DOFS``."""
     bone: str
+    """Bone that it moves."""
     axis: Floats
+    """Axis in the neutral pose, (3,)."""
     range: tuple[float, float]
+    """Least and greatest angle, radians."""
 
 
 def _hinges() -> tuple[Hinge, ...]:

@@ -63,22 +63,20 @@ class Skirt:
 
     Every vertex has a direction outwards. It follows the pelvis and the thigh that extends further in that direction,
     with a smooth transition between the two thighs.
-
-    Attributes:
-        first: index of the skirt's first vertex in the body.
-        anchors: rest positions of the vertices on the pelvis, the left thigh and the right thigh, (s, 3, 3) metres.
-        centers: centres of the left and the right thigh at the level of the vertices, at rest, (s, 2, 3) metres.
-        directions: outward unit vectors of the vertices at rest, (s, 3).
-        pelvis_share: weight of the pelvis in the position of the vertices, 0 to 1, (s,).
-        bones: indices of the bones of pelvis, left and right thigh.
     """
 
     first: int
+    """Index of the skirt's first vertex in the body."""
     anchors: NDArray[np.float32]
+    """Rest positions of the vertices on the pelvis, the left thigh and the right thigh, (s, 3, 3) metres."""
     centers: NDArray[np.float32]
+    """Centres of the left and the right thigh at the level of the vertices, at rest, (s, 2, 3) metres."""
     directions: NDArray[np.float32]
+    """Outward unit vectors of the vertices at rest, (s, 3)."""
     pelvis_share: NDArray[np.float32]
+    """Weight of the pelvis in the position of the vertices, 0 to 1, (s,)."""
     bones: tuple[int, int, int]
+    """Indices of the bones of pelvis, left and right thigh."""
 
     def hang(self, transforms: NDArray[np.float32], out: NDArray[np.float32]) -> None:
         """Write the skirt's vertices, posed by bone transforms (B, 3, 4), into the body's vertices ``out`` (n, 3)."""

@@ -50,33 +50,30 @@ Move = TypeVar("Move", bound=Callable[..., Motion])
 
 @dataclass(frozen=True)
 class Activity:
-    """Activity of one person, or of two together.
-
-    Attributes:
-        name: name in scenario files.
-        performers: number of people that it takes.
-        track: kind of track: a :class:`Loop` to walk or run round, a :class:`Spot`, or the :class:`Route` of a visitor.
-            Performers share a spot: its place is in the middle, and its bearing points from the first to the second.
-        clearance: radius in metres around the track's position that the performers' pelvises may use; their arms may
-            reach beyond. Tracks of other people stay ``people.spacing`` further away.
-        froude: lowest and highest speed over sqrt(g x leg length), for activities on a loop.
-        perform: function of the performers' ``Kinematics`` in order, the track, and the times (N,) in seconds at which
-            to plan (ascending, at ``RATE``), with the keywords ``rng`` (random generator for the manner) and ``pace``
-            (cadence relative to the usual one); returns a :class:`Performance`. Apart from its ends, the result must
-            not depend on the length of ``time``.
-        fewest: least number of people that it takes, where fewer are left; 0: ``performers``.
-        configured: function of the activity and the section ``[people]`` of a scenario that returns the activity with
-            the parameters of the scenario.
-    """
+    """Activity of one person, or of two together."""
 
     name: str
+    """Name in scenario files."""
     performers: int
+    """Number of people that it takes."""
     track: type[Loop] | type[Spot] | type[Route]
+    """Kind of track: a :class:`Loop` to walk or run round, a :class:`Spot`, or the :class:`Route` of a visitor.
+    Performers share a spot: its place is in the middle, and its bearing points from the first to the second."""
     clearance: float
+    """Radius in metres around the track's position that the performers' pelvises may use; their arms may reach beyond.
+    Tracks of other people stay ``people.spacing`` further away."""
     perform: Callable[..., Performance]
+    """Function of the performers' ``Kinematics`` in order, the track, and the times (N,) in seconds at which to plan
+    (ascending, at ``RATE``), with the keywords ``rng`` (random generator for the manner) and ``pace`` (cadence relative
+    to the usual one); returns a :class:`Performance`. Apart from its ends, the result must not depend on the length of
+    ``time``."""
     froude: tuple[float, float] = _STROLL
+    """Lowest and highest speed over sqrt(g x leg length), for activities on a loop."""
     fewest: int = 0
+    """Least number of people that it takes, where fewer are left; 0: ``performers``."""
     configured: "Callable[[Activity, PeopleSection], Activity]" = lambda each, people: each
+    """Function of the activity and the section ``[people]`` of a scenario that returns the activity with the parameters
+    of the scenario."""
 
 
 def activity(

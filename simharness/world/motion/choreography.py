@@ -41,15 +41,12 @@ class Choreography:
 
 @dataclass(frozen=True)
 class Group:
-    """Performers of one activity: one person, two, or more.
-
-    Attributes:
-        people: indices of the people.
-        activity: their activity.
-    """
+    """Performers of one activity: one person, two, or more."""
 
     people: tuple[int, ...]
+    """Indices of the people."""
     activity: Activity
+    """Their activity."""
 
 
 def choreograph(

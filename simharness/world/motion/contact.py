@@ -17,19 +17,16 @@ _FLESH = 0.15  # metres: largest extent of a body beyond the heads of its bones
 
 @dataclass(frozen=True)
 class SampledBody:
-    """Body of one person at N times, with its bounding rectangles on the floor.
-
-    Attributes:
-        person: index into the cast.
-        motion: motion, sampled at these times.
-        low: lowest x and y of the body, (N, 2) metres.
-        high: highest x and y of the body, (N, 2) metres.
-    """
+    """Body of one person at N times, with its bounding rectangles on the floor."""
 
     person: int
+    """Index into the cast."""
     motion: Motion
+    """Motion, sampled at these times."""
     low: Floats
+    """Lowest x and y of the body, (N, 2) metres."""
     high: Floats
+    """Highest x and y of the body, (N, 2) metres."""
 
     def near(self, other: "SampledBody") -> NDArray[np.intp]:
         """Return the indices of the times at which the bounding rectangles of two people overlap."""

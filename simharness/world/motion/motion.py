@@ -34,17 +34,15 @@ def motion_clock(duration: float, *, margin: float = 0.0) -> Floats:
 class Trajectory:
     """Poses of one rigid object at N times.
 
-    Attributes:
-        time: times in seconds, (N,), ascending; a single time means an object that stands still.
-        pose: position in metres and orientation as a unit quaternion w x y z, (N, 7).
-
     Raises:
         ValueError: wrong shape, non-finite value, times that do not ascend, or a quaternion that does not have unit
             length.
     """
 
     time: Floats
+    """Times in seconds, (N,), ascending; a single time means an object that stands still."""
     pose: Floats
+    """Position in metres and orientation as a unit quaternion w x y z, (N, 7)."""
 
     def __post_init__(self) -> None:
         set_arrays(self, "trajectory ", time=("N",), pose=("N", 7))
@@ -118,14 +116,12 @@ def check_poses(pose: Floats, what: str) -> None:
 class Presence:
     """Times at which a person is in the scene, as closed intervals; at all other times the person is absent.
 
-    Attributes:
-        intervals: start and end of each stay, (n, 2) seconds, ascending; infinite for a stay without start or end.
-
     Raises:
         ValueError: a wrong shape, or stays that overlap or end before they start.
     """
 
     intervals: Floats
+    """Start and end of each stay, (n, 2) seconds, ascending; infinite for a stay without start or end."""
 
     def __post_init__(self) -> None:
         set_arrays(self, "presence ", intervals=("n", 2))
@@ -176,19 +172,17 @@ def presence_at(presence: Sequence[Presence], time: ArrayLike) -> Bools:
 class Motion:
     """Configuration of one person at T times, interpolated smoothly between them.
 
-    Attributes:
-        time: times in seconds, (T,), ascending.
-        root: position of the pelvis in metres and orientation as a unit quaternion w x y z, (T, 7).
-        angles: joint angles in radians, (T, D), in the order of ``simharness.world.humans.anatomy.DOFS``.
-
     Raises:
         ValueError: wrong shape, non-finite value, times that do not ascend, or a quaternion that does not have unit
             length.
     """
 
     time: Floats
+    """Times in seconds, (T,), ascending."""
     root: Floats
+    """Position of the pelvis in metres and orientation as a unit quaternion w x y z, (T, 7)."""
     angles: Floats
+    """Joint angles in radians, (T, D), in the order of ``simharness.world.humans.anatomy.DOFS``."""
 
     def __post_init__(self) -> None:
         set_arrays(self, "motion ", time=("T",), root=("T", 7), angles=("T", len(DOFS)))
@@ -215,18 +209,15 @@ PropKind = Literal["chair", "table", "box", "step", "bottle", "booth", "door"]
 
 @dataclass(frozen=True)
 class Prop:
-    """Object that an activity uses; ``simharness.world.scene.objects.props`` gives it a shape.
-
-    Attributes:
-        kind: kind of object.
-        size: extent in metres along its x (depth), y (width) and z (height) axes; z of a chair is the height of the
-            seat, z of a table the height of the top.
-        trajectory: pose over time. The origin is the centre of the underside; a chair faces +x.
-    """
+    """Object that an activity uses; ``simharness.world.scene.objects.props`` gives it a shape."""
 
     kind: PropKind
+    """Kind of object."""
     size: tuple[float, float, float]
+    """Extent in metres along its x (depth), y (width) and z (height) axes; z of a chair is the height of the seat, z of
+    a table the height of the top."""
     trajectory: Trajectory
+    """Pose over time. The origin is the centre of the underside; a chair faces +x."""
 
 
 @dataclass(frozen=True)

@@ -38,17 +38,14 @@ class Spot:
 
 @dataclass(frozen=True)
 class Loop:
-    """Closed smooth curve, followed at constant speed.
-
-    Attributes:
-        curve: periodic spline from arc length in metres to position (2,) in metres.
-        speed: speed in metres per second.
-        start: arc length at time 0 in metres.
-    """
+    """Closed smooth curve, followed at constant speed."""
 
     curve: CubicSpline
+    """Periodic spline from arc length in metres to position (2,) in metres."""
     speed: float
+    """Speed in metres per second."""
     start: float
+    """Arc length at time 0 in metres."""
 
     @property
     def length(self) -> float:
@@ -80,17 +77,14 @@ class Loop:
 
 @dataclass(frozen=True)
 class RecordedPath:
-    """Recorded path that starts at a spot.
-
-    Attributes:
-        spot: start position at time 0, and the bearing by which the path is rotated.
-        time: times in seconds, (N,), ascending.
-        offset: position of the pelvis at these times relative to the start, before the rotation, (N, 2) metres.
-    """
+    """Recorded path that starts at a spot."""
 
     spot: Spot
+    """Start position at time 0, and the bearing by which the path is rotated."""
     time: Floats
+    """Times in seconds, (N,), ascending."""
     offset: Floats
+    """Position of the pelvis at these times relative to the start, before the rotation, (N, 2) metres."""
 
     @property
     def fastest(self) -> float:
@@ -110,19 +104,16 @@ Track = Spot | Loop | RecordedPath | Route
 
 @dataclass(frozen=True)
 class LoopLimits:
-    """Speeds of a person on a loop, and its smallest turning radius.
-
-    Attributes:
-        speed: preferred speed in metres per second.
-        slowest: lowest speed that the person accepts to stay synchronous with others, metres per second.
-        fastest: highest such speed, metres per second.
-        tightest: smallest turning radius in metres.
-    """
+    """Speeds of a person on a loop, and its smallest turning radius."""
 
     speed: float
+    """Preferred speed in metres per second."""
     slowest: float
+    """Lowest speed that the person accepts to stay synchronous with others, metres per second."""
     fastest: float
+    """Highest such speed, metres per second."""
     tightest: float
+    """Smallest turning radius in metres."""
 
 
 def loop_limits(speed: float, *, slowest: float, fastest: float, half: float, running: bool) -> LoopLimits:

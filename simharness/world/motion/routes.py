@@ -19,24 +19,20 @@ _SAME = 1e-6  # radians: a smaller turn is none
 
 @dataclass(frozen=True)
 class Route:
-    """Position and heading of a person over time: sums of smooth changes of velocity and of bearing.
-
-    Attributes:
-        place: position before the first change, (2,) metres.
-        bearing: heading before the first turn, radians from the x axis.
-        speed: usual walking speed of the person on the route, metres per second.
-        ramps: changes of velocity, (n, 4): start in seconds, duration in seconds, change along x and y in metres per
-            second.
-        turns: turns, (m, 3): start in seconds, duration in seconds, angle in radians.
-        presence: times at which the person is in the scene.
-    """
+    """Position and heading of a person over time: sums of smooth changes of velocity and of bearing."""
 
     place: Floats
+    """Position before the first change, (2,) metres."""
     bearing: float
+    """Heading before the first turn, radians from the x axis."""
     speed: float
+    """Usual walking speed of the person on the route, metres per second."""
     ramps: Floats
+    """Changes of velocity, (n, 4): start in seconds, duration in seconds, change along x and y in metres per second."""
     turns: Floats
+    """Turns, (m, 3): start in seconds, duration in seconds, angle in radians."""
     presence: Presence = ALWAYS
+    """Times at which the person is in the scene."""
 
     @cached_property
     def fastest(self) -> float:
@@ -82,19 +78,16 @@ def _covered(since: Floats, duration: Floats) -> Floats:
 
 @dataclass
 class Itinerary:
-    """Builder of a :class:`Route`: its methods append what the person does next.
-
-    Attributes:
-        place: present position, (2,) metres.
-        bearing: present heading, radians.
-        speed: usual walking speed, metres per second.
-        time: present time, seconds.
-    """
+    """Builder of a :class:`Route`: its methods append what the person does next."""
 
     place: Floats
+    """Present position, (2,) metres."""
     bearing: float
+    """Present heading, radians."""
     speed: float
+    """Usual walking speed, metres per second."""
     time: float = 0.0
+    """Present time, seconds."""
     _start: tuple[Floats, float] = field(init=False)
     _ramps: list[tuple[float, float, float, float]] = field(init=False, default_factory=list)
     _turns: list[tuple[float, float, float]] = field(init=False, default_factory=list)

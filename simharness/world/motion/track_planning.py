@@ -28,38 +28,32 @@ _SCREEN = 16  # every sixteenth coarse check comes first: most draws fail there
 
 @dataclass(frozen=True)
 class LoopRequest:
-    """Request for a loop.
-
-    Attributes:
-        activity: name of the activity.
-        speed: preferred speed in metres per second.
-        slowest: lowest speed accepted to stay synchronous with others, metres per second.
-        fastest: highest such speed, metres per second.
-        running: whether the activity is a run, which needs wider bends and must not become a walk.
-    """
+    """Request for a loop."""
 
     activity: str
+    """Name of the activity."""
     speed: float
+    """Preferred speed in metres per second."""
     slowest: float
+    """Lowest speed accepted to stay synchronous with others, metres per second."""
     fastest: float
+    """Highest such speed, metres per second."""
     running: bool = False
+    """Whether the activity is a run, which needs wider bends and must not become a walk."""
 
 
 @dataclass(frozen=True)
 class SpotRequest:
-    """Request for a spot.
-
-    Attributes:
-        activity: name of the activity.
-        clearance: radius around the spot that the performers use, metres.
-        together: whether the spot is the midpoint between people.
-        people: number of people who use it; 0: two if ``together``, else one.
-    """
+    """Request for a spot."""
 
     activity: str
+    """Name of the activity."""
     clearance: float = 0.0
+    """Radius around the spot that the performers use, metres."""
     together: bool = False
+    """Whether the spot is the midpoint between people."""
     people: int = 0
+    """Number of people who use it; 0: two if ``together``, else one."""
 
 
 @dataclass(frozen=True)

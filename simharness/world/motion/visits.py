@@ -43,15 +43,12 @@ FreeWay = Callable[[Route, float, float], bool]
 
 @dataclass(frozen=True)
 class Door:
-    """Door in a wall, or a place at the edge of a room without walls.
-
-    Attributes:
-        place: middle of the threshold, (2,) metres.
-        inward: direction into the room, (2,), a unit vector along an axis.
-    """
+    """Door in a wall, or a place at the edge of a room without walls."""
 
     place: Floats
+    """Middle of the threshold, (2,) metres."""
     inward: Floats
+    """Direction into the room, (2,), a unit vector along an axis."""
 
     def faces(self, place: Floats) -> bool:
         """Return whether a straight way through the door leads to a place, at an angle that its width allows."""
@@ -80,25 +77,22 @@ class Door:
 
 @dataclass(frozen=True)
 class Visitor:
-    """Plan of one visitor, from which routes are drawn.
-
-    Attributes:
-        entering: whether the person comes in after the beginning.
-        leaving: whether the person leaves before the end.
-        away: time after which a person who left comes back, seconds; 0: never.
-        speed: walking speed, metres per second.
-        doors: doors of the room.
-        room: the room.
-        duration: duration of the sequence, seconds.
-    """
+    """Plan of one visitor, from which routes are drawn."""
 
     entering: bool
+    """Whether the person comes in after the beginning."""
     leaving: bool
+    """Whether the person leaves before the end."""
     away: float
+    """Time after which a person who left comes back, seconds; 0: never."""
     speed: float
+    """Walking speed, metres per second."""
     doors: tuple[Door, ...]
+    """Doors of the room."""
     room: RoomSection
+    """The room."""
     duration: float
+    """Duration of the sequence, seconds."""
 
     def draw(self, rng: np.random.Generator, *, half: float, start: float, free: FreeWay) -> Route | None:
         """Draw a route whose stops are in the square with half side ``half`` in metres; None if no way is free.

@@ -19,19 +19,6 @@ class ExposureSchedule:
     A view is what arrives under the name of one camera. If two cameras are swapped, the pictures of one arrive under
     the name of the other, with the times, losses and lens of the camera that took them.
 
-    Attributes:
-        believed_rig: calibration that the method is given, V cameras.
-        true_cameras: the true cameras as they stand at time 0, V, in the order of the scenario.
-        time: time at which the picture delivered by a view in a frame was taken (middle of the exposure), (T, V),
-            seconds; if nothing arrives, the time at which it would have been taken.
-        source: frame in which that picture was taken, (T, V): the frame itself, an earlier one if the camera repeats
-            its last picture, -1 if nothing arrives.
-        known_time: time of that picture as the method is given it, (T, V), seconds; NaN if nothing arrives.
-        camera_of_view: index of the true camera that takes the pictures of each view, (V,).
-        rotation_rate: drift of the true cameras about their own x, y, z axes, (V, 3), rad/s.
-        velocity: drift of the centres of the true cameras, (V, 3), m/s.
-        readout: seconds from the first to the last row of a picture.
-
     Raises:
         ValueError: a wrong shape, a time or drift that is not finite, a source later than its frame, a known time
             without a picture or the reverse, a camera_of_view that does not name each camera once, or a negative
@@ -39,14 +26,25 @@ class ExposureSchedule:
     """
 
     believed_rig: Rig
+    """Calibration that the method is given, V cameras."""
     true_cameras: Rig
+    """The true cameras as they stand at time 0, V, in the order of the scenario."""
     time: Floats
+    """Time at which the picture delivered by a view in a frame was taken (middle of the exposure), (T, V), seconds; if
+    nothing arrives, the time at which it would have been taken."""
     source: Integers
+    """Frame in which that picture was taken, (T, V): the frame itself, an earlier one if the camera repeats its last
+    picture, -1 if nothing arrives."""
     known_time: Floats
+    """Time of that picture as the method is given it, (T, V), seconds; NaN if nothing arrives."""
     camera_of_view: Integers
+    """Index of the true camera that takes the pictures of each view, (V,)."""
     rotation_rate: Floats
+    """Drift of the true cameras about their own x, y, z axes, (V, 3), rad/s."""
     velocity: Floats
+    """Drift of the centres of the true cameras, (V, 3), m/s."""
     readout: float = 0.0
+    """Seconds from the first to the last row of a picture."""
 
     def __post_init__(self) -> None:
         views = len(self.believed_rig)

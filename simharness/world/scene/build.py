@@ -47,18 +47,15 @@ _KEPT = 24  # people, about 5 MB each: those of a scene and of the next ones
 
 @dataclass(frozen=True)
 class ScenePerson:
-    """One person in the rest pose. Several scenes may share it, so its arrays are never changed.
-
-    Attributes:
-        look: clothes, hair and accessories.
-        body: dressed body with accessories.
-        mover: kinematics of the body of the plain look (:func:`~simharness.world.humans.accessories.plain`). Poses are
-            computed in its MuJoCo data, so threads must not share it.
-    """
+    """One person in the rest pose. Several scenes may share it, so its arrays are never changed."""
 
     look: Look
+    """Clothes, hair and accessories."""
     body: Body
+    """Dressed body with accessories."""
     mover: Kinematics
+    """Kinematics of the body of the plain look (:func:`~simharness.world.humans.accessories.plain`). Poses are computed
+    in its MuJoCo data, so threads must not share it."""
 
     @cached_property
     def figure(self) -> Mesh:
@@ -68,28 +65,25 @@ class ScenePerson:
 
 @dataclass(frozen=True)
 class Scene:
-    """People, objects, motions and lighting from which a sequence and its pictures are made.
-
-    Attributes:
-        model: MuJoCo model of people ("person0/..."), room and objects; solids at rest have geoms of their name, moving
-            ones are mocap bodies of their name.
-        bodies: bodies of the P people.
-        figures: visible meshes of the people (body and clothing) in the rest pose.
-        motions: motions of the people, which can be sampled at any time.
-        presence: times at which each person is in the scene.
-        solids: room (its fittings have no geoms), then objects.
-        lighting: lighting of the scene.
-        time: times of the frames, (T,), seconds.
-    """
+    """People, objects, motions and lighting from which a sequence and its pictures are made."""
 
     model: mujoco.MjModel
+    """MuJoCo model of people ("person0/..."), room and objects; solids at rest have geoms of their name, moving ones
+    are mocap bodies of their name."""
     bodies: tuple[Body, ...]
+    """Bodies of the P people."""
     figures: tuple[Mesh, ...]
+    """Visible meshes of the people (body and clothing) in the rest pose."""
     motions: tuple[Motion, ...]
+    """Motions of the people, which can be sampled at any time."""
     presence: tuple[Presence, ...]
+    """Times at which each person is in the scene."""
     solids: tuple[Solid, ...]
+    """Room (its fittings have no geoms), then objects."""
     lighting: Lighting
+    """Lighting of the scene."""
     time: NDArray[np.float64]
+    """Times of the frames, (T,), seconds."""
 
     @property
     def moving(self) -> tuple[Solid, ...]:

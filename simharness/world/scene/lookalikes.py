@@ -20,20 +20,18 @@ class Lookalikes:
     """The D lookalikes of a scene: F figures, then for each mirror the images of the P people.
 
     In a mirror image left and right joints are exchanged, because a detector labels them so.
-
-    Attributes:
-        names: names such as "poster0" and "mirror0/person2", (D,).
-        mesh: mesh index of the object among people and solids, as in ``Image.ids``, (D,).
-        figures: COCO-17 joints of the figures in the world, (F, 17, 3), metres.
-        fronts: horizontal vectors to the front of flat figures, visible only from there, (F, 3); zeros for the others.
-        mirrors: glass of the mirrors.
     """
 
     names: tuple[str, ...]
+    """Names such as "poster0" and "mirror0/person2", (D,)."""
     mesh: NDArray[np.int64]
+    """Mesh index of the object among people and solids, as in ``Image.ids``, (D,)."""
     figures: Floats
+    """COCO-17 joints of the figures in the world, (F, 17, 3), metres."""
     fronts: Floats
+    """Horizontal vectors to the front of flat figures, visible only from there, (F, 3); zeros for the others."""
     mirrors: tuple[Mirror, ...]
+    """Glass of the mirrors."""
 
     @classmethod
     def from_scene(cls, scene: Scene) -> "Lookalikes":

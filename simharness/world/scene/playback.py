@@ -22,22 +22,19 @@ _NOWHERE = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0,
 
 @dataclass(frozen=True)
 class PlaybackState:
-    """Positions of all people and moving solids at one time.
-
-    Attributes:
-        time: time in seconds.
-        landmarks: positions of ``simharness.types.sequence.LANDMARKS`` in the world, (P, L, 3), metres.
-        bones: skinning transforms from rest pose to world, (P, B, 3, 4); those of an absent person take the whole body
-            to one point under the floor, where it stops no ray.
-        placements: poses of the moving solids of the scene in their order, (M, 7): metres, quaternion w x y z.
-        present: who is in the scene, (P,).
-    """
+    """Positions of all people and moving solids at one time."""
 
     time: float
+    """Time in seconds."""
     landmarks: Floats
+    """Positions of ``simharness.types.sequence.LANDMARKS`` in the world, (P, L, 3), metres."""
     bones: Floats
+    """Skinning transforms from rest pose to world, (P, B, 3, 4); those of an absent person take the whole body to one
+    point under the floor, where it stops no ray."""
     placements: Floats
+    """Poses of the moving solids of the scene in their order, (M, 7): metres, quaternion w x y z."""
     present: Bools
+    """Who is in the scene, (P,)."""
 
     @property
     def joints(self) -> Floats:

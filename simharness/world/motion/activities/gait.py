@@ -62,33 +62,30 @@ def periodic(knots: Knots) -> CubicSpline:
 
 @dataclass(frozen=True)
 class Gait:
-    """Stride of one body, from heel strike to heel strike of the same foot.
-
-    Attributes:
-        stride: stride length in metres.
-        frequency: strides per second.
-        vigour: amplitude relative to the normative curves.
-        bob: amplitude of the vertical motion of the pelvis, metres.
-        lead: distance from the pelvis forward to a landing foot, metres (to its ankle, as if the foot lay flat).
-        phase: fractions of the stride, (n,), from 0 to 1.
-        pitch: pitch of the foot, toes up positive, (n,) radians.
-        lift: clearance of the swinging foot beyond the necessary one, (n,) metres, 0 in stance.
-        progress: fraction of the stride that the swinging foot has covered, (n,), 0 in stance.
-        foot_off: fraction of the stride at toe-off; 0 is foot strike.
-        rolling: roll of the foot on the floor.
-    """
+    """Stride of one body, from heel strike to heel strike of the same foot."""
 
     stride: float
+    """Stride length in metres."""
     frequency: float
+    """Strides per second."""
     vigour: float
+    """Amplitude relative to the normative curves."""
     bob: float
+    """Amplitude of the vertical motion of the pelvis, metres."""
     lead: float
+    """Distance from the pelvis forward to a landing foot, metres (to its ankle, as if the foot lay flat)."""
     phase: Floats
+    """Fractions of the stride, (n,), from 0 to 1."""
     pitch: Floats
+    """Pitch of the foot, toes up positive, (n,) radians."""
     lift: Floats
+    """Clearance of the swinging foot beyond the necessary one, (n,) metres, 0 in stance."""
     progress: Floats
+    """Fraction of the stride that the swinging foot has covered, (n,), 0 in stance."""
     foot_off: float
+    """Fraction of the stride at toe-off; 0 is foot strike."""
     rolling: FootRoll
+    """Roll of the foot on the floor."""
 
     @property
     def speed(self) -> float:

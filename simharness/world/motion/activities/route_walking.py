@@ -140,25 +140,22 @@ def recent_briskness(route: Route, time: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class RouteSteps:
-    """Steps of one foot along a route.
-
-    Attributes:
-        route: places, headings and speeds.
-        gait: motion of a foot during a stride.
-        side: side of the foot.
-        phase: function of times (n,) that returns the number of strides of the left foot so far, (n,).
-        facing: function of times (n,) that returns the direction in which the feet point, (n,) radians.
-        width: lateral distance of the footprints from the route, metres.
-        late: fraction of the stride by which the foot is later than the left one.
-    """
+    """Steps of one foot along a route."""
 
     route: Route
+    """Places, headings and speeds."""
     gait: Gait
+    """Motion of a foot during a stride."""
     side: str
+    """Side of the foot."""
     phase: Callable[[Floats], Floats]
+    """Function of times (n,) that returns the number of strides of the left foot so far, (n,)."""
     facing: Callable[[Floats], Floats]
+    """Function of times (n,) that returns the direction in which the feet point, (n,) radians."""
     width: float
+    """Lateral distance of the footprints from the route, metres."""
     late: float
+    """Fraction of the stride by which the foot is later than the left one."""
 
     def pitch(self, time: Floats) -> Floats:
         """Return the pitch of the foot at times (T,) of the usual gait, toes up positive, (T,) radians."""

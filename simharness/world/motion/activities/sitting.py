@@ -27,21 +27,18 @@ _BACKREST, _BACKREST_HEIGHT = 0.04, 0.42  # metres: thickness of the backrest, a
 
 @dataclass(frozen=True)
 class Seat:
-    """Seat that fits one body with its feet flat on the floor.
-
-    Attributes:
-        height: height of the seat, metres.
-        front: front edge of the seat, metres ahead of the ankles.
-        back: rear edge of the seat, metres ahead of the ankles.
-        lean: leans of the pelvis, ascending, (n,) radians.
-        hip: hip positions at these leans, (n, 2) metres ahead of the ankles and up.
-    """
+    """Seat that fits one body with its feet flat on the floor."""
 
     height: float
+    """Height of the seat, metres."""
     front: float
+    """Front edge of the seat, metres ahead of the ankles."""
     back: float
+    """Rear edge of the seat, metres ahead of the ankles."""
     lean: Floats
+    """Leans of the pelvis, ascending, (n,) radians."""
     hip: Floats
+    """Hip positions at these leans, (n, 2) metres ahead of the ankles and up."""
 
     def hip_at(self, lean: Floats) -> Floats:
         """Return the hip positions, (T, 2) metres, of a seated pelvis with leans (T,) in radians."""

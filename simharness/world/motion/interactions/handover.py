@@ -29,45 +29,39 @@ _NEAR = 0.46  # least distance of a held object from the pelvis, in arm lengths
 
 @dataclass(frozen=True)
 class _Item:
-    """Object that is handed over.
-
-    Attributes:
-        kind: kind of object.
-        size: depth, width and height, metres.
-        grips: heights above its underside at which the first and the second person hold it, metres; they differ, so
-            that the hands do not touch.
-        behind: distance of the grip from its centre towards the holder, metres.
-    """
+    """Object that is handed over."""
 
     kind: PropKind
+    """Kind of object."""
     size: tuple[float, float, float]
+    """Depth, width and height, metres."""
     grips: tuple[float, float]
+    """Heights above its underside at which the first and the second person hold it, metres; they differ, so that the
+    hands do not touch."""
     behind: float
+    """Distance of the grip from its centre towards the holder, metres."""
 
 
 @dataclass(frozen=True)
 class _Course:
-    """Schedule of a cycle, times in seconds.
-
-    Attributes:
-        go: the object leaves the first person.
-        meet: both people hold it, until ``part``.
-        part: it continues to the second person.
-        handed: it is with the second person.
-        back: it leaves the second person; both hold it after the time from ``go`` to ``meet``.
-        part_back: it continues to the first person.
-        home: it is with the first person again.
-        end: end of the cycle.
-    """
+    """Schedule of a cycle, times in seconds."""
 
     go: float
+    """The object leaves the first person."""
     meet: float
+    """Both people hold it, until ``part``."""
     part: float
+    """It continues to the second person."""
     handed: float
+    """It is with the second person."""
     back: float
+    """It leaves the second person; both hold it after the time from ``go`` to ``meet``."""
     part_back: float
+    """It continues to the first person."""
     home: float
+    """It is with the first person again."""
     end: float
+    """End of the cycle."""
 
     def given(self, u: Floats) -> Floats:
         """Return the position of the object, (T,): -1 with the first person, 0 between them, 1 with the second."""

@@ -45,23 +45,20 @@ _FLAT = {
 
 @dataclass(frozen=True)
 class _Hold:
-    """Arm posture of one person of a hug; the angles are start values in degrees.
-
-    Attributes:
-        raised: flexion of the shoulders.
-        out: abduction of the shoulders.
-        turned: rotation of the shoulders.
-        bent: flexion of the elbows.
-        height: height of the palms above the other's shoulders, metres.
-        across: distance of the palms from the other's spine, metres.
-    """
+    """Arm posture of one person of a hug; the angles are start values in degrees."""
 
     raised: float
+    """Flexion of the shoulders."""
     out: float
+    """Abduction of the shoulders."""
     turned: float
+    """Rotation of the shoulders."""
     bent: float
+    """Flexion of the elbows."""
     height: float
+    """Height of the palms above the other's shoulders, metres."""
     across: float
+    """Distance of the palms from the other's spine, metres."""
 
 
 # The arms of the taller person go over the shoulders, those of the other around the waist.

@@ -24,17 +24,14 @@ _MOST_LEAN = 45.0  # degrees: largest lean
 
 @dataclass(frozen=True)
 class Meeting:
-    """Meeting of the hands of two people who face each other.
-
-    Attributes:
-        spots: spot of each person, facing the other.
-        point: meeting point of the hands, (3,) metres.
-        lean: lean of each trunk that this takes, degrees.
-    """
+    """Meeting of the hands of two people who face each other."""
 
     spots: tuple[Spot, Spot]
+    """Spot of each person, facing the other."""
     point: Floats
+    """Meeting point of the hands, (3,) metres."""
     lean: tuple[float, float]
+    """Lean of each trunk that this takes, degrees."""
 
     def spot(self, person: int) -> Spot:
         """Return the meeting point on the floor as a spot with the bearing of one person."""

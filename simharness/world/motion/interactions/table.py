@@ -40,19 +40,16 @@ _INWARD = np.radians(35.0)  # inward rotation of the fingers of both hands
 
 @dataclass(frozen=True)
 class _Place:
-    """Place of one person at the table.
-
-    Attributes:
-        spot: spot under the pelvis, facing the other person.
-        top: height of the table, metres.
-        edge: distance from the pelvis to the edge of the table, metres.
-        middle: distance from the pelvis to the centre of the table, metres.
-    """
+    """Place of one person at the table."""
 
     spot: Spot
+    """Spot under the pelvis, facing the other person."""
     top: float
+    """Height of the table, metres."""
     edge: float
+    """Distance from the pelvis to the edge of the table, metres."""
     middle: float
+    """Distance from the pelvis to the centre of the table, metres."""
 
 
 @activity("table", performers=2, clearance=0.7)

@@ -33,21 +33,18 @@ class _Bone:
 
 @dataclass(frozen=True)
 class Acclaim:
-    """Contents of an ASF file: the skeleton, and how the values of an AMC file rotate it.
-
-    Attributes:
-        skeleton: skeleton; its joints are the heads of the bones with their names, and the tips of the last bones.
-        frames: local axes by name of the bone.
-        dofs: kinds of the values by name of the bone, in order: "rx", "ry", "rz", for the root also "tx", "ty", "tz".
-        origin: offset added to the position of the root, (3,).
-        degrees: whether angles are in degrees.
-    """
+    """Contents of an ASF file: the skeleton, and how the values of an AMC file rotate it."""
 
     skeleton: MocapSkeleton
+    """Skeleton; its joints are the heads of the bones with their names, and the tips of the last bones."""
     frames: dict[str, Rotation]
+    """Local axes by name of the bone."""
     dofs: dict[str, tuple[str, ...]]
+    """Kinds of the values by name of the bone, in order: "rx", "ry", "rz", for the root also "tx", "ty", "tz"."""
     origin: Floats
+    """Offset added to the position of the root, (3,)."""
     degrees: bool
+    """Whether angles are in degrees."""
 
 
 def read_asf(path: Path) -> Acclaim:

@@ -29,17 +29,15 @@ TURN = 0.3  # seconds of the reversal at an end of the clip
 class Clip:
     """Recorded motion that bodies can perform.
 
-    Attributes:
-        recording: contents of the file.
-        start: time in the recording at which the clip starts, seconds.
-
     Raises:
         ValueError: the start is not within the recording, the recording is too short to reverse, or its skeleton is
             not that of a person.
     """
 
     recording: RecordedMotion
+    """Contents of the file."""
     start: float = 0.0
+    """Time in the recording at which the clip starts, seconds."""
 
     def __post_init__(self) -> None:
         file, duration = self.recording.file, self.recording.duration

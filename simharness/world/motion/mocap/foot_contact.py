@@ -53,27 +53,24 @@ class Sole:
 
 @dataclass(frozen=True)
 class FootPath:
-    """Path of one foot on the flat floor at height 0.
-
-    Attributes:
-        turn: orientation relative to the neutral foot, (T, 3, 3).
-        clearance: height of the sole above the floor, (T,) metres, 0 in stances.
-        ground: estimated height of the recorded ground under the foot, (T,) metres.
-        recorded: recorded position of the ankle, (T, 2) metres.
-        stances: first frame of every stance, and the frame after its last.
-        anchors: position of the ankle in every stance without the rolling of the sole, (S, 2) metres.
-        sole: sole of the foot.
-        rate: frames per second.
-    """
+    """Path of one foot on the flat floor at height 0."""
 
     turn: Floats
+    """Orientation relative to the neutral foot, (T, 3, 3)."""
     clearance: Floats
+    """Height of the sole above the floor, (T,) metres, 0 in stances."""
     ground: Floats
+    """Estimated height of the recorded ground under the foot, (T,) metres."""
     recorded: Floats
+    """Recorded position of the ankle, (T, 2) metres."""
     stances: list[tuple[int, int]]
+    """First frame of every stance, and the frame after its last."""
     anchors: Floats
+    """Position of the ankle in every stance without the rolling of the sole, (S, 2) metres."""
     sole: Sole
+    """Sole of the foot."""
     rate: float
+    """Frames per second."""
 
     def ankle(self, turn: Floats) -> Floats:
         """Return the path of the ankle, (T, 3) metres, for orientations (T, 3, 3) of a foot that does not slip."""

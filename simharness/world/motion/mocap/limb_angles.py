@@ -34,19 +34,16 @@ ARM: tuple[str, ...] = (
 
 @dataclass(frozen=True)
 class Aim:
-    """Direction on a limb with a target direction.
-
-    Attributes:
-        hinges: number of hinges, from the first, that move it.
-        neutral: direction in the neutral pose, (3,).
-        target: target directions, (T, 3) unit vectors.
-        weight: weight of its error relative to others.
-    """
+    """Direction on a limb with a target direction."""
 
     hinges: int
+    """Number of hinges, from the first, that move it."""
     neutral: Floats
+    """Direction in the neutral pose, (3,)."""
     target: Floats
+    """Target directions, (T, 3) unit vectors."""
     weight: float
+    """Weight of its error relative to others."""
 
 
 def arm_angles(upper: Floats, fore: Floats, hand: Floats | None, thumb: Floats | None) -> Floats:

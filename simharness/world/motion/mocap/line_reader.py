@@ -12,17 +12,14 @@ _LARGEST = 1e6  # larger than any length in any unit or angle of a person
 
 @dataclass(frozen=True)
 class Line:
-    """Line of a file.
-
-    Attributes:
-        file: name of the file.
-        number: line number, counted from 1.
-        words: words of the line, split at white space.
-    """
+    """Line of a file."""
 
     file: str
+    """Name of the file."""
     number: int
+    """Line number, counted from 1."""
     words: tuple[str, ...]
+    """Words of the line, split at white space."""
 
     def error(self, message: str) -> ValueError:
         """Return an error about this line."""

@@ -37,23 +37,20 @@ _SHOULDER_RISE = 0.35  # radians: elevation of the clavicle with the arm overhea
 
 @dataclass(frozen=True)
 class SourceMotion:
-    """Source motion of retargeting: a resampled recording with x forward, y left and z up in the zero pose.
-
-    Attributes:
-        time: seconds from the first frame, (N,).
-        turns: rotations relative to the zero pose, (N, 3, 3) each, of "pelvis", "chest", "head" and, by side, foot and
-            hand ("left foot"); head and hands may be missing.
-        segments: by (side, segment), vector from one joint to the next, (N, 3), in the unit of the file; segments are
-            "thigh", "shank", "arm", "forearm" and "hand".
-        hips: midpoint of the hips, (N, 3), in the unit of the file.
-        legs: by side, length from hip over knee to ankle, in the unit of the file.
-    """
+    """Source motion of retargeting: a resampled recording with x forward, y left and z up in the zero pose."""
 
     time: Floats
+    """Seconds from the first frame, (N,)."""
     turns: dict[str, Floats]
+    """Rotations relative to the zero pose, (N, 3, 3) each, of "pelvis", "chest", "head" and, by side, foot and hand
+    ("left foot"); head and hands may be missing."""
     segments: dict[tuple[str, str], Floats]
+    """By (side, segment), vector from one joint to the next, (N, 3), in the unit of the file; segments are "thigh",
+    "shank", "arm", "forearm" and "hand"."""
     hips: Floats
+    """Midpoint of the hips, (N, 3), in the unit of the file."""
     legs: dict[str, float]
+    """By side, length from hip over knee to ankle, in the unit of the file."""
 
 
 def source_motion(recording: RecordedMotion, *, rate: float) -> SourceMotion:

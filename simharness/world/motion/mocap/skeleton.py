@@ -18,17 +18,14 @@ END = " end"  # suffix of a joint name: tip of its bone, a joint without rotatio
 
 @dataclass(frozen=True)
 class MocapSkeleton:
-    """MocapSkeleton of J joints, the root first and parents before children. The zero pose has no rotations.
-
-    Attributes:
-        names: unique names of the joints.
-        parents: index of each parent, (J,), -1 for the root.
-        offsets: vectors from the parent to the joint in the zero pose, (J, 3), in the length unit of the file.
-    """
+    """MocapSkeleton of J joints, the root first and parents before children. The zero pose has no rotations."""
 
     names: tuple[str, ...]
+    """Unique names of the joints."""
     parents: Integers
+    """Index of each parent, (J,), -1 for the root."""
     offsets: Floats
+    """Vectors from the parent to the joint in the zero pose, (J, 3), in the length unit of the file."""
 
     def __len__(self) -> int:
         return len(self.names)
@@ -55,21 +52,18 @@ class MocapSkeleton:
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """Recorded motion of a skeleton in N frames.
-
-    Attributes:
-        file: name of the file.
-        skeleton: skeleton with J joints.
-        rate: frames per second.
-        root: position of the root in every frame, (N, 3), in the length unit of the file.
-        turns: rotation of every joint relative to its parent, (N, J, 4) quaternions w x y z.
-    """
+    """Recorded motion of a skeleton in N frames."""
 
     file: str
+    """Name of the file."""
     skeleton: MocapSkeleton
+    """Skeleton with J joints."""
     rate: float
+    """Frames per second."""
     root: Floats
+    """Position of the root in every frame, (N, 3), in the length unit of the file."""
     turns: Floats
+    """Rotation of every joint relative to its parent, (N, J, 4) quaternions w x y z."""
 
     def __len__(self) -> int:
         return len(self.root)
@@ -121,21 +115,18 @@ _UPRIGHT = 0.75  # least cosine between the vertical and each segment of a stand
 
 @dataclass(frozen=True)
 class JointMap:
-    """Indices of the joints of a person in a skeleton; -1 for joints that the skeleton does not have.
-
-    Attributes:
-        pelvis: joint that carries both legs.
-        chest: joint that carries both arms.
-        head: joint of the skull.
-        limbs: joints by side and role ("thigh", "shank", "foot", "toes", "collar", "arm", "forearm", "hand").
-        axes: axes of the person in the coordinates of the file, (3, 3); columns are forward, left and up.
-    """
+    """Indices of the joints of a person in a skeleton; -1 for joints that the skeleton does not have."""
 
     pelvis: int
+    """Joint that carries both legs."""
     chest: int
+    """Joint that carries both arms."""
     head: int
+    """Joint of the skull."""
     limbs: dict[str, dict[str, int]]
+    """Joints by side and role ("thigh", "shank", "foot", "toes", "collar", "arm", "forearm", "hand")."""
     axes: Floats
+    """Axes of the person in the coordinates of the file, (3, 3); columns are forward, left and up."""
 
 
 def map_joints(recording: RecordedMotion) -> JointMap:

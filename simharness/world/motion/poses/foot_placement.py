@@ -21,19 +21,16 @@ PEELING = 0.12  # seconds from heel-off to toe-off
 
 @dataclass(frozen=True)
 class Footprint:
-    """Footprint in the frame of its spot: x ahead, y to the left.
-
-    Attributes:
-        place: position of the ankle over the flat foot, metres.
-        bearing: direction of the toes, radians from straight ahead.
-        floor: height of the ground under the foot, metres.
-        pitch: pitch of the foot, toes up positive, radians; the foot has rolled there from lying flat.
-    """
+    """Footprint in the frame of its spot: x ahead, y to the left."""
 
     place: tuple[float, float]
+    """Position of the ankle over the flat foot, metres."""
     bearing: float = 0.0
+    """Direction of the toes, radians from straight ahead."""
     floor: float = 0.0
+    """Height of the ground under the foot, metres."""
     pitch: float = 0.0
+    """Pitch of the foot, toes up positive, radians; the foot has rolled there from lying flat."""
 
     def moved(self, ahead: float = 0.0, left: float = 0.0, *, floor: float | None = None) -> "Footprint":
         """Return the footprint shifted by ``ahead`` and ``left`` in metres, on another floor height if given."""
@@ -164,15 +161,12 @@ def pelvis_from_hips(
 
 @dataclass(frozen=True)
 class Footprints:
-    """Footprint of one foot in every frame.
-
-    Attributes:
-        ankle: position of the ankle, as if the foot lay flat, (T, 2) metres.
-        bearing: direction of the toes, (T,) radians from the x axis.
-    """
+    """Footprint of one foot in every frame."""
 
     ankle: Floats
+    """Position of the ankle, as if the foot lay flat, (T, 2) metres."""
     bearing: Floats
+    """Direction of the toes, (T,) radians from the x axis."""
 
     @staticmethod
     def beside(place: Floats, heading: Floats, *, left: float, toes_left: float) -> "Footprints":

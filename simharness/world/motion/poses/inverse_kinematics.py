@@ -19,17 +19,14 @@ _PULL = 0.01  # metres per radian: pull of an arm towards its start angles; move
 
 @dataclass(frozen=True)
 class Foot:
-    """Target pose of one foot in every frame.
-
-    Attributes:
-        ankle: position of the ankle, (T, 3) metres.
-        bearing: direction of the toes, (T,) radians from the x axis.
-        pitch: pitch, toes up positive, (T,) radians.
-    """
+    """Target pose of one foot in every frame."""
 
     ankle: Floats
+    """Position of the ankle, (T, 3) metres."""
     bearing: Floats
+    """Direction of the toes, (T,) radians from the x axis."""
     pitch: Floats
+    """Pitch, toes up positive, (T,) radians."""
 
     @property
     def turn(self) -> Floats:
@@ -39,21 +36,18 @@ class Foot:
 
 @dataclass(frozen=True)
 class Pelvis:
-    """Pose of the pelvis in every frame, except for its mean height.
-
-    Attributes:
-        ground: position on the floor, (T, 2) metres.
-        bob: vertical displacement about a height above the floor that is given separately, (T,) metres.
-        bearing: facing direction, (T,) radians from the x axis.
-        lean: lean, forward positive, (T,) radians.
-        list: list, left side up positive, (T,) radians.
-    """
+    """Pose of the pelvis in every frame, except for its mean height."""
 
     ground: Floats
+    """Position on the floor, (T, 2) metres."""
     bob: Floats
+    """Vertical displacement about a height above the floor that is given separately, (T,) metres."""
     bearing: Floats
+    """Facing direction, (T,) radians from the x axis."""
     lean: Floats
+    """Lean, forward positive, (T,) radians."""
     list: Floats
+    """List, left side up positive, (T,) radians."""
 
     @property
     def turn(self) -> Rotation:

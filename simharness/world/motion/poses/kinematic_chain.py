@@ -20,19 +20,16 @@ _TURN_WEIGHT = 0.1  # metres per radian: a target out of reach costs orientation
 
 @dataclass(frozen=True)
 class Chain:
-    """Chain of hinges from the base outwards, described in the frame of the base with all angles zero.
-
-    Attributes:
-        axes: unit axes of the hinges, (n, 3).
-        anchors: one point on each axis, (n, 3) metres.
-        end: end point of the chain, (3,) metres; its orientation at zero is the identity.
-        ranges: lowest and highest angle of each hinge, (n, 2) radians.
-    """
+    """Chain of hinges from the base outwards, described in the frame of the base with all angles zero."""
 
     axes: Floats
+    """Unit axes of the hinges, (n, 3)."""
     anchors: Floats
+    """One point on each axis, (n, 3) metres."""
     end: Floats
+    """End point of the chain, (3,) metres; its orientation at zero is the identity."""
     ranges: Floats
+    """Lowest and highest angle of each hinge, (n, 2) radians."""
 
     def forward(self, angles: Floats) -> tuple[Floats, Floats]:
         """Return orientation (T, 3, 3) and position (T, 3) of the end for angles (T, n)."""

@@ -196,20 +196,17 @@ class Addresses:
 
 @dataclass(frozen=True)
 class FootRoll:
-    """Position of the ankle as a function of the pitch of the foot.
-
-    Attributes:
-        pitch: pitch, toes up positive, (n,) radians, ascending.
-        ahead: forward offset of the ankle from its position over the flat foot, (n,) metres.
-        height: height of the ankle while the lowest point of the sole touches the floor, (n,) metres.
-        passing: as ``height``, but smooth where the lowest point changes from toe to heel, and nowhere lower, (n,)
-            metres; for a foot in the air.
-    """
+    """Position of the ankle as a function of the pitch of the foot."""
 
     pitch: Floats
+    """Pitch, toes up positive, (n,) radians, ascending."""
     ahead: Floats
+    """Forward offset of the ankle from its position over the flat foot, (n,) metres."""
     height: Floats
+    """Height of the ankle while the lowest point of the sole touches the floor, (n,) metres."""
     passing: Floats
+    """As ``height``, but smooth where the lowest point changes from toe to heel, and nowhere lower, (n,) metres; for a
+    foot in the air."""
 
     def at(self, pitch: Floats) -> tuple[Floats, Floats]:
         """Return forward offset and height of the ankle at pitches (...), metres."""

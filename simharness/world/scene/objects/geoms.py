@@ -31,17 +31,14 @@ class Geom(Protocol):
 
 @dataclass(frozen=True)
 class Box:
-    """Upright cuboid, rotated about the vertical axis.
-
-    Attributes:
-        center: centre, (3,), metres.
-        half: half sides along the axes of the box, (3,), metres.
-        yaw: rotation about z, radians.
-    """
+    """Upright cuboid, rotated about the vertical axis."""
 
     center: Point
+    """Centre, (3,), metres."""
     half: Point
+    """Half sides along the axes of the box, (3,), metres."""
     yaw: float = 0.0
+    """Rotation about z, radians."""
 
     @cached_property
     def axes(self) -> Floats:
@@ -143,15 +140,12 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangle mesh as a geom: rays test every triangle, contacts use the convex hull.
-
-    Attributes:
-        vertices: positions, (n, 3), metres.
-        faces: vertex indices, (k, 3).
-    """
+    """Triangle mesh as a geom: rays test every triangle, contacts use the convex hull."""
 
     vertices: Floats
+    """Positions, (n, 3), metres."""
     faces: NDArray[np.int32]
+    """Vertex indices, (k, 3)."""
 
     def moved(self, place: ArrayLike, yaw: float) -> "Surface":
         """See :class:`Geom`."""

@@ -46,15 +46,12 @@ class Patch:
 
 @dataclass(frozen=True)
 class Sheet:
-    """Sheet of materials and prints.
-
-    Attributes:
-        texture: picture, sRGB, (h, w, 3) uint8.
-        patches: place of each material and print.
-    """
+    """Sheet of materials and prints."""
 
     texture: NDArray[np.uint8]
+    """Picture, sRGB, (h, w, 3) uint8."""
     patches: Mapping[str, Patch]
+    """Place of each material and print."""
 
     def uv(self, name: str, points: Floats) -> NDArray[np.float32]:
         """Return texture coordinates of points (..., 2) of a patch, 0 to 1 to the right and down."""

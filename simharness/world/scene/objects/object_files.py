@@ -60,23 +60,20 @@ class _Part:
 
 @dataclass(frozen=True)
 class ObjectFile:
-    """Object read from a file.
-
-    Attributes:
-        path: the file.
-        parts: its parts.
-        textures: its pictures by name, (h, w, 3) uint8; empty for shipped objects, whose textures are those of a sheet.
-        spec: MuJoCo model of the geoms alone.
-        offset: vector that moves the object to its place on the floor, (3,), metres.
-        figure: COCO-17 joints, (17, 3), metres, of a decoy.
-    """
+    """Object read from a file."""
 
     path: Path
+    """The file."""
     parts: tuple[_Part, ...]
+    """Its parts."""
     textures: Mapping[str, NDArray[np.uint8]]
+    """Its pictures by name, (h, w, 3) uint8; empty for shipped objects, whose textures are those of a sheet."""
     spec: mujoco.MjSpec
+    """MuJoCo model of the geoms alone."""
     offset: Floats
+    """Vector that moves the object to its place on the floor, (3,), metres."""
     figure: Floats | None
+    """COCO-17 joints, (17, 3), metres, of a decoy."""
 
     def mesh(self, sheet: Sheet | None = None) -> Mesh:
         """Return the mesh for pictures.
@@ -108,17 +105,14 @@ class ObjectFile:
 
 @dataclass(frozen=True)
 class AttachedGeoms:
-    """Geoms of a file, attached to the model of a scene as a whole.
-
-    Attributes:
-        spec: MuJoCo model of the geoms.
-        place: position of its origin, (3,), metres.
-        yaw: rotation about z, radians.
-    """
+    """Geoms of a file, attached to the model of a scene as a whole."""
 
     spec: mujoco.MjSpec
+    """MuJoCo model of the geoms."""
     place: tuple[float, float, float]
+    """Position of its origin, (3,), metres."""
     yaw: float = 0.0
+    """Rotation about z, radians."""
 
     def moved(self, place: ArrayLike, yaw: float) -> "AttachedGeoms":
         """See :class:`~simharness.world.scene.objects.geoms.Geom`."""

@@ -19,19 +19,16 @@ Kind = Literal["room", "furniture", "clutter", "prop", "decoy"]
 
 @dataclass(frozen=True)
 class ObjectModel:
-    """Model of an object before it is placed: it stands on z = 0 around the origin, its front towards +x.
-
-    Attributes:
-        mesh: mesh for pictures.
-        geoms: geoms for rays and contacts.
-        figure: COCO-17 joints, (17, 3), metres, if a detector may take the object for a person.
-        mirror: glass, if the object is a mirror.
-    """
+    """Model of an object before it is placed: it stands on z = 0 around the origin, its front towards +x."""
 
     mesh: Mesh
+    """Mesh for pictures."""
     geoms: tuple[Geom, ...]
+    """Geoms for rays and contacts."""
     figure: Floats | None = None
+    """COCO-17 joints, (17, 3), metres, if a detector may take the object for a person."""
     mirror: Mirror | None = None
+    """Glass, if the object is a mirror."""
 
     @cached_property
     def extent(self) -> Box:
@@ -62,30 +59,27 @@ class ObjectModel:
 
 @dataclass(frozen=True)
 class Solid:
-    """Solid object in the scene, at rest or moving.
-
-    Attributes:
-        kind: "room" (floor, walls), "furniture" (of a kind of room), "clutter", "prop" (used by people) or "decoy" (may
-            be taken for a person).
-        name: name in messages and in the MuJoCo model.
-        mesh: mesh for pictures, in the world; in the frame of the trajectory if the solid moves. It is ``still`` if
-            the solid does not move.
-        geoms: geoms for rays and contacts, in the same frame as the mesh.
-        hull: bounding box in the world, over the whole trajectory of a moving solid; it includes empty space, such as
-            that between the boards of a shelf.
-        trajectory: poses of the frame of a moving solid; None at rest.
-        figure: COCO-17 joints in the world, (17, 3), metres, that a detector may find on a decoy.
-        mirror: glass of a mirror, in the world.
-    """
+    """Solid object in the scene, at rest or moving."""
 
     kind: Kind
+    """"room" (floor, walls), "furniture" (of a kind of room), "clutter", "prop" (used by people) or "decoy" (may be
+    taken for a person)."""
     name: str
+    """Name in messages and in the MuJoCo model."""
     mesh: Mesh
+    """Mesh for pictures, in the world; in the frame of the trajectory if the solid moves. It is ``still`` if the solid
+    does not move."""
     geoms: tuple[Geom, ...]
+    """Geoms for rays and contacts, in the same frame as the mesh."""
     hull: Box
+    """Bounding box in the world, over the whole trajectory of a moving solid; it includes empty space, such as that
+    between the boards of a shelf."""
     trajectory: Trajectory | None = None
+    """Poses of the frame of a moving solid; None at rest."""
     figure: Floats | None = None
+    """COCO-17 joints in the world, (17, 3), metres, that a detector may find on a decoy."""
     mirror: Mirror | None = None
+    """Glass of a mirror, in the world."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mesh", replace(self.mesh, still=self.trajectory is None))

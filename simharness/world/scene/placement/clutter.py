@@ -50,21 +50,18 @@ _LIMBS_REACH = 1.6  # metres: largest distance from a pelvis to a joint
 
 @dataclass(frozen=True)
 class ClutterKind:
-    """Kind of clutter at rest.
-
-    Attributes:
-        name: name of one object.
-        plural: key of the scenario.
-        draw: function that draws one object for a room.
-        sample_place: function that draws a place for it.
-        fills: whether it may be added to reach ``clutter.coverage``.
-    """
+    """Kind of clutter at rest."""
 
     name: str
+    """Name of one object."""
     plural: str
+    """Key of the scenario."""
     draw: Callable[[np.random.Generator, RoomSection], ObjectModel]
+    """Function that draws one object for a room."""
     sample_place: PlaceSampler
+    """Function that draws a place for it."""
     fills: bool = True
+    """Whether it may be added to reach ``clutter.coverage``."""
 
 
 # In the order of placement: large objects first, because they need more space.
@@ -169,21 +166,18 @@ def place_cart(seed: int, k: int, site: Site) -> Solid:
 
 @dataclass(frozen=True)
 class _Path:
-    """Harmonic path: an ellipse, whose second radius is 0 for a line.
-
-    Attributes:
-        middle: centre, (2,), metres.
-        bearing: bearing of the first radius, radians.
-        radii: radii, (2,), metres.
-        period: period in seconds; negative for clockwise.
-        phase: phase at time 0, radians.
-    """
+    """Harmonic path: an ellipse, whose second radius is 0 for a line."""
 
     middle: Floats
+    """Centre, (2,), metres."""
     bearing: float
+    """Bearing of the first radius, radians."""
     radii: Floats
+    """Radii, (2,), metres."""
     period: float
+    """Period in seconds; negative for clockwise."""
     phase: float
+    """Phase at time 0, radians."""
 
     def at(self, time: Floats) -> Floats:
         """Return poses (n, 7) at times (n,); the cart keeps its orientation on a line and faces ahead on an ellipse."""

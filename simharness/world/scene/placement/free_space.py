@@ -37,27 +37,24 @@ PlaceSampler = Callable[[np.random.Generator, "FreeSpace"], tuple[Floats, float]
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """Space that objects can use: room, paths of people, cameras and present solids.
-
-    Attributes:
-        room: the room; objects stay within its size even without walls.
-        area: half the side of the square in which people stay, metres.
-        time: times for which people are planned, (N,), seconds.
-        pelvises: positions of the pelvises, (N, P, 3), metres.
-        joints: positions of the joints, (N, P, J, 3), metres.
-        rig: true cameras.
-        taken: solids that are already present.
-        around: radius around the origin that people keep free, metres.
-    """
+    """Space that objects can use: room, paths of people, cameras and present solids."""
 
     room: RoomSection
+    """The room; objects stay within its size even without walls."""
     area: float
+    """Half the side of the square in which people stay, metres."""
     time: Floats
+    """Times for which people are planned, (N,), seconds."""
     pelvises: Floats
+    """Positions of the pelvises, (N, P, 3), metres."""
     joints: Floats
+    """Positions of the joints, (N, P, J, 3), metres."""
     rig: Rig
+    """True cameras."""
     taken: tuple[Solid, ...] = ()
+    """Solids that are already present."""
     around: float = 0.0
+    """Radius around the origin that people keep free, metres."""
 
     @cached_property
     def half(self) -> Floats:

@@ -114,17 +114,14 @@ def _shown(radiance: ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class _View:
-    """Panorama that is being drawn.
-
-    Attributes:
-        picture: see :class:`~simharness.types.lighting.Panorama`.
-        weather: weather.
-        horizon: radiance of the sky above the horizon, by column, (w, 3).
-    """
+    """Panorama that is being drawn."""
 
     picture: NDArray[np.uint8]
+    """See :class:`~simharness.types.lighting.Panorama`."""
     weather: Weather
+    """Weather."""
     horizon: Floats
+    """Radiance of the sky above the horizon, by column, (w, 3)."""
 
     @property
     def scale(self) -> float:

@@ -74,19 +74,16 @@ def room_walls(room: RoomSection) -> tuple[Wall, ...]:
 
 @dataclass(frozen=True)
 class Opening:
-    """Window or door in a wall.
-
-    Attributes:
-        kind: "window" or "door".
-        wall: its wall.
-        span: left and right edge along the wall, metres.
-        heights: lower and upper edge, metres.
-    """
+    """Window or door in a wall."""
 
     kind: Literal["window", "door"]
+    """"window" or "door"."""
     wall: Wall
+    """Its wall."""
     span: tuple[float, float]
+    """Left and right edge along the wall, metres."""
     heights: tuple[float, float]
+    """Lower and upper edge, metres."""
 
     def keeps_free(self, hull: Box) -> bool:
         """Return whether an object with this hull leaves the opening free: below a window, or away from a door."""

@@ -17,21 +17,18 @@ _EXPOSED = 0.30  # radiance of the view as a share of that of the light of a win
 
 @dataclass(frozen=True)
 class Mood:
-    """Strengths of the lights of a room, relative to each other.
-
-    Attributes:
-        window: radiance of the sky that windows show; zeros for none.
-        lamp: radiance of the lamps; zeros for lamps that are off.
-        sun: the sun, if it shines in.
-        brightness: see :class:`~simharness.types.lighting.LightSources`.
-        every: every how many lamps one is on.
-    """
+    """Strengths of the lights of a room, relative to each other."""
 
     window: Vector
+    """Radiance of the sky that windows show; zeros for none."""
     lamp: Vector
+    """Radiance of the lamps; zeros for lamps that are off."""
     sun: Sun | None = None
+    """The sun, if it shines in."""
     brightness: float = 1.0
+    """See :class:`~simharness.types.lighting.LightSources`."""
     every: int = 1
+    """Every how many lamps one is on."""
 
 
 LIGHTS: Mapping[str, Lighting] = MappingProxyType(
