@@ -77,13 +77,16 @@ class Estimate(Sealed):
     """Time to which the joints belong, seconds, where it is known."""
 
     def __post_init__(self) -> None:
-        optional = {"covariance": ("n", "J", 3, 3), "freedom": ("n", "J"), "ids": (("n",), np.int64)}
-        given = {name: shape for name, shape in optional.items() if getattr(self, name) is not None}
-        set_arrays(self, joints=("n", "J", 3), scores=("n", "J"), **given)
-        if self.freedom is not None and (self.freedom <= 2.0).any():
-            raise ValueError(
-                f"degrees of freedom must be above 2, else there is no covariance; got {np.nanmin(self.freedom):.6g}"
-            )
+        set_arrays(self, joints=("n", "J", 3), scores=("n", "J"))
+        if self.covariance is not None:
+            set_arrays(self, covariance=(*self.joints.shape, 3))
+        if self.freedom is not None:
+            set_arrays(self, freedom=self.joints.shape[:2])
+            if (self.freedom <= 2.0).any():
+                least = np.nanmin(self.freedom)
+                raise ValueError(f"degrees of freedom must be above 2, else there is no covariance; got {least:.6g}")
+        if self.ids is not None:
+            set_arrays(self, ids=((len(self.joints),), np.int64))
 
     @classmethod
     def of_joints(
