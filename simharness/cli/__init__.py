@@ -4,6 +4,7 @@ Exit codes: 0 success, 1 regression found, 2 bad input (one message on stderr), 
 traceback), 130 interrupted. Commands import heavy modules only when they run.
 """
 
+from mvpose.commands.option_groups import Command
 from simharness.cli import (
     blame_command,
     check_command,
@@ -21,6 +22,7 @@ from simharness.cli.program import PROGRAM
 __all__ = ["app", "main"]
 
 app = PROGRAM.app()
+command: Command
 for command in (
     run_command.run,
     run_command.render,

@@ -51,7 +51,7 @@ class Sample:
         object.__setattr__(self, "detections", tuple(self.detections))
         if len(self.detections) != len(self.time):
             raise ValueError(f"expected detections of {len(self.time)} frames, got {len(self.detections)}")
-        limbs = np.isfinite(self.reference[:, :, LIMB_JOINTS]).all(axis=-1)
+        limbs = np.asarray(np.isfinite(self.reference[:, :, LIMB_JOINTS]).all(axis=-1))
         if (limbs.any(axis=-1) != limbs.all(axis=-1)).any():
             frame, person = np.argwhere(limbs.any(axis=-1) != limbs.all(axis=-1))[0]
             raise ValueError(
