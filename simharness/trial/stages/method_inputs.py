@@ -30,5 +30,5 @@ def input_digest(rig: Rig, detections: Detections) -> bytes:
     cameras += [rig.packed, rig.centers]  # kept by the rig, and read by kernels
     found = (detections.view, detections.keypoints, detections.scores, detections.boxes, detections.box_scores)
     for array in (*cameras, *found, detections.descriptors, detections.time):
-        digest.update(b"" if array is None else np.ascontiguousarray(array))
+        digest.update(b"" if array is None else np.ascontiguousarray(array).data)
     return digest.digest()
