@@ -41,7 +41,7 @@ def profile_network(
         typer.Option("--check", help="Also compare the profile with the network on 80 other scenes, 2,000 pictures."),
     ] = False,
     quick: Annotated[
-        bool, typer.Option("--quick", help="A quarter of the pictures, and two scenes of each kind, for a first look.")
+        bool, typer.Option("--quick", help="Half of the scenes, and a fifth of those of --check, for a first look.")
     ] = False,
     scenes: Annotated[Path, typer.Option(metavar="SCENARIO", help="Scenes to which the profile is fitted.")] = Path(
         _DESIGNED

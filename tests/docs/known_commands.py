@@ -42,6 +42,7 @@ NAMES = (  # mentioned
     "simharness check",
     "simharness export",
     "simharness fit-detector",
+    "simharness profile-network",
     "simharness evaluate seeds",
 )
 CHECKS = (

@@ -305,11 +305,13 @@ def _size_and_border(scenes: Sequence[ProfiledScene], labels: LabelledJoints) ->
         n = int(seen[where].sum())
         return (float(wrong[where].sum() / n) if n else np.nan), n
 
-    whole, of_cut = share(~cut & ~small), share(cut & ~small)
-    of_small = share(~cut & small)
-    exponent = np.log(of_small[0] / whole[0]) / np.mean(np.log(_SMALL / size[small & ~cut])) if of_small[1] else np.nan
+    whole, of_cut, of_small = share(~cut & ~small), share(cut & ~small), share(~cut & small)
+    usual = whole[0] or np.nan
+    exponent = np.nan
+    if of_small[0] > 0:
+        exponent = float(np.log(of_small[0] / usual) / np.mean(np.log(_SMALL / size[small & ~cut])))
     return {
-        "keypoints.truncated": (of_cut[0] / whole[0], of_cut[1]),
+        "keypoints.truncated": (of_cut[0] / usual, of_cut[1]),
         "keypoints.small": (float(np.clip(exponent, 0.0, 5.0)), of_small[1]),
     }
 

@@ -261,3 +261,12 @@ def test_a_network_is_profiled_by_one_command(tmp_path, monkeypatch):
     written = kept.stat().st_mtime_ns
     assert CliRunner().invoke(app, command).exit_code == 0
     assert kept.stat().st_mtime_ns == written
+
+
+def test_the_profile_of_a_detector_without_errors_has_none(filmed):
+    """Nothing is divided by the number of errors; a share of which no event was seen is 0."""
+    fitted = fit_network(found_by(filmed), name="perfect", rounds=1).detector
+    for key in ("jitter", "miss", "inversion", "swap"):
+        assert not any(getattr(fitted.keypoints, key).by_joint()), key
+    assert fitted.boxes.missed == fitted.boxes.duplicates == fitted.phantoms.rate == 0
+    assert max(np.abs(row).max() for row in fitted.bias.by_joint()) < 1e-3
