@@ -108,7 +108,8 @@ def _meaning(root: Path, file: Path, size: int, changed: int) -> bytes:
 def _tree(source: bytes) -> bytes:
     """Return the syntax tree of a module without its documentation; its source, if that is being edited."""
     try:
-        return ast.dump(_Undocumented(b"Field" in source).visit(ast.parse(source))).encode()
+        fields = b"Field" in source or b"sections.section import" in source
+        return ast.dump(_Undocumented(fields).visit(ast.parse(source))).encode()
     except SyntaxError:
         return source
 
@@ -179,8 +180,11 @@ class _Undocumented(ast.NodeTransformer):
         return node
 
     def visit_Call(self, node: ast.Call) -> ast.Call:
-        """Drop ``description=`` of ``Field(...)``."""
-        if isinstance(node.func, ast.Name) and node.func.id == "Field":
+        """Drop the description of ``Field(...)``, a keyword, and of ``key(...)`` of a section, the second argument."""
+        name = node.func.id if isinstance(node.func, ast.Name) else ""
+        if name == "Field":
             node.keywords = [keyword for keyword in node.keywords if keyword.arg != "description"]
+        elif name == "key":
+            node.args = node.args[:1]
         self.generic_visit(node)
         return node

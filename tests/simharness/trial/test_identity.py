@@ -240,8 +240,8 @@ class TestCode:
             path.write_text("# A comment.\n" + text.replace('"""', '"""Changed. ', 1))
         sections = folder / "simharness/scenario/sections/people_section.py"
         text = sections.read_text()
-        assert 'description="' in text
-        sections.write_text(text.replace('description="', 'description="changed ', 1))
+        assert 'key(4, "number' in text
+        sections.write_text(text.replace('key(4, "number', 'key(4, "changed number', 1))
         assert code() == before
 
     def test_a_renamed_module_counts(self, copied):
