@@ -73,14 +73,15 @@ suppress_warnings = ["ref.python"]  # a short name in a signature that two modul
 def _skip_namesakes(app: Any, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:
     """Leave out what has a section already.
 
-    That is a function in its package where its module has the same name, and a generic with values, which pydantic adds
-    to the module.
+    That is a public name of simharness, which has its section in its module; a function in its package where its module
+    has the same name; and a generic with values, which pydantic adds to the module.
     """
     if "[" in name:
         return True
     module = app.env.temp_data.get("autodoc:module")
     origin = getattr(obj, "__module__", None)
-    return True if module != origin and origin == f"{module}.{name}" else None
+    elsewhere = module != origin and (module == "simharness" or origin == f"{module}.{name}")
+    return True if elsewhere else None
 
 
 def _internal(app: Any, env: Any, node: Any, contnode: Any) -> Any:
