@@ -311,8 +311,7 @@ def test_what_the_commands_write_is_read(tmp_path, monkeypatch, shared_data):
     for key, wanted in INPUTS.items():
         words = [str(tmp_path / f"{key}.json") if word == "FILE" else word for word in shlex.split(wanted.makes)[1:]]
         if wanted.command == "evaluate seeds":
-            drawn = ("--set", "appearance.source=drawn")
-            run(*words, *small, *drawn)
+            run(*(word.replace("source=pictures", "source=drawn") for word in words), *small)
         else:
             run(*(str(shared_data / "shelf") if word == "FOLDER" else word for word in words))
     numbers = paper_tables(read_inputs({key: tmp_path / f"{key}.json" for key in INPUTS}))
