@@ -46,7 +46,7 @@ class EstimateFrames:
         """
         names = tuple(self.pipelines) if variants is None else tuple(variants)
         given = {frame: self._digest(frame) for frame in frames}
-        self._warm_up(names)
+        self._warm_up(names, given)
         estimates: dict[str, list[Estimate]] = {name: [] for name in names}
         alone = []
         for name in names:
@@ -93,8 +93,11 @@ class EstimateFrames:
         """Yield the detections of frames as a variant gets them."""
         return (self.input_of(frame, variant) for frame in frames)
 
-    def _warm_up(self, names: Iterable[str]) -> None:
-        """Run each variant once per process: compilation and loading are no part of the time of a frame."""
+    def _warm_up(self, names: Iterable[str], given: Mapping[int, bytes]) -> None:
+        """Run each variant once per process: compilation and loading are no part of the time of a frame.
+
+        Digests of the inputs are given, so that a change is blamed on the variant that made it.
+        """
         fresh = [name for name in names if name not in _warm]
         fullest = max(range(len(self.detected)), key=lambda frame: len(self.detected[frame].detections))
         around = range(len(self.detected))[max(fullest - 1, 0) : fullest + 2]
@@ -106,6 +109,7 @@ class EstimateFrames:
             else:
                 with naming_frame(fullest):
                     estimator.estimate(self.rig, self.input_of(fullest, name))
+            self._check_unchanged(name, given)
         _warm.update(fresh)
 
 

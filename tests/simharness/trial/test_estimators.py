@@ -347,7 +347,7 @@ class TestAnswers:
                 return mvpose.Estimate.of_joints([])
 
         with pytest.raises(RunError, match=r"^frame \d: writes has changed the cameras or the detections"):
-            EstimateFrames(rig, copy.deepcopy(detected), {"writes": Writes()})(range(2))
+            EstimateFrames(rig, copy.deepcopy(detected), {"fast": mvpose.preset("fast"), "writes": Writes()})(range(2))
 
     def test_only_the_place_is_pickled(self, file):
         custom = UserEstimator("custom", f"{file}:make")
