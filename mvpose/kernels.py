@@ -194,7 +194,7 @@ class KernelCache:
             part = file.with_name(f"{file.name}.{uuid.uuid4().hex[:8]}.part")
             try:
                 part.write_bytes(hashlib.sha256(content).digest() + content)
-                part.chmod(0o644)  # whatever the mask of the user: an entry that others may write to is not loaded
+                part.chmod(0o644)  # also under a umask of 002: an entry that others may write to is not loaded
                 part.replace(file)
             finally:
                 part.unlink(missing_ok=True)

@@ -71,8 +71,8 @@ class Consistency:
     def ideal(self, reading: Reading) -> Floats:
         """Return what ``self(reading)`` would be if rays of the same people met as well as the errors allow, (V, V, W).
 
-        All that is seen in both views at a time counts, whether it is of the same people or not: first the people who
-        are matched, each with whom they are matched, then the others.
+        Detections of both views are paired at each time, also those of different people: matched people with each
+        other first, then the others.
         """
         return self._of_pairs(reading, lambda *pair: best_evidence(*self._views(*pair), True))
 

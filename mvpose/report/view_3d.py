@@ -27,7 +27,7 @@ _DARKER = 0.28  # share of black in the rim of a round body
 
 
 class Shape3D(NamedTuple):
-    """What is drawn between the points of a piece; whatever needs a point that is unknown is left out."""
+    """Lines and triangles between the points of a piece; those with a point of unknown position are left out."""
 
     lines: tuple[tuple[int, int], ...] = ()
     """Pairs of points."""

@@ -1,7 +1,5 @@
 """``simharness profile-network``: how a network errs, and a profile with which simulation errs alike."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
@@ -11,6 +9,7 @@ import typer
 from rich.console import Console
 
 from mvpose.commands.errors import failing
+from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
 from mvpose.commands.programs import note
 from simharness.cli.program import PROGRAM, Overrides, Workers
@@ -24,6 +23,7 @@ _RIVALS = ("typical", "topdown", "posefix")
 _TOML = b"# Made by: simharness profile-network"
 
 
+@grouped()
 def profile_network(
     name: Annotated[
         str,
@@ -32,38 +32,26 @@ def profile_network(
             metavar="NETWORK",
         ),
     ],
-    head: Annotated[
-        str | None,
-        typer.Option(metavar="NETWORK", help="Pose head that reads the joints in the boxes of NETWORK."),
-    ] = None,
-    check: Annotated[
-        bool,
-        typer.Option("--check", help="Also compare the profile with the network on 80 other scenes, 2,000 pictures."),
-    ] = False,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Half of the scenes, and a fifth of those of --check, for a first look.")
-    ] = False,
-    scenes: Annotated[Path, typer.Option(metavar="SCENARIO", help="Scenes to which the profile is fitted.")] = Path(
-        _DESIGNED
+    head: str | None = option(None, "Pose head that reads the joints in the boxes of NETWORK.", metavar="NETWORK"),
+    check: bool = option(
+        False, "Also compare the profile with the network on 80 other scenes, 2,000 pictures.", "--check"
     ),
-    other_scenes: Annotated[Path, typer.Option(metavar="SCENARIO", help="Scenes of [cyan]--check[/].")] = Path(_OTHER),
+    quick: bool = option(False, "Half of the scenes, and a fifth of those of --check, for a first look.", "--quick"),
+    scenes: Path = option(Path(_DESIGNED), "Scenes to which the profile is fitted.", metavar="SCENARIO"),
+    other_scenes: Path = option(Path(_OTHER), "Scenes of [cyan]--check[/].", metavar="SCENARIO"),
     overrides: Overrides = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Folder of NAME.toml, profile.html and profile.json. [dim]\\[default: results/profiles/NAME][/]",
-            file_okay=False,
-        ),
-    ] = None,
-    store: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Folder of what the network found, which is not read again. [dim]\\[default: store, in --out][/]",
-            file_okay=False,
-        ),
-    ] = None,
+    out: Path | None = option(
+        None,
+        "Folder of NAME.toml, profile.html and profile.json. [dim]\\[default: results/profiles/NAME][/]",
+        metavar="FOLDER",
+        file_okay=False,
+    ),
+    store: Path | None = option(
+        None,
+        "Folder of what the network found, which is not read again. [dim]\\[default: store, in --out][/]",
+        metavar="FOLDER",
+        file_okay=False,
+    ),
     workers: Workers = 1,
 ) -> None:
     """Measure how a network errs in rendered pictures, and write a detector profile that errs alike.
@@ -75,7 +63,7 @@ def profile_network(
     with PROGRAM.exit_on_error():
         start = perf_counter()
         if not check and other_scenes != Path(_OTHER):
-            raise ValueError("--other-scenes: are those of --check; add it, or remove --other-scenes")
+            raise ValueError("--other-scenes: these are the scenes of --check: add --check, or leave them out")
         stem = Path(name).stem
         place = out or Path("results/profiles") / stem
         check_place(place / "profile.html", option="--out", mark=HTML)
@@ -94,7 +82,7 @@ def profile_network(
         designed, other = _studies((scenes, other_scenes) if check else (scenes,), name, head, overrides, quick)
         kept = store or place / "store"
         if kept.is_dir():
-            Store(kept)  # another folder is told before any scene is built, and so is a wrong name
+            Store(kept)  # refuses a folder of something else before any scene is built
         people_finder(designed.base)
         where: dict[str, Any] = {"store": kept, "workers": workers}
         with reporter() as bars:
@@ -143,7 +131,7 @@ def profile_network(
 
 def _studies(
     files: Sequence[Path], name: str, head: str | None, overrides: list[str] | None, quick: bool
-) -> tuple[Study, Study | None]:
+) -> "tuple[Study, Study | None]":
     """Return the scenes of a fit, and those of its check where there are any."""
     studies = [_study(file, name, head, overrides, seeds=None) for file in files]
     if quick:
@@ -154,7 +142,7 @@ def _studies(
     return studies[0], studies[1] if len(studies) > 1 else None
 
 
-def _study(scenes: Path, name: str, head: str | None, overrides: list[str] | None, *, seeds: int | None) -> Study:
+def _study(scenes: Path, name: str, head: str | None, overrides: list[str] | None, *, seeds: int | None) -> "Study":
     """Return a study whose pictures are read by the network."""
     from simharness.scenario.load import load_study
 
@@ -165,10 +153,12 @@ def _study(scenes: Path, name: str, head: str | None, overrides: list[str] | Non
     return load_study(scenes, overrides=[*keys, *(overrides or ())], seeds=seeds)
 
 
-def _print_check(check: ProfileCheck, console: Console) -> None:
+def _print_check(check: "ProfileCheck", console: Console) -> None:
     """Print PCP of each variant with the network, and the differences of the simulated detectors from it."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
+
+    from simharness.reality.validation.verdicts import VerdictState
 
     table = Table(
         title=f"PCP on {len(check.scenes)} other scenes, and differences of simulated detectors from it",
@@ -188,5 +178,5 @@ def _print_check(check: ProfileCheck, console: Console) -> None:
         table.add_row(variant, f"{figures[0].network:.1f}", *ends)
     console.print(table, highlight=False, markup=False)
     for group, verdicts in check.verdicts.items():
-        counts = ", ".join(f"{verdicts.count(each)} {each}" for each in ("holds", "cannot tell", "fails"))
+        counts = ", ".join(f"{verdicts.count(each)} {each}" for each in VerdictState)
         console.print(f"{group}: {counts}", highlight=False)

@@ -1,7 +1,8 @@
 """Circumstances in which a detector takes left for right, or one person for another: factors of the shares of errors.
 
-Left and right are told from the face and from what hides what: from behind and from the side they are inverted more
-often than from the front. A joint is taken for that of another person where both are near in the picture.
+A detector distinguishes left and right by the face and by which limb hides the other: from behind and from the side
+they are inverted more often than from the front. A joint is taken for that of another person where both are near in
+the picture.
 """
 
 import numpy as np

@@ -183,7 +183,7 @@ class _OneCamera:
 
 @dataclass(frozen=True)
 class _CameraDraws(KeyedDraws):
-    """Draws of the detector in one camera, of its own seed; what all views share is of the common seed."""
+    """Draws of the detector in one camera, from its own seed; draws that all views share are from the common seed."""
 
     common: int = 0
     """Seed of all cameras."""

@@ -86,7 +86,7 @@ class DeclaredSkeleton(Section):
     """Skeleton of a file: the names of its joints in their order, and ours for some of them."""
 
     joints: tuple[Name, ...] = key((), "names of the joints, in the order of the file")
-    map: dict[str, Name] = key({}, "joints whose name is not ours: ours = theirs")
+    map: dict[str, Name] = key({}, "joints named otherwise in the file: name in the skeleton = name in the file")
     name: str = key("declared", "name in messages")
 
     def joint_names(self, names: JointNames | None) -> JointNames:

@@ -32,7 +32,7 @@ class Source:
     path: Path
     """The folder of files for one picture each, or the file."""
     recognised: bool = True
-    """Whether a file is of a known format, and not one of settings beside them."""
+    """Whether a file is of a known format of detections, and no file of settings."""
 
 
 def find_sources(paths: Sequence[Path]) -> list[Source]:

@@ -1,7 +1,5 @@
 """Page of the profile of a network as one self-contained HTML file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 from typing import Any
@@ -15,6 +13,7 @@ from simharness.outputs.network_profile.plots import compared_curves
 from simharness.reality.network_profile.error_curves import condition_curves, error_curves
 from simharness.reality.network_profile.profile_check import CheckedFigure, ProfileCheck
 from simharness.reality.network_profile.profile_fit import NetworkProfile
+from simharness.reality.validation.verdicts import VerdictState
 from simharness.scenario.sections.detector_section import KINDS
 from simharness.scoring.catalogue import SCORES as CATALOGUE
 from simharness.scoring.pcp import GROUPS
@@ -72,10 +71,7 @@ def _check(check: ProfileCheck) -> dict[str, Any]:
     return {
         "scenes": len(check.scenes),
         "detectors": check.detectors,
-        "verdicts": [
-            (group, [of.count(each) for each in ("holds", "cannot tell", "fails")])
-            for group, of in check.verdicts.items()
-        ],
+        "verdicts": [(group, [of.count(each) for each in VerdictState]) for group, of in check.verdicts.items()],
         "scores": [
             (
                 CATALOGUE[key].title,
@@ -116,19 +112,19 @@ def _check(check: ProfileCheck) -> dict[str, Any]:
     }
 
 
-def _row(figures: list[CheckedFigure], digits: int) -> list[tuple[str, str, str]]:
+def _row(figures: list[CheckedFigure], digits: int) -> list[tuple[str, str, VerdictState | None]]:
     """Return the network's figure and the difference of each detector: text, interval, verdict."""
-    return [(_number(figures[0].network, digits), "", ""), *(_cell(each, digits)[1:] for each in figures)]
+    return [(_number(figures[0].network, digits), "", None), *(_cell(each, digits)[1:] for each in figures)]
 
 
-def _cell(figure: CheckedFigure, digits: int) -> tuple[str, str, str, str]:
+def _cell(figure: CheckedFigure, digits: int) -> tuple[str, str, str, VerdictState | None]:
     """Return the network's figure, the difference, its interval and its verdict."""
     each = figure.difference
     ends = f"{each.low:+.{digits}f} to {each.high:+.{digits}f}" if np.isfinite(each.low) else ""
     return _number(figure.network, digits), _number(each.mean, digits, sign=True), ends, figure.verdict
 
 
-def _ratio(figure: CheckedFigure) -> tuple[str, str, str, str]:
+def _ratio(figure: CheckedFigure) -> tuple[str, str, str, VerdictState | None]:
     """Return the network's rate, the ratio of both rates, its interval and its verdict."""
     each = figure.difference
     ends = f"{1 + each.low:.2f} to {1 + each.high:.2f}" if np.isfinite(each.low) else ""

@@ -1,9 +1,12 @@
 """Plots of the errors of a network beside those of the simulated detector with its profile, as SVG."""
 
 import numpy as np
+from scipy.stats import binomtest
 
+from mvpose.arrays import Floats
 from mvpose.report.svg_plots import legend_above, svg_plot
 from simharness.outputs.validation.plots import REAL_COLOR, TWIN_COLOR
+from simharness.reality.detector_fit.detector_sums import Trials
 from simharness.reality.network_profile.error_curves import ErrorCurve
 
 _SIZE = (3.6, 2.6)
@@ -25,12 +28,12 @@ def compared_curves(network: ErrorCurve, simulated: ErrorCurve, *, name: str) ->
     enough = network.counts.n >= _FEWEST
     with svg_plot(name, size=_SIZE) as (axes, written):
         share = np.where(enough, 100 * network.share, np.nan)
-        low, high = (100 * each for each in _wilson(network.counts.n, np.minimum(network.counts.k, network.counts.n)))
+        low, high = _intervals(network.counts)
         axes.bar(at, share, color=REAL_COLOR, width=0.72, alpha=0.5, label="network")
         if (network.counts.k <= network.counts.n).all():
             axes.vlines(at[enough], low[enough], high[enough], color=REAL_COLOR, lw=1.6)
-        told = np.where(simulated.counts.n >= _FEWEST, 100 * simulated.share, np.nan)
-        axes.plot(at, told, "o--", color=TWIN_COLOR, ms=4, lw=1.2, label="profile")
+        shares = np.where(simulated.counts.n >= _FEWEST, 100 * simulated.share, np.nan)
+        axes.plot(at, shares, "o--", color=TWIN_COLOR, ms=4, lw=1.2, label="profile")
         turned = sum(map(len, network.labels)) > _TURNED
         axes.set_xticks(at, network.labels, rotation=55 if turned else 0, ha="right" if turned else "center")
         axes.set(xlabel=network.axis, ylabel="%")
@@ -40,8 +43,8 @@ def compared_curves(network: ErrorCurve, simulated: ErrorCurve, *, name: str) ->
     return written[0]
 
 
-def _wilson(n: np.ndarray, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ends of the interval of each share, 0 to 1."""
-    z, n = 1.96, np.maximum(n, 1.0)
-    middle, half = (k + z**2 / 2) / (n + z**2), z * np.sqrt(k * (n - k) / n + z**2 / 4) / (n + z**2)
-    return middle - half, middle + half
+def _intervals(counts: Trials) -> Floats:
+    """Return the ends of the 95 % interval (Wilson) of each share, (2, B), %; NaN without a trial."""
+    pairs = zip(counts.k.astype(int), counts.n.astype(int), strict=True)
+    ends = [binomtest(min(k, n), n).proportion_ci(method="wilson") if n else (np.nan, np.nan) for k, n in pairs]
+    return 100 * np.array(ends).T

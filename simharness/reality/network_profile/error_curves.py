@@ -1,7 +1,5 @@
 """Errors of a detector by circumstance: shares of people, joints and pairs of them, measured on labelled joints."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple

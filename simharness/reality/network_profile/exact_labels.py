@@ -3,8 +3,6 @@
 The scenes follow one another as the frames of one sample, with long gaps between them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Any

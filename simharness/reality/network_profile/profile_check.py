@@ -1,10 +1,8 @@
 """A network beside simulated detectors on scenes that no profile has seen: the same pictures, people and cameras.
 
 Where the whole 95 % interval of a difference is inside its bound, the prediction holds; where it is outside, it fails;
-else the scenes cannot tell.
+else it is unclear.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,12 +20,14 @@ from simharness.reality.detector_fit.detector_sums import Trials
 from simharness.reality.network_profile.error_curves import part_counts
 from simharness.reality.network_profile.exact_labels import label_scenes
 from simharness.reality.network_profile.profiled_scenes import ProfiledScene
+from simharness.reality.validation.verdicts import VerdictState
 from simharness.runtime.frame_pool import map_jobs
 from simharness.scenario.sections.detector_section import KINDS, DetectorSection
 from simharness.scoring.assessment import assess
 from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.pcp import GROUPS, percent
 from simharness.statistics.intervals import Interval, mean_interval
+from simharness.statistics.resampling import pseudo_values
 from simharness.trial.conditioned_trial import estimate_frames
 
 NETWORK = "network"
@@ -67,14 +67,15 @@ class CheckedFigure(NamedTuple):
     """Largest difference that is accepted; None where none is."""
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> VerdictState | None:
         """Whether the difference is within the bound, by its interval."""
         if self.bound is None or not np.isfinite(self.difference.mean):
-            return ""
+            return None
         low, high = self.difference.low, self.difference.high
         if -self.bound <= low and high <= self.bound:
-            return "holds"
-        return "fails" if low > self.bound or high < -self.bound else "cannot tell"
+            return VerdictState.HOLDS
+        outside = low > self.bound or high < -self.bound
+        return VerdictState.FAILS if outside else VerdictState.UNCLEAR
 
 
 @dataclass(frozen=True)
@@ -125,15 +126,15 @@ class ProfileCheck:
 
         whole = counts.sum(axis=0)
         rate = float(whole[0, 1] / whole[0, 0]) if whole[0, 0] else np.nan
-        if whole[:, 1].max() < _FEWEST or not whole[0, 1]:
+        if len(counts) < 2 or whole[:, 1].max() < _FEWEST or not whole[0, 1]:
             return CheckedFigure(rate, Interval(np.nan, np.nan, np.nan, 0))
-        values = ratio(whole - counts)  # the jackknife over scenes
+        values = pseudo_values(ratio, counts)
         n, mean = len(counts), float(ratio(whole)) - 1
-        half = 1.96 * float(np.sqrt((n - 1) / n * ((values - values.mean()) ** 2).sum()))
+        half = 1.96 * float(np.std(values, ddof=1)) / n**0.5
         return CheckedFigure(rate, Interval(mean, mean - half, mean + half, n), BOUNDS["errors"])
 
     @property
-    def verdicts(self) -> dict[str, list[str]]:
+    def verdicts(self) -> dict[str, list[VerdictState]]:
         """Verdicts about the fitted profile, by group of figures."""
         name = self.detectors[0]
         cases = dict.fromkeys(scene.case for scene in self.scenes)
@@ -171,7 +172,7 @@ class ProfileCheck:
         cases = dict.fromkeys(scene.case for scene in self.scenes)
         return {
             "scenes": len(self.scenes),
-            "verdicts": {group: {each: of.count(each) for each in VERDICTS} for group, of in self.verdicts.items()},
+            "verdicts": {group: {each: of.count(each) for each in VerdictState} for group, of in self.verdicts.items()},
             "detectors": {
                 name: {
                     "scores": {v: {key: plain(self.score(name, v, key)) for key in SCORES} for v in self.variants},
@@ -203,9 +204,6 @@ class ProfileCheck:
         simulated = np.array([value(scene, detector) for scene in scenes], float)
         mean = float(np.nanmean(network)) if np.isfinite(network).any() else np.nan
         return CheckedFigure(mean, mean_interval(simulated - network), bound)
-
-
-VERDICTS = ("holds", "cannot tell", "fails")
 
 
 def check_profile(

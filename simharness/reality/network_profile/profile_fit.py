@@ -5,8 +5,6 @@ scenes is measured as the network is (indirect inference, see :mod:`simharness.r
 errors among hidden joints, for example, follows from guesses, whose errors depend on the pose.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count, islice, pairwise
@@ -251,7 +249,7 @@ def _score_slope(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
 def _class_scores(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
     """Return the median scores of visible limb joints by class, and the factors of those that are not visible.
 
-    Misses with the scores of good keypoints are told from others by the slope, not as a share.
+    Misses with the scores of good keypoints are distinguished from others by the slope, not by a share.
     """
     error, seen = labels.error[..., LIMB_JOINTS], (labels.occlusion == VISIBLE)[..., LIMB_JOINTS]
     known = np.isfinite(labels.residual[..., LIMB_JOINTS, 0])

@@ -1,7 +1,5 @@
 """Rendered scenes that a network has read: what cameras see, and its detections, which the store keeps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
