@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -11,7 +12,7 @@ import numpy as np
 
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.materials import draw_sheet
-from tools.objects import gym, home, office, park, shop, stage, ward
+from tools.objects import clutter, decoys, gym, home, office, park, plants, shop, stage, ward
 from tools.objects.builder import ObjectBuilder
 
 Draw = Callable[[ObjectBuilder, np.random.Generator], None]
@@ -22,7 +23,7 @@ OBJECTS: dict[str, tuple[Draw, int]] = {
     "bookcase": (office.bookcase, 4),
     "printer": (office.printer, 1),
     "water_cooler": (office.water_cooler, 1),
-    "potted_plant": (office.potted_plant, 4),
+    "potted_plant": (plants.plant, 8),
     "sofa": (home.sofa, 4),
     "television": (home.television, 2),
     "bookshelf": (home.bookshelf, 4),
@@ -65,8 +66,28 @@ OBJECTS: dict[str, tuple[Draw, int]] = {
     "bicycle": (park.bicycle, 3),
     "far_tree": (park.far_tree, 5),
     "far_shrub": (park.far_shrub, 4),
+    "pillar": (clutter.pillar, 8),
+    "rack": (clutter.rack, 6),
+    "partition": (clutter.partition, 8),
+    "cart": (clutter.cart, 6),
+    "laid_table": (clutter.table, 10),
+    "poster": (partial(decoys.poster, on_wall=False), 8),
+    "wall_poster": (partial(decoys.poster, on_wall=True), 8),
+    "mirror": (partial(decoys.mirror, on_wall=False), 4),
+    "wall_mirror": (partial(decoys.mirror, on_wall=True), 4),
+    "coat_stand": (decoys.coat_stand, 6),
 }
 """Functions that draw the objects, and the number of variants of each, by name."""
+
+PROPS: dict[str, tuple[Callable[[ObjectBuilder, int], None], int]] = {
+    "chair": (clutter.chair, 9),
+    "table": (clutter.plain_table, 4),
+    "step": (clutter.step, 3),
+    "bottle": (clutter.bottle, 3),
+    "booth": (clutter.booth, 3),
+    "door": (clutter.door, 3),
+}
+"""Functions that draw the objects that activities use, given the number of the variant: they differ in colour."""
 
 
 def write_objects(folder: Path) -> None:
@@ -74,11 +95,14 @@ def write_objects(folder: Path) -> None:
     (folder / "textures").mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.xml"):
         old.unlink()
-    for name, (draw, variants) in OBJECTS.items():
+    draws: dict[str, tuple[Draw | Callable[[ObjectBuilder, int], None], int]] = {**OBJECTS, **PROPS}
+    for name, (draw, variants) in draws.items():
         for k in range(variants):
-            builder = ObjectBuilder()
-            draw(builder, stream(0, "objects", name, k))
-            (folder / (f"{name}.{k + 1}.xml" if k else f"{name}.xml")).write_text(builder.mjcf(name), encoding="utf-8")
+            builder, stem = ObjectBuilder(), f"{name}.{k + 1}" if k else name
+            draw(builder, k if name in PROPS else stream(0, "objects", name, k))
+            (folder / f"{stem}.xml").write_text(builder.mjcf(name, stem), encoding="utf-8")
+            if builder.picture is not None:
+                _write_picture(folder / "textures" / f"{stem}.png", builder.picture)
     sheet = draw_sheet(0)
     used = {
         line.split('"')[1]
@@ -86,13 +110,17 @@ def write_objects(folder: Path) -> None:
         for line in file.read_text().splitlines()
         if "<texture" in line
     }
-    for name in used:
+    for name in used - {"picture"}:
         patch = sheet.patches[name]
         picture = sheet.texture[patch.top : patch.top + patch.height, patch.left : patch.left + patch.width]
         if name in ("wood", "fabric", "metal", "leaves"):  # a texture of a cube is a square
             side = min(picture.shape[:2])
             picture = picture[:side, :side]
-        cv2.imwrite(str(folder / "textures" / f"{name}.png"), picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
+        _write_picture(folder / "textures" / f"{name}.png", picture)
+
+
+def _write_picture(path: Path, picture: np.ndarray) -> None:
+    cv2.imwrite(str(path), picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, Literal, Self
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
+from mvpose.skeleton import COCO17
 from simharness.types.mesh import Mesh
 from simharness.world.scene.objects.materials import Material
 from simharness.world.scene.objects.shapes import lathe, loft
@@ -56,23 +57,39 @@ class Part:
 
 
 class ObjectBuilder:
-    """Builder of an object, which stands on z = 0 with its front towards +x and its back at -x."""
+    """Builder of an object, which stands on z = 0 with its front towards +x and its back at -x.
+
+    Attributes:
+        parts: its parts.
+        figure: COCO-17 joints of a decoy, (17, 3), metres.
+        origin: point that is placed, if not the middle of the floor below it: of what hangs, where the wall ends.
+        size: nominal depth, width and height, metres, if they are not the extents: those of the seat of a chair.
+        picture: picture of the print "picture", (h, w, 3) uint8.
+    """
 
     def __init__(self) -> None:
         self.parts: list[Part] = []
+        self.figure: Floats | None = None
+        self.origin: tuple[float, float, float] | None = None
+        self.size: tuple[float, float, float] | None = None
+        self.picture: np.ndarray | None = None
 
     def box(
         self,
         center: Sequence[float],
         size: Sequence[float],
         color: ArrayLike,
-        material: Material = "plain",
+        material: Material | Literal["mirror"] = "plain",
         *,
         yaw: float = 0.0,
+        tilt: float = 0.0,
     ) -> Self:
-        """Add a box of ``size`` x, y, z in metres; ``yaw`` turns it about its own vertical axis."""
-        half = tuple(float(v) / 2 for v in size)
-        return self._add("box", half, np.asarray(center, float), Rotation.from_euler("z", yaw), color, material)
+        """Add a box of ``size`` x, y, z in metres; ``yaw`` turns it about its own vertical axis.
+
+        ``tilt`` leans it backwards about its y axis, radians.
+        """
+        half, turn = tuple(float(v) / 2 for v in size), Rotation.from_euler("ZY", [yaw, tilt])
+        return self._add("box", half, np.asarray(center, float), turn, color, material)
 
     def block(
         self, low: Sequence[float], high: Sequence[float], color: ArrayLike, material: Material = "plain"
@@ -176,8 +193,8 @@ class ObjectBuilder:
         self.parts.append(Part(kind, size, position, turn, albedo, material, mesh))
         return self
 
-    def mjcf(self, name: str) -> str:
-        """Return the MJCF file of the object; what would sink into the floor lies flat on it."""
+    def mjcf(self, name: str, stem: str) -> str:
+        """Return the MJCF file ``stem``.xml of the object; what would sink into the floor lies flat on it."""
         root = ElementTree.Element("mujoco", model=name)
         default = ElementTree.SubElement(root, "default")
         ElementTree.SubElement(default, "mesh", inertia="shell")
@@ -185,8 +202,14 @@ class ObjectBuilder:
         ElementTree.SubElement(sheet, "geom", type="mesh", contype="0", conaffinity="0")
         asset, world = ElementTree.SubElement(root, "asset"), ElementTree.SubElement(root, "worldbody")
         for material in sorted({part.material for part in self.parts} - {"plain"}):
+            if material == "mirror":
+                ElementTree.SubElement(asset, "material", name=material, reflectance="1")
+                continue
             is_print = any(part.uv is not None for part in self.parts if part.material == material)
-            kind = {"type": "2d" if is_print else "cube", "file": f"textures/{material}.png"}
+            kind = {
+                "type": "2d" if is_print else "cube",
+                "file": f"textures/{stem if material == 'picture' else material}.png",
+            }
             ElementTree.SubElement(asset, "texture", {"name": material, **kind})
             ElementTree.SubElement(asset, "material", name=material, texture=material)
         meshes: dict[str, str] = {}
@@ -194,6 +217,12 @@ class ObjectBuilder:
             _write_geom(_above_floor(part), asset, world, meshes)
         if not len(asset):
             root.remove(asset)
+        if self.size is not None:
+            custom = ElementTree.SubElement(root, "custom")
+            ElementTree.SubElement(custom, "numeric", name="size", data=_text(self.size))
+        sites = [] if self.figure is None else list(zip(COCO17.joints, self.figure, strict=True))
+        for site, place in [*sites, *([] if self.origin is None else [("origin", np.array(self.origin))])]:
+            ElementTree.SubElement(world, "site", name=site, pos=_text(place))
         ElementTree.indent(root)
         return ElementTree.tostring(root, encoding="unicode") + "\n"
 

@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.world.scene.objects.plants import draw_plant
 from tools.objects.belongings import (
     DARK,
     STEEL,
@@ -179,8 +178,3 @@ def water_cooler(f: ObjectBuilder, rng: np.random.Generator) -> None:
     ]
     f.turned(bottle, (0.62, 0.76, 0.86), at=(0, 0, 0.95), sides=18)
     f.bar((0.0, 0.175, 0.70), (0.0, 0.175, 0.95), 0.035, WHITE, sides=12)
-
-
-def potted_plant(f: ObjectBuilder, rng: np.random.Generator) -> None:
-    """Draw a potted plant."""
-    f.part(draw_plant(rng).mesh)

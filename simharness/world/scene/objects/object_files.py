@@ -2,13 +2,16 @@
 
 What pictures show is what MuJoCo shows of the file: its visible geoms (groups 0 to 2) at their initial positions, with
 their colours, materials and textures. The same geoms stop rays and people. A site for each of the COCO-17 joints
-(``<site name="nose"/>`` and so on) makes the object a decoy. The object is moved so that its lowest point stands on the
-floor and its bounding box is centred on the origin; lengths are metres, z is up and the front is +x.
+(``<site name="nose"/>`` and so on) makes the object a decoy, and a box whose material has a reflectance of 0.5 or more
+is a mirror that looks to +x. The object is moved so that its lowest point stands on the floor and its bounding box is
+centred on the origin; a site ``origin`` is moved to the origin instead: of an object that hangs, it is where wall and
+floor meet. Lengths are metres, z is up and the front is +x.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +26,8 @@ from mvpose.files.input_files import read_bytes
 from mvpose.files.message_text import one_line
 from mvpose.skeleton import COCO17
 from simharness.types.mesh import Mesh
-from simharness.world.scene.objects.geoms import Box, Cylinder, carried
+from simharness.types.mirror import Mirror
+from simharness.world.scene.objects.geoms import Box, Cylinder, Surface, carried
 from simharness.world.scene.objects.materials import Sheet
 from simharness.world.scene.objects.shapes import bar_mesh, box_mesh, joined, lathe
 from simharness.world.scene.objects.solids import ObjectModel
@@ -38,6 +42,8 @@ _CREASE = np.cos(np.radians(40))  # faces that bend more do not share normals
 _ROUND = ((0.02, 8), (0.06, 12), (0.15, 18), (np.inf, 28))  # sides of a round bar up to a radius in metres
 _DEFAULT_COLOR = (0.5, 0.5, 0.5, 1.0)  # of geoms in MuJoCo; a material replaces it
 _KEPT = 64  # files, at most about 1 MB each
+_FLAT = 1e-4  # metres: a thinner part is a sheet
+_REFLECTS = 0.5  # reflectance from which a material is a mirror
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,7 @@ class _Part:
         place, turn: position (3,) and rotation (3, 3) of the geom.
         texture: name of its texture.
         uv: texture coordinates of the corners of the faces, (k, 3, 2); None where the texture is projected on them.
+        kind: its type in MuJoCo.
     """
 
     mesh: Mesh
@@ -56,6 +63,19 @@ class _Part:
     turn: Floats
     texture: str = ""
     uv: NDArray[np.float32] | None = None
+    kind: mujoco.mjtGeom = mujoco.mjtGeom.mjGEOM_MESH
+
+    @property
+    def vertices(self) -> Floats:
+        """Positions of its vertices in the file, (n, 3), metres."""
+        return self.mesh.vertices @ self.turn.T + self.place
+
+    def geoms(self, points: Floats) -> tuple[Box | Surface, ...]:
+        """Return the geom of the part with its vertices at ``points`` (n, 3); none for a sheet, which has no hull."""
+        if np.ptp(self.mesh.vertices, axis=0).min() < _FLAT:
+            return ()
+        is_upright = self.kind == mujoco.mjtGeom.mjGEOM_BOX and np.allclose(self.turn, np.eye(3), atol=1e-6)
+        return (Box.around(points) if is_upright else Surface(points, self.mesh.faces),)
 
 
 @dataclass(frozen=True)
@@ -72,8 +92,12 @@ class ObjectFile:
     """MuJoCo model of the geoms alone."""
     offset: Floats
     """Vector that moves the object to its place on the floor, (3,), metres."""
+    size: Floats
+    """Depth, width and height, (3,), metres: the numbers ``size`` of the file, or its extents."""
     figure: Floats | None
     """COCO-17 joints, (17, 3), metres, of a decoy."""
+    mirror: Mirror | None
+    """Glass of a mirror."""
 
     def mesh(self, sheet: Sheet | None = None) -> Mesh:
         """Return the mesh for pictures.
@@ -87,8 +111,7 @@ class ObjectFile:
             sheet = Sheet.pack({"plain": np.ones((8, 8, 3)), **{name: self.textures[name] / 255 for name in names}})
         meshes, uv = [], []
         for number, part in enumerate(self.parts):
-            vertices = part.mesh.vertices @ part.turn.T + part.place + self.offset
-            meshes.append(replace(part.mesh, vertices=vertices.astype(np.float32)))
+            meshes.append(part.mesh.moved((part.vertices + self.offset).astype(np.float32)))
             if sheet is not None:
                 name = part.texture or "plain"
                 place = None if part.uv is None else _within(part.uv)
@@ -98,9 +121,15 @@ class ObjectFile:
 
     def model(self, sheet: Sheet | None = None) -> ObjectModel:
         """Return the model to be placed; see :meth:`mesh`."""
-        figure = None if self.figure is None else self.figure + self.offset
         x, y, z = self.offset.tolist()
-        return ObjectModel(self.mesh(sheet), (AttachedGeoms(self.spec, (x, y, z)),), figure=figure)
+        return ObjectModel(self.mesh(sheet), (AttachedGeoms(self.spec, (x, y, z)),), self.figure, self.mirror)
+
+    def stretched(self, scale: ArrayLike) -> ObjectModel:
+        """Return the model stretched along x, y and z by ``scale`` (3,), in its own colours; no mirror or decoy is."""
+        points = [np.asarray((part.vertices + self.offset) * scale) for part in self.parts]
+        mesh = self.mesh().moved(np.concatenate(points).astype(np.float32))
+        geoms = [part.geoms(each) for part, each in zip(self.parts, points, strict=True)]
+        return ObjectModel(mesh, tuple(chain(*geoms)))
 
 
 @dataclass(frozen=True)
@@ -129,6 +158,13 @@ def variants(name: str) -> tuple[Path, ...]:
     """Return the files of a shipped object: ``NAME.xml``, and ``NAME.2.xml`` and so on."""
     first = ASSETS / f"{name}.xml"
     return (first, *sorted(ASSETS.glob(f"{name}.[0-9]*.xml")))
+
+
+def draw_shipped(rng: np.random.Generator, name: str, stretch: float, *, height: float | None = None) -> ObjectModel:
+    """Draw a variant of a shipped object, stretched in width and height by up to a share, or to a height in metres."""
+    files = variants(name)
+    file, (wide, tall) = load_whole(files[rng.integers(len(files))]), 1 + stretch * rng.uniform(-1, 1, 2)
+    return file.stretched((wide, wide, tall if height is None else height / file.size[2]))
 
 
 @lru_cache(maxsize=_KEPT)
@@ -173,6 +209,10 @@ def load_object(path: Path) -> ObjectFile:
     return result
 
 
+load_whole = lru_cache(maxsize=_KEPT)(load_object)
+"""Loading of a shipped object with its own textures, read once in a process."""
+
+
 def _object_file(path: Path, spec: mujoco.MjSpec) -> ObjectFile:
     """Return the object of a MuJoCo model.
 
@@ -191,17 +231,30 @@ def _object_file(path: Path, spec: mujoco.MjSpec) -> ObjectFile:
         mesh, uv = _shape(model, geom, np.clip(color[:3], 0, 1))
         turn = data.geom_xmat[geom].reshape(3, 3).copy()
         texture = _texture(model, geom)
-        parts.append(_Part(mesh, data.geom_xpos[geom].copy(), turn, texture, uv if texture else None))
+        kind = mujoco.mjtGeom(int(model.geom_type[geom]))
+        parts.append(_Part(mesh, data.geom_xpos[geom].copy(), turn, texture, uv if texture else None, kind))
         _add_geom(geoms, model, data, geom, mesh)
     if not parts:
         raise ValueError("it has no geom that is visible (group 0 to 2, alpha above 0): add a geom")
-    vertices = np.concatenate([part.mesh.vertices @ part.turn.T + part.place for part in parts])
+    vertices = np.concatenate([part.vertices for part in parts])
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    offset = np.array([*(-(low + high) / 2)[:2], -low[2]])
     pictures = {model.texture(k).name: _picture(model, k) for k in range(model.ntex)}
     sites = {model.site(k).name: data.site_xpos[k] for k in range(model.nsite)}
-    figure = np.array([sites[name] for name in COCO17.joints]) if set(COCO17.joints) <= set(sites) else None
-    return ObjectFile(path, tuple(parts), pictures, geoms, offset, figure)
+    offset = -sites["origin"] if "origin" in sites else np.array([*(-(low + high) / 2)[:2], -low[2]])
+    figure = [sites[name] + offset for name in COCO17.joints] if set(COCO17.joints) <= set(sites) else None
+    size = next((numbers.data for numbers in spec.numerics if numbers.name == "size"), high - low)
+    shown = None if figure is None else np.array(figure)
+    return ObjectFile(path, tuple(parts), pictures, geoms, offset, np.array(size), shown, _mirror(model, data, offset))
+
+
+def _mirror(model: mujoco.MjModel, data: mujoco.MjData, offset: Floats) -> Mirror | None:
+    """Return the glass on the front of the first box that reflects, if there is one."""
+    for geom in np.flatnonzero((model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (model.geom_matid >= 0)):
+        if model.mat_reflectance[model.geom_matid[geom]] >= _REFLECTS:
+            depth, width, height = model.geom_size[geom].tolist()
+            x, y, z = (data.geom_xpos[geom] + offset + [depth, 0.0, 0.0]).tolist()
+            return Mirror((x, y, z), (1.0, 0.0, 0.0), (width, height))
+    return None
 
 
 def _color(model: mujoco.MjModel, geom: int) -> Floats:

@@ -1,4 +1,4 @@
-"""Meshes of simple shapes (quadrilaterals, boxes, bars, bodies of revolution, lofted skins), and objects made of them.
+"""Meshes of simple shapes (quadrilaterals, boxes, bars, bodies of revolution, lofted skins),.
 
 Faces are counter-clockwise as seen from outside. Creases have separate vertices on both sides, so a smooth mesh may
 have flat sides and sharp edges.
@@ -6,15 +6,13 @@ have flat sides and sharp edges.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
-from simharness.types.mirror import Mirror
-from simharness.world.scene.objects.geoms import Box, Cylinder, Geom, Surface
+from simharness.world.scene.objects.geoms import Box, Cylinder
 from simharness.world.scene.objects.solids import ObjectModel
 
 # Corners of each side of a Box in the order of its corners, counter-clockwise from outside: -x, +x, -y, +y, -z, +z.
@@ -46,12 +44,6 @@ def box_mesh(boxes: Sequence[Box], colors: ArrayLike) -> Mesh:
         colors = np.repeat(colors[:, None], 6, axis=1)
     vertices = np.concatenate([box.corners[_QUADS].reshape(-1, 3) for box in boxes])
     return quad_mesh(vertices, np.arange(len(vertices)).reshape(-1, 4), colors.reshape(-1, 3))
-
-
-def hexahedron(corners: ArrayLike, color: ArrayLike) -> Mesh:
-    """Return a mesh of six flat sides over eight corners (8, 3), in the order of the corners of a ``Box``."""
-    vertices = np.asarray(corners, float)[_QUADS].reshape(-1, 3)
-    return quad_mesh(vertices, np.arange(24).reshape(-1, 4), np.broadcast_to(np.asarray(color, float), (6, 3)))
 
 
 def bar_mesh(bar: Cylinder, color: ArrayLike, *, sides: int = 14) -> Mesh:
@@ -115,11 +107,6 @@ def loft(rings: ArrayLike, colors: ArrayLike, *, edges: Sequence[int] = ()) -> M
     return replace(mesh, faces=mesh.faces[kept], colors=mesh.colors[kept], smooth=True)
 
 
-def shifted(mesh: Mesh, offset: ArrayLike) -> Mesh:
-    """Return the mesh moved by ``offset`` (3,) metres."""
-    return replace(mesh, vertices=(mesh.vertices + np.asarray(offset, float)).astype(np.float32))
-
-
 def joined(*meshes: Mesh) -> Mesh:
     """Return one mesh of several, smooth if any is; none may have a texture."""
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
@@ -133,49 +120,6 @@ def joined(*meshes: Mesh) -> Mesh:
     )
 
 
-def surface(mesh: Mesh) -> Surface:
-    """Return the geom with exactly the triangles of a mesh."""
-    return Surface(mesh.vertices.astype(float), mesh.faces)
-
-
-class Assembly:
-    """Builder of an object model, which stands on z = 0 around the origin with its front towards +x."""
-
-    def __init__(self) -> None:
-        self._meshes: list[Mesh] = []
-        self._geoms: list[Geom] = []
-
-    def box(self, center: Sequence[float], size: Sequence[float], color: ArrayLike, *, yaw: float = 0.0) -> Self:
-        """Add a box of ``size`` x, y, z in metres; ``color`` (3,) of the box or (6, 3) of its six sides."""
-        x, y, z = (float(v) for v in center)
-        dx, dy, dz = (float(v) / 2 for v in size)
-        return self.boxes([Box((x, y, z), (dx, dy, dz), yaw)], np.asarray([color], float))
-
-    def boxes(self, boxes: Sequence[Box], colors: ArrayLike) -> Self:
-        """Add boxes; ``colors`` as for :func:`simharness.world.scene.objects.shapes.box_mesh`."""
-        self._meshes.append(box_mesh(boxes, colors))
-        self._geoms += boxes
-        return self
-
-    def bar(
-        self, start: Sequence[float], end: Sequence[float], radius: float, color: ArrayLike, sides: int = 10
-    ) -> Self:
-        """Add a round bar from one point to another, metres."""
-        a, b = np.asarray(start, float), np.asarray(end, float)
-        length = float(np.linalg.norm(b - a))
-        x, y, z = ((a + b) / 2).tolist()
-        i, j, k = ((b - a) / length).tolist()
-        bar = Cylinder((x, y, z), radius, length / 2, (i, j, k))
-        self._meshes.append(bar_mesh(bar, color, sides=sides))
-        self._geoms.append(bar)
-        return self
-
-    def mesh(self, mesh: Mesh) -> Self:
-        """Add a mesh."""
-        self._meshes.append(mesh)
-        self._geoms.append(surface(mesh))
-        return self
-
-    def model(self, *, figure: Floats | None = None, mirror: Mirror | None = None) -> ObjectModel:
-        """Return the object model of all parts."""
-        return ObjectModel(joined(*self._meshes), tuple(self._geoms), figure=figure, mirror=mirror)
+def box_model(boxes: Sequence[Box], colors: ArrayLike) -> ObjectModel:
+    """Return the object model of several boxes; ``colors`` as for :func:`box_mesh`."""
+    return ObjectModel(box_mesh(boxes, colors), tuple(boxes))

@@ -3,7 +3,7 @@
 A cart oscillates on a line or circulates on an ellipse, always clear of people.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,12 +13,11 @@ from mvpose.arrays import Floats
 from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.motion import Trajectory
-from simharness.world.scene.objects import laboratory
-from simharness.world.scene.objects.decoy_models import DECOY_MODELS
 from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.laboratory import draw_box, draw_shelf
+from simharness.world.scene.objects.mannequin import draw_mannequin
 from simharness.world.scene.objects.materials import draw_sheet
-from simharness.world.scene.objects.object_files import load_object, load_shipped, variants
-from simharness.world.scene.objects.plants import draw_plant
+from simharness.world.scene.objects.object_files import draw_shipped, load_object, load_shipped, load_whole, variants
 from simharness.world.scene.objects.solids import ObjectModel, Solid, yaw_of
 from simharness.world.scene.placement.free_space import (
     BODY_HALF_WIDTH,
@@ -56,25 +55,37 @@ class ClutterKind:
     """Name of one object."""
     plural: str
     """Key of the scenario."""
-    draw: Callable[[np.random.Generator, RoomSection], ObjectModel]
-    """Function that draws one object for a room."""
     sample_place: PlaceSampler
     """Function that draws a place for it."""
     fills: bool = True
     """Whether it may be added to reach ``clutter.coverage``."""
+    file: str = ""
+    """Name of the shipped object that it is; its own by default."""
+    stretch: float = 0.0
+    """Largest change of its width and depth, and of its height, as a share."""
+
+    def draw(self, rng: np.random.Generator, room: RoomSection) -> ObjectModel:
+        """Draw one object for a room; a pillar reaches the ceiling."""
+        if self.name in ("box", "shelf"):
+            return draw_box(rng) if self.name == "box" else draw_shelf(rng)
+        height = room.size[2] if self.name == "pillar" else None
+        return draw_shipped(rng, self.file or self.name, self.stretch, height=height)
 
 
 # In the order of placement: large objects first, because they need more space.
 CLUTTER_KINDS = (
-    ClutterKind("pillar", "pillars", lambda rng, room: laboratory.draw_pillar(rng, room.size[2]), near_people),
-    ClutterKind("shelf", "shelves", lambda rng, room: laboratory.draw_shelf(rng), towards_walls),
-    ClutterKind("rack", "racks", lambda rng, room: laboratory.draw_rack(rng), towards_walls, fills=False),
-    ClutterKind("partition", "partitions", lambda rng, room: laboratory.draw_partition(rng), towards_walls),
-    ClutterKind("table", "tables", lambda rng, room: laboratory.draw_table(rng), towards_walls, fills=False),
-    ClutterKind("box", "boxes", lambda rng, room: laboratory.draw_box(rng), near_people),
-    ClutterKind("plant", "plants", lambda rng, room: draw_plant(rng), near_people),
-    ClutterKind("chair", "chairs", lambda rng, room: laboratory.draw_chair(rng), near_people, fills=False),
+    ClutterKind("pillar", "pillars", near_people),
+    ClutterKind("shelf", "shelves", towards_walls),
+    ClutterKind("rack", "racks", towards_walls, fills=False, stretch=0.12),
+    ClutterKind("partition", "partitions", towards_walls, stretch=0.05),
+    ClutterKind("table", "tables", towards_walls, fills=False, file="laid_table", stretch=0.03),
+    ClutterKind("box", "boxes", near_people),
+    ClutterKind("plant", "plants", near_people, file="potted_plant", stretch=0.1),
+    ClutterKind("chair", "chairs", near_people, fills=False, stretch=0.05),
 )
+_CART_STRETCH = 0.08
+_DECOYS = {"posters": "poster", "mirrors": "mirror", "mannequins": "mannequin", "coat_stands": "coat stand"}
+"""Names of decoys, in the order of placement, by key of the scenario."""
 
 
 def place_clutter(seed: int, clutter: ClutterSection, space: FreeSpace) -> tuple[Solid, ...]:
@@ -147,7 +158,7 @@ def place_cart(seed: int, k: int, site: Site) -> Solid:
     Raises:
         ValueError: no path is free.
     """
-    cart = laboratory.draw_cart(stream(seed, "clutter", "cart", k))
+    cart = draw_shipped(stream(seed, "clutter", "cart", k), "cart", _CART_STRETCH)
     rng = stream(seed, "clutter", "cart", k, "way")
     space = site.space
     for _ in range(TRIES):
@@ -233,11 +244,11 @@ def place_decoys(seed: int, decoys: DecoysSection, space: FreeSpace) -> tuple[So
         ValueError: no place is found for a decoy.
     """
     site = Site(space)
-    for plural, (name, draw) in DECOY_MODELS.items():
+    for plural, name in _DECOYS.items():
         for k in range(getattr(decoys, plural)):
             rng = stream(seed, "decoys", name, k)
             on_wall = rng.uniform() < _ON_WALL_CHANCE and space.room.walls and plural in ("posters", "mirrors")
-            model = draw(rng, on_wall)
+            model = _decoy(rng, name, on_wall)
             place_rng = stream(seed, "decoys", name, k, "place")
             sample_place = _at_wall if on_wall else near_people
             solid = site.find(place_rng, model, sample_place, kind="decoy", name=f"{name}{k}", at_wall=on_wall)
@@ -249,6 +260,14 @@ def place_decoys(seed: int, decoys: DecoysSection, space: FreeSpace) -> tuple[So
                 )
             site.add(solid)
     return tuple(site.solids[len(space.taken) :])
+
+
+def _decoy(rng: np.random.Generator, name: str, on_wall: bool) -> ObjectModel:
+    """Draw a decoy, as it hangs on a wall or as it stands."""
+    if name == "mannequin":
+        return draw_mannequin(rng)
+    files = variants(f"{'wall_' * on_wall}{name.replace(' ', '_')}")
+    return load_whole(files[rng.integers(len(files))]).model()
 
 
 def _at_wall(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:

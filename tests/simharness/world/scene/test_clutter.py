@@ -7,13 +7,15 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build
-from simharness.world.scene.objects.laboratory import draw_box, draw_cart, draw_shelf
+from simharness.world.scene.objects.laboratory import draw_box, draw_shelf
+from simharness.world.scene.objects.object_files import draw_shipped
 from simharness.world.scene.placement.clutter import CLUTTER_KINDS, place_clutter
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, LENS, LIMB
 from simharness.world.scene.placement.sight_lines import PictureFill, intersects
 
 ROOM = RoomSection()
-DRAW = {kind.name: lambda rng, draw=kind.draw: draw(rng, ROOM) for kind in CLUTTER_KINDS} | {"cart": draw_cart}
+DRAW = {kind.name: lambda rng, draw=kind.draw: draw(rng, ROOM) for kind in CLUTTER_KINDS}
+DRAW["cart"] = lambda rng: draw_shipped(rng, "cart", 0.08)
 EVERYTHING = ClutterSection(boxes=2, shelves=1, racks=1, tables=1, chairs=2, pillars=1, partitions=1, plants=2, carts=1)
 
 

@@ -20,7 +20,8 @@ from simharness.world.motion.paths import make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.scene.dynamics.inverse_dynamics import InverseDynamics
 from simharness.world.scene.dynamics.motion_servos import LEVER, MotionServos, Push, planned_push, track
-from simharness.world.scene.objects.shapes import Assembly
+from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.shapes import box_model
 
 GRAVITY = 9.81
 MAN = Kinematics(make_body(Shape(gender=0.1, height=0.42)))
@@ -235,7 +236,7 @@ def block(kind, *, moving=True):
     pose = np.zeros((len(time), 7))
     pose[:, 3] = 1.0
     pose[:, 0] = np.minimum(time, 1.2) - 0.8 if moving else -0.5
-    thing = Assembly().box((0.0, 0.0, 0.95), (0.4, 0.4, 0.4), (0.5, 0.5, 0.5)).model()
+    thing = box_model([Box((0.0, 0.0, 0.95), (0.2, 0.2, 0.2))], [(0.5, 0.5, 0.5)])
     return thing.along(Trajectory(time, pose), kind=kind, name="block")
 
 

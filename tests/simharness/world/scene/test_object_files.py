@@ -1,5 +1,7 @@
 """Objects from files, MJCF and OBJ: what they show and stop, where they stand, messages, identity; those shipped."""
 
+from typing import get_args
+
 import cv2
 import mujoco
 import numpy as np
@@ -10,9 +12,18 @@ from mvpose.skeleton import COCO17
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.identity import trial_identity
+from simharness.world.motion.motion import PropKind
 from simharness.world.scene.objects.materials import draw_sheet
-from simharness.world.scene.objects.object_files import ASSETS, load_object, load_shipped, object_dependencies, variants
-from simharness.world.scene.placement.clutter import place_clutter
+from simharness.world.scene.objects.object_files import (
+    ASSETS,
+    load_object,
+    load_shipped,
+    load_whole,
+    object_dependencies,
+    variants,
+)
+from simharness.world.scene.placement.clutter import CLUTTER_KINDS, place_clutter
+from simharness.world.scene.placement.sight_lines import intersects
 from simharness.world.scene.rooms.kinds import room_kinds
 
 STOOL = """
@@ -235,19 +246,52 @@ def test_rooms_name_objects_that_ship():
     names = {name for kind in room_kinds().values() for name in kind.furniture}
     assert all(variants(name)[0].is_file() for name in names)
     files = {file.name.partition(".")[0] for file in ASSETS.glob("*.xml")}
-    assert files - names == {"far_tree", "far_shrub"}
+    decoys = {"poster", "wall_poster", "mirror", "wall_mirror", "coat_stand"}
+    props = set(get_args(PropKind)) - {"box"}
+    clutter = {kind.file or kind.name for kind in CLUTTER_KINDS} - {"box", "shelf"} | {"cart"}
+    assert files == names | {"far_tree", "far_shrub"} | decoys | props | clutter
+
+
+@pytest.mark.parametrize("name", ["chair", "potted_plant", "laid_table", "cart"])
+def test_a_stretched_object_is_as_large_as_its_scale_says(name):
+    """Mesh and geoms are stretched alike: the seat of a chair with its depth, width and height."""
+    file, scale = load_whole(variants(name)[0]), np.array([1.1, 0.8, 1.3])
+    model = file.stretched(scale)
+    np.testing.assert_allclose(model.extent.half, file.model().extent.half * scale, rtol=1e-5)
+    solid = model.at((0.0, 0.0), 0.0, kind="clutter", name=name)
+    middle, half = np.array(solid.hull.center), np.array(solid.hull.half)
+    start = middle + [2.0, 1.0, 1.5]
+    ends = start + 2 * (middle + np.random.default_rng(0).uniform(-1, 1, (200, 3)) * half - start)
+    met = np.isfinite(Rays([solid]).distance(start, ends))
+    assert met.any()
+    assert (met == intersects(solid.mesh, np.tile(start, (200, 1)), ends)).mean() > 0.97
+
+
+MIRROR = """<mujoco><asset><material name="glass" reflectance="0.8"/></asset><worldbody>
+<geom type="box" size="0.02 0.4 0.8" pos="0.3 0 0.9" material="glass"/></worldbody></mujoco>"""
+
+
+def test_a_box_that_reflects_is_a_mirror(write):
+    glass = load_object(write("mirror.xml", MIRROR)).model().mirror
+    np.testing.assert_allclose(glass.center, (0.02, 0.0, 0.8), atol=1e-9)
+    assert (glass.normal, glass.half) == ((1.0, 0.0, 0.0), (0.4, 0.8))
+    assert load_object(write("dull.xml", MIRROR.replace('0.8"/>', '0.3"/>', 1))).model().mirror is None
 
 
 @pytest.mark.parametrize("file", sorted(ASSETS.glob("*.xml")), ids=lambda file: file.stem)
 def test_a_shipped_object_opens_in_mujoco_and_stands_on_the_floor(file):
     model = mujoco.MjModel.from_xml_path(str(file))
-    object_, sheet = load_shipped(file), draw_sheet(0)
-    mesh = object_.mesh(sheet)
+    object_, sheet = load_shipped(file), None if file.stem.split(".")[0] in ("poster", "wall_poster") else draw_sheet(0)
+    mesh = load_whole(file).mesh() if sheet is None else object_.mesh(sheet)
     assert len(object_.parts) == model.ngeom
-    assert mesh.texture is sheet.texture
-    assert mesh.vertices[:, 2].min() == pytest.approx(0.0, abs=1e-6)
+    assert sheet is None or mesh.texture is sheet.texture
+    if file.stem.startswith("wall_") and not file.stem.startswith("wall_bars"):  # it hangs on the plane x = 0
+        assert 0.0 <= mesh.vertices[:, 0].min() < 0.01
+        assert 0.05 < mesh.vertices[:, 2].min() < 0.15
+    else:
+        assert mesh.vertices[:, 2].min() == pytest.approx(0.0, abs=1e-6)
     assert abs(object_.offset[2]) < 0.02
-    assert 0.3 < np.ptp(mesh.vertices, axis=0).max() < 8.0
+    assert 0.2 < np.ptp(mesh.vertices, axis=0).max() < 8.0
     assert mesh.uv.min() >= 0.0
     assert mesh.uv.max() <= 1.0
 

@@ -6,7 +6,7 @@ from walkers import ring
 
 from simharness.world.motion.motion import Trajectory
 from simharness.world.scene.objects.geoms import Box
-from simharness.world.scene.objects.shapes import Assembly, box_mesh
+from simharness.world.scene.objects.shapes import box_mesh, box_model
 from simharness.world.scene.placement.sight_lines import PictureFill, SightLines, intersects, lines_of_sight
 
 numbers = st.floats(-2, 2)
@@ -32,7 +32,7 @@ def test_no_lines_and_no_faces():
 
 
 def test_a_moving_solid_cuts_lines_at_its_position_in_time():
-    model = Assembly().box((0, 0, 0.5), (0.4, 0.2, 1.0), (0.5, 0.5, 0.5)).model()
+    model = box_model([Box((0, 0, 0.5), (0.2, 0.1, 0.5))], [(0.5, 0.5, 0.5)])
     turned = np.sqrt(0.5)
     poses = np.array([[0.0, 0, 0, 1, 0, 0, 0], [2.0, 0, 0, turned, 0, 0, turned]])
     solid = model.along(Trajectory(np.array([0.0, 1.0]), poses), kind="clutter", name="it")
@@ -52,12 +52,8 @@ def test_lines_of_sight_end_at_joints_in_the_pictures():
 
 def test_a_wall_in_front_of_a_camera_fills_its_picture():
     rig = ring(4)
-    wall = (
-        Assembly()
-        .box((2.9, 0, 2.0), (0.02, 1.4, 4.0), (0.5, 0.5, 0.5))
-        .model()
-        .at((0, 0), 0.0, kind="clutter", name="w")
-    )
+    plate = box_model([Box((2.9, 0, 2.0), (0.01, 0.7, 2.0))], [(0.5, 0.5, 0.5)])
+    wall = plate.at((0, 0), 0.0, kind="clutter", name="w")
     pictures = PictureFill(rig)
     assert not pictures.allows(wall, 0.6)
     pictures.add(wall)
@@ -70,9 +66,8 @@ def test_a_wall_in_front_of_a_camera_fills_its_picture():
 def test_the_share_of_a_picture_is_that_of_its_area():
     """A square board in front of a pinhole camera: its share follows from its side and distance."""
     rig = ring(2, height=0.9)
-    board = (
-        Assembly().box((2.5, 0, 0.9), (0.001, 0.8, 0.6), (0.5,) * 3).model().at((0, 0), 0.0, kind="clutter", name="b")
-    )
+    plate = box_model([Box((2.5, 0, 0.9), (0.0005, 0.4, 0.3))], [(0.5, 0.5, 0.5)])
+    board = plate.at((0, 0), 0.0, kind="clutter", name="b")
     pictures = PictureFill(rig)
     pictures.add(board)
     expected = (0.8 * 520) * (0.6 * 520) / (800 * 600)

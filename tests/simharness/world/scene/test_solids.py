@@ -9,7 +9,8 @@ from simharness.types.mirror import Mirror
 from simharness.types.random_streams import stream
 from simharness.world.motion.motion import Trajectory
 from simharness.world.scene.objects.geoms import Box, Cylinder, Surface, carried
-from simharness.world.scene.objects.shapes import TOP, Assembly, bar_mesh, box_mesh, hexahedron, joined, lathe, shifted
+from simharness.world.scene.objects.shapes import TOP, bar_mesh, box_mesh, box_model, joined, lathe
+from simharness.world.scene.objects.solids import ObjectModel
 from simharness.world.scene.placement.sight_lines import intersects
 
 numbers = st.floats(-3, 3)
@@ -54,8 +55,7 @@ def test_a_lathe_gives_prisms(sides, squash):
 
 def test_meshes_from_corners_and_joined_meshes():
     box = Box((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), 0.7)
-    assert signed_volume(hexahedron(box.corners, (0.5, 0.5, 0.5))) == pytest.approx(0.96, rel=1e-5)
-    both = joined(box_mesh([box], np.ones((1, 3))), shifted(hexahedron(box.corners, (0.2, 0.4, 0.6)), (5, 0, 0)))
+    both = joined(box_mesh([box], np.ones((1, 3))), box_mesh([box.moved((5, 0), 0.0)], [(0.2, 0.4, 0.6)]))
     assert signed_volume(both) == pytest.approx(2 * 0.96, rel=1e-4)
     np.testing.assert_allclose(both.colors[-1], (0.2, 0.4, 0.6))
 
@@ -77,9 +77,11 @@ def test_a_bar_mesh_matches_its_geom(yaw, tilt, way):
 
 @pytest.mark.parametrize("end", [(0.4, 0.0, 0.9), (0.5, 0.6, 0.3), (0.0, -0.7, 0.3), (0.1, 0.1, 1.2)])
 def test_rays_hit_a_tilted_bar_at_its_mesh(end):
-    solid = (
-        Assembly().bar((0, 0, 0.3), end, 0.08, (0.5,) * 3, sides=48).model().at((1, 2), 0.7, kind="prop", name="bar")
-    )
+    way = np.array(end) - (0, 0, 0.3)
+    length = np.linalg.norm(way)
+    bar = Cylinder(tuple((way / 2 + (0, 0, 0.3)).tolist()), 0.08, length / 2, tuple((way / length).tolist()))
+    mesh = bar_mesh(bar, (0.5,) * 3, sides=48)
+    solid = ObjectModel(mesh, (bar,)).at((1, 2), 0.7, kind="prop", name="bar")
     rng, middle = np.random.default_rng(0), np.array(solid.hull.center)
     start = middle + [2.0, -1.5, 1.0]
     ends = start + 2 * (middle + rng.uniform(-1, 1, (500, 3)) * solid.hull.half - start)
@@ -122,19 +124,17 @@ def test_moved_rotates_about_the_vertical_and_translates():
     )
 
 
-def assembly():
-    return (
-        Assembly()
-        .box((0, 0, 0.1), (0.6, 0.4, 0.2), (0.5, 0.5, 0.5))
-        .bar((0, 0, 0.2), (0, 0.1, 1.0), 0.05, (0.5, 0.5, 0.5))
-        .mesh(shifted(lathe([(0, 0), (0.2, 0.1), (0, 0.3)], (0.5, 0.5, 0.5)), (0, 0.1, 1.0)))
-    )
+def assembly(**decoy):
+    box, bar = Box((0, 0, 0.1), (0.3, 0.2, 0.1)), Cylinder((0, 0.05, 0.6), 0.05, 0.4)
+    cone = lathe([(0, 1.0), (0.2, 1.1), (0, 1.3)], (0.5, 0.5, 0.5))
+    mesh = joined(box_mesh([box], [(0.5, 0.5, 0.5)]), bar_mesh(bar, (0.5, 0.5, 0.5)), cone)
+    return ObjectModel(mesh, (box, bar, Surface(cone.vertices.astype(float), cone.faces)), **decoy)
 
 
 @given(x=numbers, y=numbers, yaw=st.floats(-7, 7))
 def test_all_parts_of_a_model_are_placed(x, y, yaw):
     figure, glass = np.full((17, 3), 0.7), Mirror((0.3, 0.1, 0.5), (1.0, 0.0, 0.0), (0.2, 0.4))
-    loose = assembly().model(figure=figure, mirror=glass)
+    loose = assembly(figure=figure, mirror=glass)
     placed = loose.at((x, y), yaw, kind="decoy", name="it")
     expected = carried(loose.mesh.vertices, (x, y), yaw)
     np.testing.assert_allclose(placed.mesh.vertices, expected, atol=1e-5)
@@ -148,9 +148,10 @@ def test_all_parts_of_a_model_are_placed(x, y, yaw):
 
 def test_names_of_geoms():
     spec = mujoco.MjSpec()
-    single = Assembly().box((0, 0, 0.5), (1, 1, 1), (0.5, 0.5, 0.5)).model().at((3, 0), 0.0, kind="room", name="floor")
-    several = assembly().model().at((0, 0), 0.0, kind="clutter", name="box0")
-    moving = assembly().model().along(Trajectory(np.zeros(1), np.eye(7)[[3]]), kind="prop", name="cart0")
+    slab = box_model([Box((0, 0, 0.5), (0.5, 0.5, 0.5))], [(0.5, 0.5, 0.5)])
+    single = slab.at((3, 0), 0.0, kind="room", name="floor")
+    several = assembly().at((0, 0), 0.0, kind="clutter", name="box0")
+    moving = assembly().along(Trajectory(np.zeros(1), np.eye(7)[[3]]), kind="prop", name="cart0")
     for solid in (single, several, moving):
         solid.add_to(spec)
     model = spec.compile()
@@ -171,7 +172,7 @@ def test_a_moving_solid_follows_its_trajectory():
     for k in range(21):
         mujoco.mju_mulQuat(quat[k], yawed[k], tilted[k])
     pose = np.column_stack([time, -0.5 * time, 0.3 * time, quat])
-    solid = assembly().model().along(Trajectory(time, pose), kind="prop", name="it")
+    solid = assembly().along(Trajectory(time, pose), kind="prop", name="it")
     rays = Rays([solid])
     for moment in (0.0, 0.7, 1.9):
         rays.put(moment)

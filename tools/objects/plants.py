@@ -4,8 +4,8 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
-from simharness.world.scene.objects.shapes import Assembly, joined, lathe, quad_mesh
-from simharness.world.scene.objects.solids import ObjectModel
+from simharness.world.scene.objects.shapes import joined, lathe, quad_mesh
+from tools.objects.builder import ObjectBuilder
 
 _POTS = np.array([[0.72, 0.42, 0.30], [0.90, 0.89, 0.86], [0.28, 0.30, 0.33], [0.52, 0.60, 0.62], [0.80, 0.70, 0.56]])
 _SOIL = np.array([0.24, 0.18, 0.14])
@@ -14,13 +14,13 @@ _GREENS = np.array([[0.22, 0.44, 0.22], [0.30, 0.50, 0.26], [0.18, 0.38, 0.27], 
 _GOLDEN = np.pi * (3 - 5**0.5)  # golden angle between successive leaves around a stem
 
 
-def draw_plant(rng: np.random.Generator) -> ObjectModel:
+def plant(f: ObjectBuilder, rng: np.random.Generator) -> None:
     """Draw a potted plant 1 to 1.8 m tall."""
     kind = rng.integers(3)
     pot = rng.uniform(0.15, 0.20), rng.uniform(0.28, 0.40)
     color, green = _POTS[rng.integers(len(_POTS))], _GREENS[rng.integers(len(_GREENS))]
     grow = (_broad_leaves, _fronds, _blades)[kind]
-    return Assembly().mesh(_pot(*pot, color)).mesh(grow(rng, pot[1] - 0.03, green)).model()
+    f.part(joined(_pot(*pot, color), grow(rng, pot[1] - 0.03, green)))
 
 
 def _pot(radius: float, height: float, color: Floats) -> Mesh:
