@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from simharness.api import Blame, TrialResult, assert_robust, blame, load_scenario, run_trial, score, simulate
     from simharness.scenario.sections.scenario import Scenario
+    from simharness.trial.foreign_program import ForeignProgram
     from simharness.types.recording import Recording
     from simharness.types.sequence import Sequence
     from simharness.types.truth import KeypointError, Truth
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "Blame": "simharness.api",
+    "ForeignProgram": "simharness.trial.foreign_program",
     "KeypointError": "simharness.types.truth",
     "Recording": "simharness.types.recording",
     "Scenario": "simharness.scenario.sections.scenario",
@@ -31,6 +33,7 @@ _MODULES = {
 
 __all__ = [
     "Blame",
+    "ForeignProgram",
     "KeypointError",
     "Recording",
     "Scenario",

@@ -8,6 +8,10 @@ class RunError(RuntimeError):
     """Failure of a run whose input was found good: a bug, a lack of memory, a dead worker."""
 
 
+class MethodError(RunError):
+    """Failure of a method that a user brings: the message names its place, so that commands print no traceback."""
+
+
 @contextlib.contextmanager
 def failing(step: str = "") -> Iterator[None]:
     """Turn the errors of a step that works on good input into a RunError.
@@ -43,4 +47,4 @@ def naming_frame(frame: int) -> Iterator[None]:
     try:
         yield
     except RunError as error:
-        raise RunError(f"frame {frame}: {error}") from error
+        raise type(error)(f"frame {frame}: {error}") from error

@@ -16,7 +16,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
-from mvpose.commands.errors import RunError
+from mvpose.commands.errors import MethodError, RunError
 from mvpose.files.message_text import one_line
 
 FOUND = 1
@@ -40,8 +40,8 @@ class Program:
     version: Callable[[], str]
     """Function that returns the version; "" for none."""
     tracebacks: bool = False
-    """Whether every failure prints its traceback; else only where the environment variable ``NAME_TRACEBACK`` is set,
-    which prints those of bad input as well."""
+    """Whether failures print their tracebacks, but for those of users' methods. Where the environment variable
+    ``NAME_TRACEBACK`` is set, all errors do, those of bad input as well."""
     left: str = ""
     """What a failure of most commands leaves on disk, for its message."""
 
@@ -104,7 +104,8 @@ class Program:
             self._end("failed", f"{kind}{error}", FAILED, self.left if left is None else left)
 
     def _end(self, kind: str, message: str, code: int, left: str = "") -> None:
-        if os.environ.get(f"{self.name.upper()}_TRACEBACK") or (self.tracebacks and code == FAILED):
+        internal = self.tracebacks and code == FAILED and not isinstance(sys.exception(), MethodError)
+        if internal or os.environ.get(f"{self.name.upper()}_TRACEBACK"):
             traceback.print_exc()
         shown = Text.assemble((f"{kind}: ", "bold red"), one_line(message), f"; {left}" if left else "")
         Console(stderr=True).print(shown, soft_wrap=True)

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from mvpose import Detections, Estimate, Rig
-from mvpose.commands.errors import RunError, naming_frame
+from mvpose.commands.errors import MethodError, RunError, naming_frame
 from mvpose.commands.progress import Stages
 from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.presets import PRESETS, READ_HEATMAPS, without_repair
@@ -70,7 +70,7 @@ class EstimateFrames:
         """Refuse a variant that has changed the cameras, or detections of frames whose digests are given."""
         changed = [frame for frame, digest in given.items() if self._digest(frame) != digest]
         if changed:
-            raise RunError(
+            raise MethodError(
                 f"frame {changed[0]}: {name} has changed the cameras or the detections that it was given, which all "
                 "variants share: nothing after it can be trusted. Let it work on copies"
             )
@@ -142,7 +142,7 @@ def track_frames(estimator: SequenceEstimator, rig: Rig, frames: Iterable[Detect
     feed.finish(online)
     count = feed.count + sum(1 for _ in feed)
     if len(estimates) != count:
-        raise RunError(
+        raise MethodError(
             f"frame {min(len(estimates), count)}: track yielded {len(estimates)} estimates for {count} frames, "
             "expected one for each frame, in order"
         )

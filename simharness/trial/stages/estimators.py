@@ -41,7 +41,7 @@ from mvpose import Detections, Estimate, Rig, preset
 from mvpose.affinity import AppearanceAffinity
 from mvpose.arrays import Floats
 from mvpose.checks import as_array
-from mvpose.commands.errors import RunError
+from mvpose.commands.errors import MethodError, RunError
 from mvpose.detections import MOST_DETECTIONS
 from mvpose.estimators import Estimator
 from mvpose.files.message_text import prefixed
@@ -106,7 +106,7 @@ class UserEstimator:
         """Estimate the people of one frame.
 
         Raises:
-            RunError: the estimator raised an error, or returned no valid estimate of these detections.
+            MethodError: the estimator raised an error, or returned no valid estimate of these detections.
         """
         estimator = self.loaded
         rig, detections = own_rig(self.name, rig), copy.deepcopy(detections)
@@ -119,11 +119,12 @@ class UserEstimator:
         try:
             _check(estimate, len(detections), detections.skeleton)
         except ValueError as error:
-            raise RunError(f"{self.name} ({self.place}): {error}") from None
+            raise MethodError(f"{self.name} ({self.place}): {error}") from None
         return replace(estimate, timings={**estimate.timings, "total": seconds})
 
-    def _failure(self, error: Exception) -> RunError:
-        return RunError(f"{self.name} ({self.place}): {_describe_error(error, _file_of(self.loaded))}")
+    def _failure(self, error: Exception) -> MethodError:
+        message = str(error) if isinstance(error, MethodError) else _describe_error(error, _file_of(self.loaded))
+        return MethodError(f"{self.name} ({self.place}): {message}")
 
 
 @dataclass(frozen=True)
@@ -141,8 +142,8 @@ class UserTracker(UserEstimator):
         """Yield the estimate of every frame, in order, and check it.
 
         Raises:
-            RunError: the estimator raised an error, yielded an estimate before it took the frame, or yielded no valid
-                estimate of the frame's detections; the message names the frame.
+            MethodError: the estimator raised an error, yielded an estimate before it took the frame, or yielded no
+                valid estimate of the frame's detections; the message names the frame.
         """
         estimator: Any = self.loaded
         waiting: deque[tuple[int, Skeleton]] = deque()  # detections and skeleton of each frame without an estimate yet
@@ -163,17 +164,17 @@ class UserTracker(UserEstimator):
                         raise ValueError(f"track yielded {passed + 1} estimates after it took {taken} frames")
                     _check(estimate, *waiting.popleft(), method="track")
                 except ValueError as error:
-                    raise RunError(f"frame {passed}: {self.name} ({self.place}): {error}") from None
+                    raise MethodError(f"frame {passed}: {self.name} ({self.place}): {error}") from None
                 yield estimate
                 passed += 1
         except RunError:
             raise
         except Exception as error:
-            raise RunError(f"frame {max(taken - 1, 0)}: {self._failure(error)}") from error
+            raise MethodError(f"frame {max(taken - 1, 0)}: {self._failure(error)}") from error
         for _ in given:  # frames that it did not take
             pass
         if waiting:
-            raise RunError(
+            raise MethodError(
                 f"frame {passed}: {self.name} ({self.place}): track yielded {passed} estimates for {taken} frames, "
                 "expected one for each frame, in order"
             )

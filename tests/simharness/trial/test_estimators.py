@@ -463,7 +463,7 @@ def test_a_foreign_program_is_stressed_like_any_preset(tmp_path, monkeypatch):
     Path("methods").mkdir()
     for file in WRAPPED.parent.glob("*.py"):
         Path("methods", file.name).write_bytes(file.read_bytes())
-    lines = 'seeds = 2\nvariants = ["full", "foreign"]\n[method.estimators]\nforeign = "methods/wrapped.py:Foreign"'
+    lines = 'seeds = 2\nvariants = ["full", "foreign"]\n[method.estimators]\nforeign = "methods/wrapped.py:foreign"'
     Path("custom.toml").write_text(f"{SCENE}{lines}\n")
     results = run_study(load_study("custom.toml"), out=Path("studies"), workers=2)
     assert results.info["failed"] == []
@@ -478,18 +478,18 @@ def test_a_foreign_program_is_stressed_like_any_preset(tmp_path, monkeypatch):
     assert "foreign" in page
     assert "simharness render" not in html.unescape(page)  # without a failure there are no worst frames
     shown = _command(load_study("custom.toml"), results.scenario_of(results.trials["trial"][0]))  # a trial again
-    assert """--set 'method.estimators.foreign="methods/wrapped.py:Foreign"' """ in shown
+    assert """--set 'method.estimators.foreign="methods/wrapped.py:foreign"' """ in shown
     write_digest(results, Path("kept"))
     assert "| foreign | " in Path("kept/table.md").read_text()
     again = replay(results.scenario_of(results.trials["trial"][0]), "foreign")
     assert all(len(estimate) == 2 for estimate in again.estimates)
     Path("methods/program.py").write_text("import sys\nsys.exit('out of order')\n")
-    with pytest.raises(RunError, match=r"foreign \(methods/wrapped\.py:Foreign\): RuntimeError: .*out of order"):
+    with pytest.raises(RunError, match=r"foreign \(methods/wrapped\.py:foreign\): the program .* 1; .*out of order"):
         measure(load("custom.toml", overrides=["seeds=1"]), ["foreign"])
 
 
 def test_the_example_needs_no_simulator():
-    estimator = load_estimator(f"{WRAPPED}:Foreign")
+    estimator = load_estimator(f"{WRAPPED}:foreign")
     estimate = estimator.estimate(RIG, SEEN)
     assert len(estimate) == 2
     for label in range(2):
