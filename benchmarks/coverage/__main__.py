@@ -13,10 +13,10 @@ def main() -> None:
     parser.add_argument("--repetitions", type=int, default=1000, metavar="N", help="samples of each population")
     repetitions = parser.parse_args().repetitions
     for title, table in (
-        ("Coverage of 95 % intervals of means, percent, by number of scenes", means),
+        ("95 % intervals of means: coverage in percent, width in that of Student's, by number of scenes", means),
         ("Rejected means of zero at level 5 %, one-sided, percent, by number of scenes", differences),
         ("Rejected equal rates at level 5 %, one-sided, percent, by number of scenes", counts),
-        ("Breaking point at 8.3: mean, median, coverage in percent, by number of scenes", breaking_points),
+        ("Breaking points: median, coverage in percent, width of intervals, by number of scenes", breaking_points),
     ):
         print(f"\n{title}\n\n{table(repetitions)}", flush=True)
 

@@ -27,29 +27,28 @@ class ScorePopulation:
 
 @dataclass(frozen=True)
 class Curve:
-    """Scores on a plateau up to 8 that pass 90 at 8.3.
+    """Scores on a plateau that fall from a value of the factor on, and pass 90 at a later one.
 
     Attributes:
         plateau: mean on the plateau.
         offset: deviation that all values of a scene share.
         noise: deviation of each value of a scene.
+        values: tested values of the factor.
+        falls, breaks: values of the factor where the plateau ends, and where the mean passes the threshold.
     """
 
     plateau: float
     offset: float
     noise: float
-    threshold: float = 90.0
+    values: tuple[float, ...] = tuple(map(float, range(1, 13)))
+    falls: float = 8.0
     breaks: float = 8.3
-
-    @property
-    def values(self) -> list[float]:
-        """Tested values of the factor."""
-        return [float(value) for value in range(1, 13)]
+    threshold: float = 90.0
 
     def draw(self, rng: np.random.Generator, scenes: int) -> Floats:
         """Return scores (scenes, k)."""
-        slope = (self.plateau - self.threshold) / (self.breaks - 8)
-        mean = self.plateau - np.maximum(np.array(self.values) - 8, 0) * slope
+        slope = (self.plateau - self.threshold) / (self.breaks - self.falls)
+        mean = self.plateau - np.maximum(np.array(self.values) - self.falls, 0) * slope
         return mean + rng.normal(0, self.offset, (scenes, 1)) + rng.normal(0, self.noise, (scenes, len(mean)))
 
 
@@ -74,6 +73,21 @@ def _recall(rate: float, loss: float) -> ScorePopulation:
     return ScorePopulation("%", 100 - rate * loss, draw)
 
 
+def _collapses(rate: float, low: float, high: float, *, seen: bool = False) -> ScorePopulation:
+    """Describe PCP of 97 to 100, of which a share ``rate`` of scenes falls to ``low`` to ``high``.
+
+    With ``seen`` a sample without such a scene is drawn again.
+    """
+
+    def draw(rng: np.random.Generator, shape: Shape) -> Floats:
+        fallen = rng.random(shape) < rate
+        while seen and not (found := fallen.any(axis=1)).all():
+            fallen[~found] = rng.random((int((~found).sum()), shape[1])) < rate
+        return np.where(fallen, rng.uniform(low, high, shape), rng.uniform(97, 100, shape))
+
+    return ScorePopulation("%", rate * (low + high) / 2 + (1 - rate) * 98.5, draw)
+
+
 MEANS: Mapping[str, ScorePopulation] = {
     "ghosts, 0.08 a scene for 10 frames": _ghosts(0.08, 10),
     "ghosts, 0.3 a scene for 5 frames": _ghosts(0.3, 5),
@@ -85,6 +99,10 @@ MEANS: Mapping[str, ScorePopulation] = {
     "recall, one scene of ten loses 5": _recall(0.1, 5),
     "recall, three scenes of ten lose 5": _recall(0.3, 5),
     "PCP, all scenes lose 2": _recall(1.0, 2),
+    "PCP, one scene of ten falls to 40 to 80": _collapses(0.1, 40, 80),
+    "the same, samples with such a scene": _collapses(0.1, 40, 80, seen=True),
+    "PCP, one scene of five falls to 75 to 85": _collapses(0.2, 75, 85),
+    "PCP, half of the scenes fall to 75 to 85": _collapses(0.5, 75, 85),
     "PCP of 60": ScorePopulation("%", 60.0, lambda rng, shape: 100 * rng.beta(3, 2, shape)),
     "errors, log-normal, sigma 0.5": ScorePopulation(
         "mm", math.exp(0.125), lambda rng, shape: rng.lognormal(0, 0.5, shape)
@@ -124,5 +142,7 @@ CURVES: Mapping[str, Curve] = {
     "plateau 91, noise 6": Curve(91, 0, 6),
     "plateau 92, scenes 3, noise 3": Curve(92, 3, 3),
     "plateau 95, scenes 5, noise 5": Curve(95, 5, 5),
+    "knee between 4 and 8": Curve(97, 4, 4, (0.0, 2.0, 4.0, 8.0), 5.5, 6.0),
+    "the same, three values added": Curve(97, 4, 4, (0.0, 2.0, 4.0, 5.0, 6.0, 7.0, 8.0), 5.5, 6.0),
 }
 """Curves by name."""

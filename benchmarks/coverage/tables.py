@@ -5,27 +5,31 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from scipy.special import stdtrit
 
 from benchmarks.coverage.populations import CHANGES, CURVES, EVENTS, MEANS
 from simharness.statistics.breaking_points import BreakingPoint, breaking_point
 from simharness.statistics.intervals import mean_interval
 from simharness.statistics.paired_tests import paired, paired_counts
 
-SCENES = (5, 12, 20, 40)
+SCENES = (5, 10, 20, 40)
 """Numbers of scenes of a sample."""
 
 _LEVEL = 0.05
 
 
 def means(repetitions: int) -> str:
-    """Return how often intervals hold the mean of scores, percent."""
+    """Return how often intervals hold the mean of scores, percent, and their median width relative to Student's."""
     rows = []
     for name, score in MEANS.items():
         cells = []
         for scenes in SCENES:
             samples = score.draw(np.random.default_rng(scenes), (repetitions, scenes))
             intervals = [mean_interval(each, unit=score.unit) for each in samples]
-            cells.append(_percent(each.low <= score.mean <= each.high for each in intervals))
+            student = 2 * stdtrit(scenes - 1, 0.975) * samples.std(axis=1, ddof=1) / np.sqrt(scenes)
+            wider = np.array([each.high - each.low for each in intervals])[student > 0] / student[student > 0]
+            held = _percent(each.low <= score.mean <= each.high for each in intervals)
+            cells.append(f"{held}, {np.median(wider):.2f}")
         rows.append((name, score.unit, *cells))
     return _table(("score", "unit", *map(str, SCENES)), rows)
 
@@ -58,7 +62,7 @@ def counts(repetitions: int) -> str:
 
 
 def breaking_points(repetitions: int) -> str:
-    """Return mean and median of breaking points whose truth is 8.3, and how often their intervals hold it."""
+    """Return the true breaking point, the median of those found, how often intervals hold it, and their width."""
     rows = []
     for name, curve in CURVES.items():
         cells = []
@@ -73,9 +77,10 @@ def breaking_points(repetitions: int) -> str:
                 (each.low is None or each.low <= curve.breaks) and (each.high is None or each.high >= curve.breaks)
                 for each in points
             )
-            cells.append(f"{np.mean(found):.1f}, {np.median(found):.1f}, {held}")
-        rows.append((name, *cells))
-    return _table(("curve", *map(str, SCENES)), rows)
+            wide = [(curve.values[-1] if x.high is None else x.high) - (x.low or curve.values[0]) for x in points]
+            cells.append(f"{np.median(found):.1f}, {held}, {np.median(wide):.1f}")
+        rows.append((name, str(curve.breaks), *cells))
+    return _table(("curve", "breaks at", *map(str, SCENES)), rows)
 
 
 def _value(point: BreakingPoint, values: Sequence[float]) -> float:

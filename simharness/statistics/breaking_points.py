@@ -10,9 +10,6 @@ from scipy.optimize import isotonic_regression
 from mvpose.arrays import Floats
 from simharness.statistics.studentized import mean_ends
 
-_STEPS = 64
-"""Number of values between two tested ones at which the mean is tested against the threshold."""
-
 
 @dataclass(frozen=True)
 class BreakingPoint:
@@ -20,8 +17,8 @@ class BreakingPoint:
 
     Attributes:
         value: value of the factor; None without a crossing (see ``why``).
-        low, high: ends of its 95 % interval; None where an end lies outside the tested values, or with a single scene
-            for each value.
+        low, high: ends of its 95 % interval, tested values; None where an end lies outside of these, or with a single
+            scene for each value.
         why: "crosses" at ``value``; "never" within the tested values; "at once": the first value is past the threshold.
     """
 
@@ -40,9 +37,11 @@ def breaking_point(
     (Barlow et al., "Statistical inference under order restrictions", 1972), so that a plateau near the threshold does
     not break where one of its means happens to be low. The fit is interpolated linearly between the tested values.
 
-    The interval contains all values at which the mean is not significantly on either side of the threshold (inversion
-    of a test, as of Fieller, "Some problems in interval estimation", JRSS B 1954), by the skewness-corrected t over
-    scenes (:mod:`simharness.statistics.studentized`); between tested values the scores of each scene are interpolated.
+    The interval reaches from the last tested value at which the mean is significantly good, as at all before it, to the
+    first at which it is significantly past the threshold, as at all after it, by the skewness-corrected t over scenes
+    (:mod:`simharness.statistics.studentized`). What the curve does between two tested values is unknown, so that it
+    holds the break of every monotone curve, however many scenes there are; more values make it narrower. Testing in
+    a fixed order until the first result that is not significant keeps the level (Maurer, Hothorn & Lehmacher 1995).
 
     Args:
         values: tested values of the factor, (k,), ascending.
@@ -89,39 +88,13 @@ def _crossing(values: Floats, margin: Floats) -> float:
 
 
 def _ends(values: Floats, margin: Floats) -> tuple[float | None, float | None]:
-    """Return the first and last value at which the mean of margins (n, k) may be zero; None where that is outside."""
-    if len(margin) < 2:
+    """Return the tested values around all at which the mean of margins (n, k) may be zero; None where there is none."""
+    low, high = np.array([mean_ends(column[np.isfinite(column)]) for column in margin.T]).T
+    # Unknown ends are NaN, and the mean may be on either side.
+    good, past = int(np.argmin([*(low > 0), False])), int(np.argmin([*(high < 0)[::-1], False]))
+    if max(good, past) == len(values):  # the break is outside
         return None, None
-    at, low, high = _bands(values, margin)
-    # Unknown ends are of no help: the mean may be on either side.
-    above, below = np.nan_to_num(low, nan=-np.inf) > 0, np.nan_to_num(high, nan=np.inf) < 0
-    if above.all():  # beyond the last value
-        return None, None
-    if below.all():  # before the first
-        return None, None
-    first, last = int(np.argmin(above)), len(at) - 1 - int(np.argmin(below[::-1]))
-    return (_between(at, low, first - 1) if above[0] else None, _between(at, high, last) if below[-1] else None)
-
-
-def _between(at: Floats, end: Floats, before: int) -> float:
-    """Return where ``end`` passes zero after the index ``before``, linearly."""
-    one, other = end[before], end[before + 1]
-    share = one / (one - other) if np.isfinite(one) and np.isfinite(other) and one != other else 0.5
-    return float(at[before] + share * (at[before + 1] - at[before]))
-
-
-def _bands(values: Floats, margin: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return values of the factor with the ends of the 95 % interval of the mean margin at each, ascending."""
-    if len(values) == 1:
-        low, high = mean_ends(margin[np.isfinite(margin[:, 0]), 0])
-        return values, np.atleast_1d(low), np.atleast_1d(high)
-    shares = np.linspace(0, 1, _STEPS + 1)
-    at, lows, highs = [], [], []
-    for index in range(len(values) - 1):
-        pair = margin[:, index : index + 2]
-        pair = pair[np.isfinite(pair).all(axis=1)]
-        low, high = mean_ends(np.outer(1 - shares, pair[:, 0]) + np.outer(shares, pair[:, 1]))
-        at.append(values[index] + shares * (values[index + 1] - values[index]))
-        lows.append(low)
-        highs.append(high)
-    return np.concatenate(at), np.concatenate(lows), np.concatenate(highs)
+    return (
+        float(values[good - 1]) if good else None,
+        float(values[-past]) if past else None,
+    )

@@ -83,7 +83,7 @@ def test_a_study_with_a_factor_says_where_points_are_lost(tmp_path):
     """PCP is linear in the synthetic study, 5 points a camera: they are lost one camera below the best."""
     results = make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}, cases=("crowd", "empty"))
     (table,) = study_command._tables(results)
-    assert table.rows[0] == ["crowd", "cameras.count", "full", "85.4 at 5", "70.4 at 2", "below 4 (4 to 4)"]
+    assert table.rows[0] == ["crowd", "cameras.count", "full", "85.4 at 5", "70.4 at 2", "below 4 (3 to 5)"]
     assert [row[:3] for row in table.rows[1:3]] == [["", "", "fast"], ["empty", "cameras.count", "full"]]
     text = printed(table, 80)
     assert max(map(len, text.splitlines())) <= 80

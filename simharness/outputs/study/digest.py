@@ -269,7 +269,8 @@ def _lines(digest: Mapping[str, Any]) -> Iterator[str]:
 def _means_text(digest: Mapping[str, Any]) -> Iterator[str]:
     names = list(digest["means"])
     yield "\n## Variants"
-    yield "\nMeans over seeds with 95 % intervals; the value of a seed is the mean over its settings.\n"
+    yield "\nMeans over seeds with 95 % intervals; the value of a seed is the mean over its settings."
+    yield f"{tables.condition(len(digest['seeds']))}\n"
     for case, means in {"": digest["means"], **digest["cases"]}.items():
         if case:
             yield f"\nCase {case}:\n"
@@ -333,10 +334,11 @@ def _breaking(digest: Mapping[str, Any], parts: Mapping[str, Mapping[str, Any]])
     heads = ["factor", *(["case"] if digest["by_case"] else []), "broken", *names]
     yield from markdown_table(heads, [[*row, *(cells.get(name, "–") for name in names)] for row, cells in rows.items()])
     yield (
-        "\nLinear interpolation between the swept values. In parentheses: 95 % interval over seeds; *beyond*: the "
-        "interval ends outside the swept values. *not within the range*: the mean passes the threshold at no swept "
-        "value. *at once*: the mean is past the threshold at the mildest value already. Ghosts do not lower PCP; they "
-        "lower precision, the share of estimates that match a true person."
+        "\nLinear interpolation between the swept values. In parentheses: 95 % interval over seeds, from the last swept "
+        "value that is good for certain to the first that is bad for certain; *beyond*: the interval ends outside the "
+        "swept values. *not within the range*: the mean passes the threshold at no swept value. *at once*: the mean is "
+        "past the threshold at the mildest value already. Ghosts do not lower PCP; they lower precision, the share of "
+        "estimates that match a true person."
     )
 
 

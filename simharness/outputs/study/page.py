@@ -122,6 +122,7 @@ def render_study(
         facts=_facts(results),
         variants=variants,
         seeds=seeds,
+        condition=tables.condition(seeds) if seeds else "",
         failed=info["failed"],
         max_errors=_MAX_ERRORS,
         columns=tables.COLUMNS,

@@ -18,6 +18,7 @@ from simharness.scoring.failure_classes import DISPLACED, FailureKind
 from simharness.statistics.intervals import Interval, mean_interval
 from simharness.statistics.paired_tests import holm, paired
 from simharness.statistics.resampling import pseudo_values
+from simharness.statistics.studentized import unseen_share
 from simharness.study.study_folder import Results
 
 COLUMNS: tuple[ScoreInfo, ...] = tuple(
@@ -103,6 +104,12 @@ def all_scores(trials: pl.DataFrame, variants: Sequence[str]) -> list[tuple[Scor
         if any(mean.n for mean in means):
             rows.append((info, [cell(mean, info) for mean in means]))
     return rows
+
+
+def condition(seeds: int) -> str:
+    """Return a sentence about what intervals over seeds cannot contain."""
+    share = fixed(100 * unseen_share(seeds), 0)
+    return f"They are of what these scenes show: {seeds} scenes may miss what happens in up to {share} % of all scenes."
 
 
 def cases(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, dict[str, list[Cell]]]:
