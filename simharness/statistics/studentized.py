@@ -40,8 +40,8 @@ _CONSTANT = 1e-12  # deviation, relative to the largest value, below which value
 def p_greater(values: Floats) -> float:
     """Return the p-value of the hypothesis that the mean is at most zero, from finite values (n,).
 
-    1 for fewer than two values and for zeros. Equal positive values have p = 0. Where the values are skewed to the left,
-    p is at least the probability of a negative mean under random weights; the additional scene lies the farther off the
+    1 for fewer than two values and for zeros. Equal positive values have p = 0. For values that are skewed to the left
+    p is at least the probability of a negative mean under random weights; the additional scene is the farther off, the
     larger the skewness.
     """
     n = len(values)

@@ -334,7 +334,7 @@ def _breaking(digest: Mapping[str, Any], parts: Mapping[str, Mapping[str, Any]])
     heads = ["factor", *(["case"] if digest["by_case"] else []), "broken", *names]
     yield from markdown_table(heads, [[*row, *(cells.get(name, "–") for name in names)] for row, cells in rows.items()])
     yield (
-        "\nLinear interpolation between the swept values. In parentheses: 95 % interval over seeds, from the last swept "
+        "\nLinear interpolation between the swept values. In parentheses: 95 % interval from the last swept "
         "value that is good for certain to the first that is bad for certain; *beyond*: the interval ends outside the "
         "swept values. *not within the range*: the mean passes the threshold at no swept value. *at once*: the mean is "
         "past the threshold at the mildest value already. Ghosts do not lower PCP; they lower precision, the share of "

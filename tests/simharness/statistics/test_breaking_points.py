@@ -52,7 +52,7 @@ def test_missing_scores_are_ignored():
 
 
 def test_the_interval_reaches_from_the_last_good_to_the_first_bad_value():
-    """Noise of a mean that is far less than its distance from the threshold: ends are the values beside the crossing."""
+    """Noise of a mean that is less than its distance from the threshold: ends are the values beside the crossing."""
     rng = np.random.default_rng(5)
     values = np.array([0.0, 0.5, 1.5, 2.5, 2.75, 9.0])
     scores = 100 - 10 * values + rng.normal(0, 0.1, (12, 6))
