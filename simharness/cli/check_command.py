@@ -15,6 +15,7 @@ from simharness.cli.program import PROGRAM, Workers
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from simharness.gate.baseline import Measurement
     from simharness.gate.compare import FailedCase, GateResult, Verdict
     from simharness.scenario.load import Study
 
@@ -127,6 +128,26 @@ def _update(study: "Study", path: Path, workers: int) -> None:
         highlight=False,
         markup=False,
     )
+    _print_power(measured, study)
+
+
+def _print_power(measured: "Measurement", study: "Study") -> None:
+    """Print which changes the suite can show, and how many seeds smaller or larger ones need."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    from simharness.gate.power import POWER, WISHED, even_changes, power_of, power_rows
+
+    title = f"Changes that {len(study.seeds)} seeds show in {100 * POWER:.0f} % of runs, if they vary as the score does"
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    for heading in ("score", "variant"):
+        table.add_column(heading)
+    for heading in ("whole\nsuite", "one\ncase", *(f"seeds for\n{wish} tolerances" for wish in WISHED)):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for row in power_rows(power_of(measured, study.gate)):
+        table.add_row(*row)
+    Console().print(table)
+    Console().print(even_changes(measured, study.gate), soft_wrap=True, highlight=False)
 
 
 def _print(check: "GateResult", console: Console) -> None:

@@ -9,7 +9,7 @@ from simharness.gate.score_tests import Pairs, Tested, pairs_of, test_of
 from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.scoring.catalogue import SCORES
-from simharness.statistics.paired_tests import holm
+from simharness.statistics.paired_tests import hochberg
 
 Verdict = Literal["worse", "unexpected", "better", "same"]
 """``unexpected``: better by more than its bound; a score with a best value may also have moved past it."""
@@ -84,6 +84,9 @@ class Comparison:
 def compare(before: Measurement, after: Measurement, gate: GateSection) -> Comparison:
     """Compare two measurements of one suite.
 
+    P-values are corrected for the tests of a family: one score of all variants over the whole suite, or in all cases.
+    The two families of a score share the level.
+
     Trials that only one of them has, because they failed in the other, are left out; the caller reports them.
 
     Args:
@@ -99,11 +102,11 @@ def compare(before: Measurement, after: Measurement, gate: GateSection) -> Compa
     families = 1 + any(each.case is not None for each in pairs)
     p = [1.0] * len(pairs)
     least = [1.0] * len(pairs)
-    for whole in (True, False):
-        family = [at for at, each in enumerate(pairs) if made[at] and (each.case is None) == whole]
-        for at, value in zip(family, holm([tested[at].p for at in family]), strict=True):
+    for family in {(each.score, each.case is None) for each in pairs}:
+        members = [at for at, each in enumerate(pairs) if made[at] and (each.score, each.case is None) == family]
+        for at, value in zip(members, hochberg([tested[at].p for at in members]), strict=True):
             p[at] = min(1.0, families * value)
-            least[at] = families * len(family) * tested[at].least_p
+            least[at] = families * len(members) * tested[at].least_p
     changes = [_change(*each, gate.level) for each in zip(pairs, tested, allowed, p, least, strict=True)]
     uncompared = tuple(score for score in GATED if _has(after, score) and not _has(before, score))
     return Comparison(tuple(changes), before.cases if families > 1 else (), uncompared)

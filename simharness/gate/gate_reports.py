@@ -100,15 +100,15 @@ def difference(change: Change) -> str:
         return "none"
     interval = ""
     if math.isfinite(change.low):
-        interval = f" ({_difference(change.score, change.low)} to {_difference(change.score, change.high)})"
-    return _difference(change.score, change.difference) + interval
+        interval = f" ({difference_text(change.score, change.low)} to {difference_text(change.score, change.high)})"
+    return difference_text(change.score, change.difference) + interval
 
 
 def allowed(change: Change) -> str:
     """Return the changes that fail nothing as text: from the largest loss to the largest gain."""
     loss, gain = change.allowed.loss, change.allowed.gain
     if change.score == TIME:
-        return f"to {_difference(TIME, math.exp(loss))}"
+        return f"to {difference_text(TIME, math.exp(loss))}"
     info = SCORES[change.score]
     if info.target is not None:
         return f"±{gain:g}, off {info.target:g} +{loss:g}"
@@ -134,7 +134,8 @@ def _digits(score: str) -> int:
     return 2 if score == TIME else SCORES[score].digits
 
 
-def _difference(score: str, value: float) -> str:
+def difference_text(score: str, value: float) -> str:
+    """Return a difference of a score with its sign; a ratio for time."""
     return f"×{value:.2f}" if score == TIME else signed(value, max(_digits(score), 1))
 
 

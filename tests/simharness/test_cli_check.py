@@ -183,7 +183,9 @@ def test_the_printed_command_runs_the_worst_trial(check, baseline, tmp_path):
 def test_two_workers_give_the_result_of_one(check, tmp_path):
     two = SMALL.replace("seeds = 12", "seeds = 3").replace("duration = 0.8", "duration = 0.4")
     (tmp_path / "two.toml").write_text(two.replace("[gate]\n", "[gate]\nlevel = 0.5\n"))
-    assert check("--update-baseline", file="two.toml", baseline="new/two.json").exit_code == 0
+    updated = check("--update-baseline", file="two.toml", baseline="new/two.json")
+    assert updated.exit_code == 0
+    assert "Changes that 3 seeds show" in updated.stdout
     result = check("--workers", "2", file="two.toml", baseline="new/two.json")
     assert result.exit_code == 0
     assert result.stdout.count("none") == len(GATED) - OF_IDENTITIES
