@@ -86,6 +86,7 @@ def test_lost_pictures_are_found_where_they_were_lost(motion, lost):
     truth = PERIOD / 8 * (steps - MARGIN)
     assert np.abs(clocks.times - truth)[np.abs(np.arange(FRAMES) - 120) > 8].max() < 0.004
     assert "dropped-pictures" in {each.kind for each in clocks.findings()}
+    assert np.diff(clocks.times[:, 2]).argmax() + 1 == step.frame  # the first frame behind it has its true time already
 
 
 def test_a_long_recording_is_judged_by_its_busiest_part(motion, monkeypatch):

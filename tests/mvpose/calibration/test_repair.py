@@ -63,6 +63,16 @@ def test_the_whole_rig_stays_where_most_cameras_are(frames):
     np.testing.assert_allclose(found.corrections[:, 3:], found.rig.centers - wrong.centers, atol=1e-9)
 
 
+def test_the_file_of_a_repair_has_the_covariance_in_degrees_and_metres(frames):
+    found = repair(disturbed(RIG, 1, 0.1, seed=8, views=[1]), frames, period=PERIOD)
+    for view, camera in enumerate(found.to_json()["cameras"]):
+        variance = np.diag(found.covariance[view])
+        assert np.deg2rad(camera["sigma_degrees"]) ** 2 == pytest.approx(variance[:3])
+        assert np.square(camera["sigma_metres"]) == pytest.approx(variance[3:])
+        assert np.deg2rad(camera["rotation_degrees"]) == pytest.approx(found.corrections[view, :3])
+        assert camera["shift_metres"] == pytest.approx(found.corrections[view, 3:])
+
+
 def test_a_right_rig_hardly_changes(frames):
     found = repair(RIG, frames, period=PERIOD)
     assert np.degrees(np.abs(found.corrections[:, :3])).max() < 0.1

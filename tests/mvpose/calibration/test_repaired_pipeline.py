@@ -80,6 +80,19 @@ def test_detections_of_cameras_in_time_stay_as_they_are(motion):
         np.testing.assert_array_equal(rows, np.arange(len(given)))
 
 
+def test_boxes_move_with_their_keypoints(motion):
+    """Pictures a third of a frame late are moved back by as much: boxes by the mean of their keypoints."""
+    frames = filmed(motion, np.zeros(4))[:60]
+    clocks = estimate_clocks(RIG, frames, period=PERIOD)
+    times = PERIOD * np.tile(np.arange(60.0)[:, None], (1, 4)) + np.array([0.0, PERIOD / 3, 0.0, 0.0])
+    moved = resampled(RIG, frames, replace(clocks, offsets=np.array([0.0, PERIOD / 3, 0.0, 0.0]), times=times))
+    for given, each in zip(frames[5:-5], moved.frames[5:-5], strict=True):
+        shift = (each.keypoints - given.keypoints).mean(axis=1)
+        assert np.linalg.norm(shift[given.view == 1], axis=1).min() > 0.05
+        np.testing.assert_allclose(each.boxes[:, :2] - given.boxes[:, :2], shift, atol=1e-9)
+        np.testing.assert_allclose(each.boxes[:, 2:], given.boxes[:, 2:], atol=1e-9)
+
+
 def test_presets_take_the_suffix():
     assert isinstance(preset("full+repair"), SequenceEstimator)
     assert isinstance(preset("track+repair", lag=0.0), RepairedPipeline)

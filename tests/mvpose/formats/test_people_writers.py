@@ -90,6 +90,12 @@ class TestTrc:
         assert np.isnan(markers[2]).all()
         same(markers, y_up(people.joints[4:10, 1]))
 
+    def test_times_are_those_of_the_recording_also_where_it_begins_late(self):
+        people = replace(recording(), times=recording().times + 7.36)
+        _, _, numbers, times, _ = read_trc(written(people, "trc")["person_8.trc"])
+        assert numbers.tolist() == [5, 6, 7, 8, 9, 10]
+        np.testing.assert_allclose(times, people.times[4:10], atol=1e-6)
+
     def test_millimetres_and_z_up_where_asked_for(self):
         people = recording()
         header, *_, markers = read_trc(written(people, "trc", units="mm", up="z")["person_3.trc"])

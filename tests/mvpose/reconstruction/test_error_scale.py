@@ -11,7 +11,7 @@ from mvpose import COCO17, Camera, Detections, Estimate, Matching, Rig
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
 from mvpose.reconstruction.error_scale import PRIOR_FREEDOM, SHARED, fit_variances, observe
-from mvpose.reconstruction.likelihood import ANCHOR, log_likelihood
+from mvpose.reconstruction.likelihood import ANCHOR, accumulate, evaluate_strongest_modes, log_likelihood
 
 SIGMAS = Noise().sigmas(COCO17)
 METHODS = [Triangulation(), PictorialStructure()]
@@ -93,6 +93,28 @@ def test_the_information_is_the_curvature_of_the_log_likelihood(seed):
     # The misfit scales the whole; the anchor adds 1 / m^2.
     scaled = (information - ANCHOR * np.eye(3)) / np.trace(information - ANCHOR * np.eye(3))
     np.testing.assert_allclose(scaled, curvature / np.trace(curvature), atol=2e-3)
+
+
+@pytest.mark.parametrize("distance", [0.5, 3.0, 12.0])
+def test_keypoints_are_as_certain_as_the_joint_and_the_pixel_at_its_distance(distance):
+    """Information across a ray is score squared over the sum of both variances, if the keypoint is right."""
+    sigma, pixel, score, floor = 0.04, 0.02, 0.8, 0.1
+    origins, directions = np.zeros((1, 3)), np.array([[[1.0, 0.0, 0.0]]])
+    weights, angle, point = np.array([[score]]), np.array([pixel]), np.array([distance, 0.03, 0.0])
+    variance = (sigma**2 + (pixel * distance) ** 2) / score**2
+    value = score * np.exp(-0.5 * 0.03**2 / variance)
+    right = value / (value + floor)
+    A, b = np.zeros((3, 3)), np.zeros(3)
+    support, responsibility, misfit = accumulate(point, origins, directions, weights, angle, sigma, floor, 1.0, A, b)
+    np.testing.assert_allclose(A, np.diag([0.0, right / variance, right / variance]), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(b, [0.0, -0.03 * right / variance, 0.0], rtol=1e-9, atol=1e-9)
+    assert (support, responsibility) == pytest.approx((score * right, right))
+    assert misfit == pytest.approx(right * 0.03**2 / variance)
+    strongest = evaluate_strongest_modes(point, origins, directions, weights, angle, sigma, floor)
+    assert strongest == pytest.approx((support, responsibility, misfit, 0.03**2))
+    assert log_likelihood(point, origins, directions, weights, angle, sigma, floor) == pytest.approx(
+        np.log(value + floor)
+    )
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.99])

@@ -227,6 +227,21 @@ def test_depth_ambiguity_is_squared_distance_times_probability(concentration):
     assert not covariance[0].any()
 
 
+def test_a_joint_inherits_the_ambiguity_of_its_parent():
+    """A wrist as deep as the elbow has no second depth of its own, but where the elbow is, the wrist is as well."""
+    joints = np.array([[0.0, 0.0, 1.4], [0.0, 0.2, 1.2], [0.3, 0.2, 1.2]])
+    origin, directions = np.array([[0.0, -4.0, 1.2]]), np.array([joints - [0.0, -4.0, 1.2]]).swapaxes(0, 1)[:, :, None]
+    directions = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+    joints[2] = origin[0] + directions[2, 0, 0] * 4.2  # at the depth of the elbow along its own ray
+    weights, covariance = np.array([0.0, 1.0, 1.0])[:, None, None], np.zeros((3, 3, 3))
+    graph = bone_graph(Skeleton("arm", ("shoulder", "elbow", "wrist"), (-1, 0, 1), (0, 1, 2), (0.1, 0.1, 0.1)))
+    _add_ambiguity(covariance, joints, origin, directions, weights, graph, np.ones(3), np.zeros(3), np.zeros(3))
+    assert np.trace(covariance[1]) == pytest.approx(0.4**2 / 2)  # both depths are as likely
+    depth = ((joints[1] - origin[0]) * directions[2, 0, 0]).sum() - 4.2  # of the elbow along the ray of the wrist
+    assert np.trace(covariance[2]) == pytest.approx(np.trace(covariance[1]) + 4.0 * depth**2 / 2, rel=1e-3)
+    assert np.trace(covariance[2]) > 0.9 * np.trace(covariance[1])
+
+
 def log_posterior(joints, rays):
     """Likelihood times prior of a whole pose, written out from the docstrings."""
     noise, (length, deviation) = Noise(), bone_lengths(COCO17)

@@ -127,6 +127,23 @@ def test_a_detection_with_left_and_right_exchanged_gives_no_second_person():
     assert np.linalg.norm(joints[0] - star, axis=1)[5:].max() < 0.15  # the others outvote them: wrists are 1.4 m apart
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_both_sides_of_the_body_are_treated_alike(seed):
+    """With all names exchanged, people have the same poses under the other names: also where joints are missing."""
+    rig, people = ring(4), crowd(3, spacing=0.5, seed=seed)
+    detections, _ = detect(rig, people, noise=4.0, seed=seed)
+    rng = np.random.default_rng([5, seed])
+    scores = np.where(rng.random(detections.scores.shape) < 0.35, 0.0, rng.uniform(0.3, 1.0, detections.scores.shape))
+    named = [
+        find(rig, Detections.from_keypoints(detections.view, detections.keypoints[:, names], scores[:, names]))[0]
+        for names in (list(range(17)), MIRROR)
+    ]
+    assert len(named[0])
+    assert len(named[0]) == len(named[1])
+    order = [np.lexsort(np.nanmean(each, axis=1)[:, :2].round(3).T) for each in named]
+    np.testing.assert_allclose(named[0][order[0]], named[1][order[1]][:, MIRROR], atol=1e-6)
+
+
 def test_results_do_not_depend_on_detection_order_or_world_frame():
     rig, people = ring(4), crowd(3)
     detections, _ = detect(rig, people, noise=2.0)

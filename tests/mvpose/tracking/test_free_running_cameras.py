@@ -70,6 +70,28 @@ def test_who_walks_in_is_found_within_a_tenth_of_a_second():
     assert (people[75 + 15 :] == 3).all()
 
 
+def test_who_is_first_seen_by_pictures_of_two_times_is_as_uncertain_as_people_move_in_between():
+    """Errors across the motion are as large as their covariance says, though half of the rays are old."""
+    ratio = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        x, y, angle = *rng.uniform(-0.8, 0.8, 2), rng.uniform(0.0, 2.0 * np.pi)
+        path = [(x, y, 1.3 * np.cos(angle), 1.3 * np.sin(angle))]
+        rig, frames, _ = film(path, [0.0], offsets=[0.0, 0.08, 0.0, 0.0, 0.0], noise=2.0, seed=seed)
+        rig, frame = Rig([rig[0], rig[1]]), frames[0]
+        tracker, first = Tracker(mvpose.preset("fast")), Detections.empty()
+        tracker.estimate(rig, replace(first, time=np.full(2, -0.2)))
+        for view, time in ((0, 0.0), (1, 0.08)):
+            given = frame.select(frame.view == view)
+            moment = tracker.advance(rig, replace(given, time=np.where(np.arange(2) == view, time, np.nan)))
+        assert len(moment.tracks) == 1
+        off = moment.tracks.state[0, :, :3] - walking(0.08, paths=path)[0]
+        ratio += np.einsum(
+            "jr,jr->j", off, np.linalg.solve(moment.tracks.covariance[0, :, :3, :3], off[..., None])[..., 0]
+        ).tolist()
+    assert 0.1 < np.median(ratio) / 2.37 < 1.3  # 2.37: the median of chi-square of three degrees of freedom
+
+
 def test_false_detections_of_pictures_that_are_apart_in_time_are_nobody():
     rig, parts, _ = _one_by_one(PATHS[:1], np.arange(40) / RATE, noise=1.0)
     ghost = walking(0.0, paths=[(1.8, -1.8, 0.1, 0.0)])[0]

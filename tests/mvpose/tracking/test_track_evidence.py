@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from people import ring
+from people import STANDING, look_at, ring
 from walking_people import film, identities
 
 from mvpose import Detections, Rig, preset
 from mvpose.rays import viewing_rays
 from mvpose.tracking import Tracker, TrackingModel
 from mvpose.tracking.association import TrackAffinity
-from mvpose.tracking.existence import Existence, MeasuredClutter, log_odds
+from mvpose.tracking.existence import Existence, MeasuredClutter, gather_evidence, log_odds
 
 RATE = 25.0
 
@@ -99,3 +99,49 @@ def _timed(frame, time):
     return Detections(
         frame.view, frame.keypoints, frame.scores, frame.boxes, frame.box_scores, time=np.full(2, float(time))
     )
+
+
+def standing_in_line(*distances):
+    """A rig, and states (n, 17, 6) of people who stand one behind the other as its first camera sees them."""
+    rig = Rig([look_at([0.0, 0.0, 1.0], [1.0, 0.0, 1.0]), look_at([3.0, 9.0, 1.0], [3.0, 0.0, 1.0])])
+    state = np.zeros((len(distances), 17, 6))
+    state[..., :3] = [STANDING + [away, 0.0, 0.0] for away in distances]
+    return rig, state
+
+
+def gathered(rig, state, owners, *, steps=1, step=0.2, memory=1e9):
+    """Hits and misses (n,) by pictures of the first camera, a step apart, which show the tracks ``owners``."""
+    n, model = len(state), Existence()
+    origin, found = np.zeros((n, 2), np.bool_), np.full((n, 2), -np.inf)
+    hits, misses, absent = np.zeros((3, n, 2))
+    sizes = np.array([camera.size for camera in rig], float)
+    for k in range(steps):
+        taken = rig.packed, sizes, np.array([True, False]), np.array([step, 0.0])
+        gather_evidence(
+            (origin, hits, misses, absent, found), taken, np.zeros(n, np.bool_), state, np.array(owners, np.int64),
+            np.zeros(len(owners), np.int64), k * step, model.independent, memory,
+        )  # fmt: skip
+    return hits[:, 0], misses[:, 0]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_only_who_stands_before_somebody_hides_the_person(turned):
+    """The farther of two on one line of sight may be missed; the nearer one cannot be hidden by the farther."""
+    rig, state = standing_in_line(2.0, 3.5)
+    near, far = (1, 0) if turned else (0, 1)
+    state = state[::-1].copy() if turned else state
+    assert gathered(rig, state, [near])[1][far] == 0.0
+    assert gathered(rig, state, [far])[1][near] == pytest.approx(1.0)
+    assert gathered(rig, state, [])[1] == pytest.approx([1.0, 1.0])  # nobody is seen: nobody hides another
+
+
+def test_pictures_that_found_a_person_and_that_missed_one_are_forgotten_alike():
+    """Evidence is a geometric sum: each picture counts exp(-age / memory) times as much as a new one."""
+    rig, state = standing_in_line(2.0)
+    memory, step, steps = 3.0, 0.5, 40
+    weights = np.exp(-np.arange(steps) * step / memory).sum()
+    hits, none = gathered(rig, state, [0], steps=steps, step=step, memory=memory)
+    nothing, misses = gathered(rig, state, [], steps=steps, step=step, memory=memory)
+    assert (none[0], nothing[0]) == (0.0, 0.0)
+    assert hits[0] == pytest.approx(weights)
+    assert misses[0] == pytest.approx(weights)

@@ -7,6 +7,7 @@ from walking_people import film, identities
 import mvpose
 from mvpose import Detections
 from mvpose.tracking import Tracker, track
+from mvpose.tracking.picture_times import FrameClock
 
 PATHS = [(-0.8, -0.5, 0.5, 0.2), (0.8, 0.6, -0.4, -0.3)]
 RATE = 25.0
@@ -123,6 +124,16 @@ def test_a_minute_without_pictures_or_people(rate, timed):
     for k in range(5):
         estimate = tracker.estimate(rig, _at(frames[k], times[count + 10 + k]))
     assert sorted(estimate.ids) == [2, 3]
+
+
+@pytest.mark.parametrize("period", [0.01, 0.04, 0.2])
+def test_a_frame_without_pictures_comes_after_the_time_between_the_latest_frames(period):
+    """The mean of the latest intervals draws near the true one by a tenth of the rest with each frame."""
+    clock = FrameClock(period=0.04, interval=0.04)
+    for k in range(12):
+        clock.take(clock.read(_at(Detections.empty(), k * period), 5))
+    expected = period + (0.04 - period) * 0.9**11
+    assert clock.read(_nothing(np.nan), 5).elapsed == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("gap", [60.0, 3600.0, 1e6, 1e10])

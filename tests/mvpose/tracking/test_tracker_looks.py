@@ -1,7 +1,11 @@
 """People who come back by their looks: descriptors over long gaps, and never by a uniform."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from people import STANDING, ring
 
 from mvpose import Detections, Pipeline, preset
@@ -9,6 +13,7 @@ from mvpose.affinity import AppearanceAffinity, FusedAffinity
 from mvpose.tracking import Tracker, TrackerState, TrackingModel
 from mvpose.tracking.looks import learn_looks, look_distances
 from mvpose.tracking.reappearance import Reappearance
+from mvpose.tracking.tracks import Tracks
 
 RIG = ring(5)
 SPOTS = [(-1.2, -1.2), (1.2, -1.2), (-1.2, 1.2), (1.2, 1.2), (0.0, 0.0), (0.0, 1.4)]
@@ -152,6 +157,16 @@ def test_no_more_people_are_remembered_than_asked():
             estimate = tracker.estimate(RIG, _frame(10.0 * k + step / 25, places, clothes, rng))
         assert tracker.state().lost <= 5
     assert estimate.ids.max() >= 35
+
+
+@given(st.lists(st.integers(0, 500), min_size=1, max_size=12, unique=True), st.integers(1, 12))
+def test_of_too_many_lost_people_those_lost_last_are_remembered(tenths, most):
+    """In any order of the tracks."""
+    lost = Tracks.none(joints=1, bones=0, cameras=2)
+    lost = replace(lost, found=np.column_stack([np.full(len(tenths), -np.inf), 0.1 * np.array(tenths)]),
+                   described=np.ones(len(tenths)))  # fmt: skip
+    kept = Reappearance(most=most).remembers(lost, 60.0)
+    assert set(np.array(tenths)[kept]) == set(sorted(tenths)[-most:])
 
 
 def test_descriptors_may_come_late_or_be_missing_but_not_change_their_length():

@@ -64,6 +64,19 @@ def test_cameras_that_look_away_see_nobody(valued: RigValue) -> None:
     assert valued.maps([valued.terms(away)]).seen.max() == 0.0
 
 
+def test_lengths_of_parts_are_those_of_the_score_for_uneven_shoulders_and_hips() -> None:
+    """The torso goes from midway between the hips to midway between the shoulders, and no side counts more."""
+    from simharness.planning.rig_value import _lengths
+
+    body = np.random.default_rng(3).uniform(-1, 1, (2, 15, 3))  # nose, ears, shoulders, elbows, wrists, hips, ...
+    sides = [0, 2, 1, *np.arange(3, 15).reshape(-1, 2)[:, ::-1].ravel()]
+    lengths, exchanged = _lengths(body), _lengths(body[:, sides])
+    middle = body[:, [[3, 4], [9, 10]]].mean(axis=2)
+    np.testing.assert_allclose(lengths[:, 8], np.linalg.norm(middle[:, 0] - middle[:, 1], axis=1))
+    np.testing.assert_allclose(lengths[:, 0], np.linalg.norm(body[:, 3] - body[:, 5], axis=1))  # left upper arm
+    np.testing.assert_allclose(lengths, exchanged[:, [1, 0, 3, 2, 5, 4, 7, 6, 8, 9]])
+
+
 def test_error_is_that_of_the_information_of_both_rays(valued: RigValue) -> None:
     pair = [valued.terms(each) for each in ring_rig(valued.room, 4)[:2]]
     both = (pair[0][..., 4] > 0.5) & (pair[1][..., 4] > 0.5)
