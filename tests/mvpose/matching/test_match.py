@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -211,3 +213,23 @@ def test_pairs_of_views_are_matched_for_the_greatest_gain_over_alpha():
     expected[0, 2] = expected[2, 0] = 0.9
     np.testing.assert_array_equal(match_view_pairs(affinity, np.array([0, 0, 1, 1])), expected)
     assert (match_view_pairs(affinity, np.array([0, 0, 1, 1]), alpha=0.2) > 0).sum() == 4
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_each_pair_of_views_is_matched_by_itself_in_any_order_of_detections(seed):
+    """Four views: each block is the best partial permutation of its two views alone, by SciPy."""
+    rng = np.random.default_rng(seed)
+    view = rng.permutation(np.repeat(np.arange(4), [2, 3, 1, 4]))
+    affinity = rng.random((10, 10))
+    affinity = np.where(view[:, None] == view, 0.0, (affinity + affinity.T) / 2)
+    found = match_view_pairs(affinity, view, alpha=0.4)
+    expected = np.zeros_like(affinity)
+    for one, other in itertools.combinations(range(4), 2):
+        rows, columns = np.flatnonzero(view == one), np.flatnonzero(view == other)
+        gain = np.maximum(affinity[np.ix_(rows, columns)] - 0.4, 0.0)
+        for i, j in zip(*linear_sum_assignment(gain, maximize=True), strict=True):
+            if gain[i, j] > 0.0:
+                a, b = rows[i], columns[j]
+                expected[a, b] = expected[b, a] = affinity[a, b]
+    np.testing.assert_array_equal(found, expected)
+    assert (found > 0).sum() > 8

@@ -9,7 +9,7 @@ from people import STANDING, detect, look_at, ring
 from mvpose import COCO17, Detections, Rig
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Triangulation
-from mvpose.reconstruction.hypotheses import _link, _supporting_rays
+from mvpose.reconstruction.hypotheses import _link, _meetings, _supporting_rays
 from mvpose.reconstruction.likelihood import log_likelihood
 from mvpose.reconstruction.triangulation import consensus, pair_point
 
@@ -184,3 +184,18 @@ def test_links_join_exactly_the_states_at_the_length_of_the_bone() -> None:
     assert 0 < len(pairs) < 600
     assert [(s, state[k]) for s in range(60) for k in range(first[s], first[s + 1])] == pairs
     np.testing.assert_allclose(cost, [0.5 * ((reach[s - 20, b] - 0.5) / 0.05) ** 2 for s, b in pairs], rtol=1e-9)
+
+
+@pytest.mark.parametrize("score", [0.25, 0.5, 1.0])
+def test_rays_meet_within_as_many_deviations_as_their_scores_allow(score):
+    """Two perpendicular rays a gap apart, whose variance is the sum of both, each over its score squared."""
+    sigma, agreement = 0.05, 2.0
+    widest = agreement * np.sqrt(2.0) * sigma / score
+    for gap, meets in ((0.98 * widest, True), (1.02 * widest, False)):
+        rows = np.zeros((2, 10))
+        rows[0, :6], rows[1, :6] = [-3, 0, 0, 1, 0, 0], [0, -3, gap, 0, 1, 0]
+        rows[:, 6], rows[:, 7], rows[:, 9] = score, score / 0.01, 2 * np.log(score / 0.01)
+        points, ends, _ = _meetings(np.array([0, 1]), rows, sigma, agreement)
+        assert len(points) == len(ends) == meets
+        if meets:
+            np.testing.assert_allclose(points, [[0.0, 0.0, gap / 2]], atol=1e-9)

@@ -5,11 +5,13 @@ import pytest
 from people import STANDING, look_at, ring
 from walking_people import film, identities
 
-from mvpose import Detections, Rig, preset
+from mvpose import COCO17, Detections, Rig, preset
 from mvpose.rays import viewing_rays
+from mvpose.reconstruction.error_scale import SHARED
 from mvpose.tracking import Tracker, TrackingModel
 from mvpose.tracking.association import TrackAffinity
 from mvpose.tracking.existence import Existence, MeasuredClutter, gather_evidence, log_odds
+from mvpose.tracking.frame_kernels import vagueness_of
 
 RATE = 25.0
 
@@ -145,3 +147,23 @@ def test_pictures_that_found_a_person_and_that_missed_one_are_forgotten_alike():
     assert (none[0], nothing[0]) == (0.0, 0.0)
     assert hits[0] == pytest.approx(weights)
     assert misses[0] == pytest.approx(weights)
+
+
+def test_the_vagueness_of_a_track_is_the_deviation_of_its_best_known_joint():
+    rng = np.random.default_rng(0)
+    half = rng.normal(size=(5, 6, 6))
+    covariance, state = half @ half.swapaxes(1, 2), rng.normal(size=(5, 6))
+    of_joints = np.sqrt(np.trace(covariance[:, :3, :3], axis1=1, axis2=2) / 3.0)
+    state[of_joints.argmin()] = np.nan  # an unknown joint does not count
+    assert vagueness_of(state, covariance) == pytest.approx(np.sort(of_joints)[1])
+    assert vagueness_of(np.full((5, 6), np.nan), covariance) == np.inf
+
+
+def test_a_joint_that_all_cameras_see_is_known_to_between_the_shared_and_the_whole_error_of_a_keypoint():
+    rig, frames, _ = film([(0.2, 0.1, 0.3, 0.2)], np.arange(25) / RATE, noise=1.0)
+    tracker = Tracker(preset("fast"))
+    estimate = [tracker.estimate(rig, frame) for frame in frames][-1]
+    sigmas = tracker.model.noise.sigmas(COCO17)
+    variances = np.linalg.eigvalsh(estimate.covariance[0])
+    assert (variances.min(axis=1) > (SHARED * sigmas) ** 2).all()
+    assert (variances.max(axis=1) < sigmas**2).all()
