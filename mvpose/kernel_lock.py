@@ -22,11 +22,12 @@ _held: set[Path] = set()  # locks of this process, which would wait for itself
 
 
 @contextlib.contextmanager
-def locked(path: Path) -> Iterator[bool]:
+def locked(path: Path, *, patience: float = _PATIENCE) -> Iterator[bool]:
     """Hold the lock of a file, which is created, and deleted at the end.
 
     Args:
         path: file in an existing folder.
+        patience: longest time to wait for another process, seconds.
 
     Yields:
         Whether the lock is held.
@@ -41,7 +42,7 @@ def locked(path: Path) -> Iterator[bool]:
         yield False
         return
     with file:
-        if not _acquired(fcntl, file):
+        if not _acquired(fcntl, file, patience):
             yield False
             return
         _held.add(path)
@@ -52,9 +53,9 @@ def locked(path: Path) -> Iterator[bool]:
             path.unlink(missing_ok=True)  # a process that waits for it still gets the lock of the deleted file
 
 
-def _acquired(fcntl: ModuleType, file: IO[bytes]) -> bool:
+def _acquired(fcntl: ModuleType, file: IO[bytes], patience: float) -> bool:
     """Wait for the lock of an open file; return whether it was acquired."""
-    end = time.monotonic() + _PATIENCE
+    end = time.monotonic() + patience
     while True:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

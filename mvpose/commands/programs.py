@@ -28,6 +28,9 @@ BAD_INPUT = 2
 FAILED = 3
 """Exit code: the run itself failed, on good input."""
 
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
 
 @dataclass(frozen=True)
 class Program:
@@ -91,6 +94,9 @@ class Program:
             yield
         except (typer.Exit, typer.Abort):
             raise
+        except KeyboardInterrupt as interruption:
+            typer.echo(str(interruption) or "interrupted", err=True)
+            raise typer.Exit(INTERRUPTED) from None
         except ValueError as error:
             self._end("error", str(error), BAD_INPUT)
         except OSError as error:

@@ -77,14 +77,17 @@ def check(
             _update(study, baseline, workers)
             return
         from mvpose.commands.progress import reporter
-        from simharness.gate.suite import baseline_of
+        from simharness.gate.suite import baseline_of, kept_trials
         from simharness.gate.suite import check as check_suite
 
         before = baseline_of(study, baseline)
-        with failing(), reporter() as bars:
-            result = check_suite(study, before, workers=workers, accept_better=accept_better, reporter=bars)
-        _print(result, Console())
-        unwritten = _write(result, reports)
+        with kept_trials(study, baseline) as store:
+            with failing(), reporter() as bars:
+                result = check_suite(
+                    study, before, workers=workers, accept_better=accept_better, reporter=bars, store=store
+                )
+            _print(result, Console())
+            unwritten = _write(result, reports)
     if not result.passed:
         raise typer.Exit(FOUND)
     if unwritten:
@@ -111,17 +114,18 @@ def _update(study: "Study", path: Path, workers: int) -> None:
     from mvpose.commands.progress import reporter
     from simharness.gate.baseline import write_baseline
     from simharness.gate.score_tests import require_seeds
-    from simharness.gate.suite import run_suite
+    from simharness.gate.suite import kept_trials, run_suite
 
     require_seeds(study)
-    with failing(), reporter() as bars:
-        done = run_suite(study, workers=workers, reporter=bars)
-    if done.failed:
-        message = f"{_list_failed(done.failed)}\n{path} was not written, because it would lack these trials"
-        Console(stderr=True).print(message, soft_wrap=True, highlight=False, markup=False)
-        raise typer.Exit(FOUND)
-    measured = done.measurement(study)
-    write_baseline(measured, path)
+    with kept_trials(study, path) as store:
+        with failing(), reporter() as bars:
+            done = run_suite(study, workers=workers, reporter=bars, store=store)
+        if done.failed:
+            message = f"{_list_failed(done.failed)}\n{path} was not written, because it would lack these trials"
+            Console(stderr=True).print(message, soft_wrap=True, highlight=False, markup=False)
+            raise typer.Exit(FOUND)
+        measured = done.measurement(study)
+        write_baseline(measured, path)
     Console().print(
         f"{path}: {len(measured.scores)} results of the suite {measured.suite} ({measured.fingerprint})",
         soft_wrap=True,

@@ -172,7 +172,6 @@ def rectangle_of(text: str) -> "Volume":
     return Volume.box(*sides)
 
 
-INTERRUPTED = 130
 _PLAN = "simharness plan"
 
 
@@ -264,8 +263,7 @@ def plan(
                     effort=PlanEffort(scenes=scenes, workers=workers),
                 )  # fmt: skip
         except KeyboardInterrupt:
-            typer.echo("interrupted; the same command goes on where this one stopped", err=True)
-            raise typer.Exit(INTERRUPTED) from None
+            raise KeyboardInterrupt("interrupted; the same command goes on where this one stopped") from None
         page = write_plan(planned, folder, command=PROGRAM.command_line())
     _show(planned)
     typer.echo(f"rig: {folder / 'planned.toml'}")

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from simharness.outputs.study.curves import Loss
     from simharness.study.study_folder import Results
 
-INTERRUPTED = 130
 _LISTED = 10  # failed trials that are listed
 _SHORT_KEY = 16  # letters of a factor that stay on one line
 _IDENTITIES = ("hota", "idf1", "id_switches", "switches_per_minute")
@@ -140,9 +139,6 @@ def _stopping() -> Iterator[None]:
 
     try:
         yield
-    except KeyboardInterrupt as interruption:
-        _write(str(interruption) or "interrupted", err=True)
-        raise typer.Exit(INTERRUPTED) from None
     except RunError as error:
         Console(stderr=True).print(Text.assemble(("the study stopped: ", "bold red"), str(error)), soft_wrap=True)
         raise typer.Exit(FAILED) from None

@@ -1,16 +1,20 @@
 """Run of a suite: every trial is measured beside the reference kernel, and compared with the baseline."""
 
+import contextlib
 import hashlib
 import json
+import shutil
+import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from numba.core.registry import cpu_target
 from threadpoolctl import threadpool_limits
 
-from mvpose.commands.progress import Reporter, Silence
+from mvpose.commands.progress import Reporter
+from mvpose.kernel_lock import locked
 from mvpose.presets import TRACKING, without_repair
 from simharness.gate.baseline import FRAMES, TIME, Measurement, read_baseline
 from simharness.gate.compare import Comparison, FailedCase, GateResult, compare
@@ -21,9 +25,10 @@ from simharness.runtime.version import code_version
 from simharness.scenario.load import Study
 from simharness.scenario.sections.method_section import MethodSection
 from simharness.scenario.sections.scenario import Scenario
-from simharness.study.scheduler import TrialSuccess, Unit, run_units
 from simharness.study.stored_trial import StoredTrial, TrialOutput
-from simharness.trial.identity import trial_identity
+from simharness.study.study_folder import plan
+from simharness.study.study_run import run_planned, stored_entries
+from simharness.study.trial_store import Store
 from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.estimators import estimators_of
 from simharness.trial.stages.networks import ReadFrames
@@ -45,36 +50,60 @@ class SuiteRun:
         return Measurement(study.name, fingerprint(study), code_version(), processor(), self.scores)
 
 
-def run_suite(study: Study, *, workers: int = 1, reporter: Reporter | None = None) -> SuiteRun:
-    """Run all trials of a study. Nothing is stored, because times of an earlier run cannot be compared.
+def run_suite(
+    study: Study, *, workers: int = 1, reporter: Reporter | None = None, store: Path | None = None
+) -> SuiteRun:
+    """Run all trials of a study.
 
     Args:
         study: the suite.
         workers: processes that share the trials.
         reporter: receiver of progress, one step for each trial.
+        store: folder of trials that an interrupted run has finished, from :func:`kept_trials`; nothing is kept without.
 
     Raises:
         ValueError: fewer than one worker, or a user-defined estimator that cannot be loaded.
+        Interrupted: Ctrl-C. Finished trials stay in the store.
     """
     estimators_of(study.base.method)  # report errors now rather than at every trial
-    units: dict[str, Unit] = {}
-    places: dict[str, list[tuple[str, int]]] = {}  # several settings may resolve to the same scenario
-    for setting, seed in settings_at_seeds(study):
-        scenario = study.at(setting, seed)
-        unit = Unit(trial_identity(scenario), scenario, study.variants)
-        units[unit.trial] = unit
-        places.setdefault(unit.trial, []).append((setting_name(setting, study), seed))
-    scores: dict[TrialKey, Scores] = {}
-    failed: list[FailedCase] = []
-    with (reporter or Silence()).stage("check", study.trials) as advance:
-        for result in run_units(units.values(), measure_beside_reference, workers=workers):
-            for case, seed in places[result.unit.trial]:
-                if isinstance(result, TrialSuccess):
-                    scores |= {TrialKey(case, seed, name): each.scores for name, each in result.output.results.items()}
-                else:
-                    failed.append(FailedCase(case, seed, result.error))
-                advance(1, failed=int(not isinstance(result, TrialSuccess)))
+    planned = plan(study)
+    with tempfile.TemporaryDirectory() as spare:
+        opened = Store(store or Path(spare) / "trials")
+        outcome = run_planned(planned, opened, workers=workers, reporter=reporter, measure=measure_beside_reference)
+        errors = {each.trial: each.error for each in outcome.failed}
+        scores = {
+            TrialKey(setting_name(each.setting, study), each.seed, entry.variant): entry.result.scores
+            for each in planned
+            if each.trial not in errors
+            for entry in stored_entries(opened, each)
+        }
+    failed = [
+        FailedCase(setting_name(each.setting, study), each.seed, errors[each.trial])
+        for each in planned
+        if each.trial in errors
+    ]
     return SuiteRun(scores, tuple(failed))
+
+
+@contextlib.contextmanager
+def kept_trials(study: Study, baseline: Path) -> Iterator[Path | None]:
+    """Give the store of a suite's finished trials, which stays if the run of the suite ends early, and only then.
+
+    It lies beside the baseline. The next run continues, unless suite, code or processor have changed: times are
+    relative to a reference that is measured with each trial, so those of one machine can be compared.
+
+    Yields:
+        The folder; None where it cannot be written, or another run of the suite is using it.
+    """
+    place = baseline.parent / f".{baseline.name}.trials"
+    with contextlib.suppress(OSError):
+        place.mkdir(exist_ok=True)
+        (place / ".gitignore").write_text("*\n")
+    with locked(place / "lock", patience=0.0) as alone:
+        made_by = hashlib.blake2b(f"{fingerprint(study)} {code_version()} {processor()}".encode(), digest_size=8)
+        yield place / made_by.hexdigest() if alone else None
+        if alone:
+            shutil.rmtree(place)
 
 
 def measure_beside_reference(
@@ -85,7 +114,7 @@ def measure_beside_reference(
     Args:
         scenario: resolved, with its seed.
         variants: variants of the method.
-        stored: not used, because stored times cannot be compared.
+        stored: not used: all variants are timed on detections of this run.
 
     Raises:
         ValueError: the scenario cannot be built.
@@ -168,6 +197,7 @@ def check(
     workers: int = 1,
     accept_better: bool = False,
     reporter: Reporter | None = None,
+    store: Path | None = None,
 ) -> GateResult:
     """Run a suite and compare it with its baseline.
 
@@ -177,9 +207,10 @@ def check(
         workers: processes that share the trials.
         accept_better: whether unexpected improvements fail nothing.
         reporter: receiver of progress, one step for each trial.
+        store: as :func:`run_suite`.
     """
     start = time.perf_counter()
-    done = run_suite(study, workers=workers, reporter=reporter)
+    done = run_suite(study, workers=workers, reporter=reporter, store=store)
     comparison = compare(baseline, done.measurement(study), study.gate)
     worst = _worst_trial(done, comparison, study.variants[0])
     return GateResult(

@@ -106,11 +106,11 @@ def run_study(
     _check_place(folder, store)
     estimators_of(study.base.method)  # report errors now rather than at every trial
     opened, planned = Store(store), plan(study)
-    tally = _run(planned, opened, workers=workers, scheduler=scheduler, reporter=reporter, measure=measure)
+    tally = run_planned(planned, opened, workers=workers, scheduler=scheduler, reporter=reporter, measure=measure)
     order = {id(setting): index for index, setting in enumerate(study.settings)}
     ordered = sorted(planned, key=lambda each: (order[id(each.setting)], each.seed))
     failed = {each.trial for each in tally.failed}
-    rows = [(each, entry) for each in ordered for entry in _entries(opened, each, failed=each.trial in failed)]
+    rows = [(each, entry) for each in ordered for entry in stored_entries(opened, each, failed=each.trial in failed)]
     info = _info(study, tally, command)
     try:
         with atomic_folder(folder, _STUDY) as partial:
@@ -153,19 +153,19 @@ def run_shard(
         raise ValueError(f"shard must be i/n with i from 1 to n, got {part}/{parts}")
     estimators_of(study.base.method)
     planned = list(_unique(plan(study)))[part - 1 :: parts]
-    return _run(planned, Store(store), workers=workers, scheduler=scheduler, reporter=reporter, measure=measure)
+    return run_planned(planned, Store(store), workers=workers, scheduler=scheduler, reporter=reporter, measure=measure)
 
 
-def _run(
+def run_planned(
     planned: Sequence[PlannedTrial],
     store: Store,
     *,
-    workers: int,
-    scheduler: str | None,
-    reporter: Reporter | None,
-    measure: Measure,
+    workers: int = 1,
+    scheduler: str | None = None,
+    reporter: Reporter | None = None,
+    measure: Measure = measure_trial,
 ) -> StudyOutcome:
-    """Measure the trials that are missing or outdated in the store."""
+    """Measure the trials that are missing or outdated in the store; the arguments and errors of :func:`run_study`."""
     start = perf_counter()
     unique = {each.trial: each for each in _unique(planned)}
     units = [unit for each in unique.values() if (unit := _unit(store, each)).variants]
@@ -258,7 +258,7 @@ def _failed(planned: PlannedTrial, failure: TrialFailure) -> FailedTrial:
     )
 
 
-def _entries(store: Store, planned: PlannedTrial, *, failed: bool) -> Iterator[Entry]:
+def stored_entries(store: Store, planned: PlannedTrial, *, failed: bool = False) -> Iterator[Entry]:
     """Yield the stored entries of a trial; entries may be missing only if the trial failed.
 
     Raises:

@@ -35,6 +35,7 @@ from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import parse_json, read_bytes, read_json
 from mvpose.files.message_text import shown
 from simharness.runtime.parquet_tables import table_of
+from simharness.scoring.catalogue import SCORES
 from simharness.trial.identity import code
 from simharness.trial.variant_result import VariantResult
 
@@ -115,7 +116,7 @@ class Store:
 
     def has(self, identity: str) -> bool:
         """Return whether an entry exists and is undamaged."""
-        return self._valid_content(identity) is not None
+        return self.read(identity) is not None
 
     def state(self, identity: str) -> EntryState:
         """Return whether an entry is current, has to be scored again, or is missing."""
@@ -124,14 +125,7 @@ class Store:
 
     def read(self, identity: str) -> Entry | None:
         """Return an entry; None where it is missing or damaged."""
-        content = self._valid_content(identity)
-        if content is None:
-            return None
-        try:
-            return _unpacked(content)
-        except (ValueError, LookupError, TypeError):
-            self.damaged.add(identity)
-            return None
+        return self._read(identity)[1]
 
     def read_detections(self, trial: str) -> bytes:
         """Return the archive of a trial's detections; empty where it is missing or damaged."""
@@ -186,12 +180,11 @@ class Store:
         Raises:
             StoreError: see :meth:`write`.
         """
-        content = other._valid_content(identity)
-        if content is None:
+        content, entry = other._read(identity)
+        if entry is None:
             return False
-        trial = _unpacked(content).trial
-        if not self._detections_path(trial).exists() and (detections := other.read_detections(trial)):
-            self.write_detections(trial, detections)
+        if not self._detections_path(entry.trial).exists() and (detections := other.read_detections(entry.trial)):
+            self.write_detections(entry.trial, detections)
         self._write(self.file_of(identity), content)
         return True
 
@@ -210,20 +203,16 @@ class Store:
     def _failure_path(self, identity: str) -> Path:
         return self.file_of(identity).with_suffix(".failed.json")
 
-    def _valid_content(self, identity: str) -> bytes | None:
-        """Return the bytes of an entry if all checksums are right and the identity matches; else None."""
-        file = self.file_of(identity)
+    def _read(self, identity: str) -> tuple[bytes, Entry | None]:
+        """Return the bytes of an entry and the entry; None where it is missing or damaged."""
+        file, content = self.file_of(identity), b""
         try:
             content = read_bytes(file, what=_WHAT)
-            parts = members_of(content, only=_PARTS)
-            if parts.keys() != set(_PARTS) or parse_json(parts["trial.json"])["entry"] != identity:
-                raise ValueError("another entry")
+            return content, _unpacked(content, identity)
         except (ValueError, LookupError, TypeError):
-            if not file.exists():
-                return None
-            self.damaged.add(identity)
-            return None
-        return content
+            if file.exists():
+                self.damaged.add(identity)
+            return content, None
 
     def _write(self, path: Path, content: bytes) -> None:
         try:
@@ -341,11 +330,17 @@ def _packed(identity: str, entry: Entry) -> bytes:
     return buffer.getvalue()
 
 
-def _unpacked(content: bytes) -> Entry:
+def _unpacked(content: bytes, identity: str) -> Entry:
+    """Return the entry in a file.
+
+    Raises:
+        ValueError, LookupError, TypeError: a part is missing or damaged, or it is another entry, or it lacks scores
+            that the code which made it gives.
+    """
     parts = members_of(content, only=_PARTS)
     about = parse_json(parts["trial.json"])
     tables = {name: table_of(parts[f"{name}.parquet"]) for name in _TABLES}
-    return Entry(
+    entry = Entry(
         about["trial"],
         about["variant"],
         VariantResult(scores=about["scores"], **tables),
@@ -354,6 +349,11 @@ def _unpacked(content: bytes) -> Entry:
         about["scores_code"],
         about["failures_code"],
     )
+    if about["entry"] != identity:
+        raise ValueError(f"the entry {about['entry']}")
+    if entry.state is EntryState.CURRENT and (missing := SCORES.keys() - entry.result.scores):
+        raise ValueError(f"no score {min(missing)}")
+    return entry
 
 
 def _check_apart(source: Path, into: Path) -> None:

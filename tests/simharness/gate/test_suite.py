@@ -4,20 +4,25 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import polars as pl
 import pytest
 from suites import SMALL, remember_scenes
 from trials import Recorder
+from typer.testing import CliRunner
 
 from mvpose.commands.errors import RunError
 from mvpose.presets import TRACKING
+from simharness.cli import app
 from simharness.gate import frame_times, suite
 from simharness.gate.baseline import FRAMES, GATED, KEPT, TIME
 from simharness.gate.frame_times import reference_work, relative_times
 from simharness.gate.score_tests import least_corrected_p
-from simharness.gate.suite import baseline_of, fingerprint, run_suite
+from simharness.gate.suite import baseline_of, fingerprint, kept_trials, run_suite
 from simharness.scenario.load import load_study
 from simharness.scoring.catalogue import SCORES
+from simharness.study.stored_trial import TrialOutput
 from simharness.trial.run_trial import run_trial
+from simharness.trial.variant_result import VariantResult
 
 
 @pytest.fixture
@@ -193,3 +198,70 @@ def test_two_settings_of_one_scenario_share_its_result(study, monkeypatch):
         (case, seed) for case in ("phantoms", "again") for seed in (0, 1)
     }
     assert set(measured) == {0, 1}
+
+
+class Unfinished:
+    """Made-up measurements of trials; Ctrl-C comes before a given one.
+
+    Attributes:
+        measured: seeds of the trials, in order.
+        last: number of measurements before Ctrl-C.
+    """
+
+    def __init__(self, monkeypatch):
+        self.measured, self.last = [], 99
+        monkeypatch.setattr(suite, "measure_beside_reference", self)
+
+    def __call__(self, scenario, variants, stored=None):
+        if len(self.measured) == self.last:
+            raise KeyboardInterrupt
+        self.measured.append(scenario.seed)
+        scores = {**dict.fromkeys(SCORES, float(scenario.seed)), FRAMES: 4.0, TIME: 1.5}
+        table = pl.DataFrame({"frame": [0]})
+        return TrialOutput({name: VariantResult(scores, table, table, table) for name in variants})
+
+    def update(self, path, last=99):
+        """Return exit code, last line on stderr and number of measurements of ``check --update-baseline``."""
+        self.measured, self.last = [], last
+        arguments = ["check", str(path), "--baseline", str(path.with_name("small.json")), "--update-baseline"]
+        result = CliRunner().invoke(app, arguments)
+        return result.exit_code, ([""] + result.stderr.splitlines())[-1], len(self.measured)
+
+
+@pytest.fixture
+def unfinished(tmp_path, monkeypatch):
+    (tmp_path / "small.toml").write_text(SMALL)
+    return Unfinished(monkeypatch)
+
+
+class TestInterruption:
+    def test_finished_trials_are_kept_until_the_suite_has_ended(self, tmp_path, unfinished):
+        path, trials = tmp_path / "small.toml", load_study(tmp_path / "small.toml").trials
+        stored = f"interrupted: 5 of {trials} trials are stored; the same command continues"
+        assert unfinished.update(path, last=5) == (130, stored, 5)
+        assert not (tmp_path / "small.json").exists()
+        assert (tmp_path / ".small.json.trials" / ".gitignore").read_text() == "*\n"
+        assert unfinished.update(path) == (0, "", trials - 5)
+        continued = (tmp_path / "small.json").read_text()
+        assert sorted(each.name for each in tmp_path.iterdir()) == ["small.json", "small.toml"]
+        assert unfinished.update(path) == (0, "", trials)  # times are measured anew
+        assert (tmp_path / "small.json").read_text() == continued
+
+    @pytest.mark.parametrize("name", ["code_version", "processor", "fingerprint"])
+    def test_a_trial_of_other_code_or_of_another_machine_is_run_again(self, tmp_path, unfinished, monkeypatch, name):
+        path = tmp_path / "small.toml"
+        assert unfinished.update(path, last=5)[0] == 130
+        monkeypatch.setattr(suite, name, lambda *study: "other")
+        assert unfinished.update(path) == (0, "", load_study(path).trials)
+
+    def test_two_runs_at_once_share_nothing(self, study, tmp_path):
+        with kept_trials(study, tmp_path / "small.json") as first:
+            first.mkdir()
+            with kept_trials(study, tmp_path / "small.json") as second:
+                assert second is None
+            assert first.is_dir()
+        assert not first.exists()
+
+    def test_where_nothing_can_be_written_nothing_is_kept(self, study, tmp_path):
+        with kept_trials(study, tmp_path / "missing" / "small.json") as store:
+            assert store is None

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simharness.study.study_folder import plan
-from simharness.study.trial_store import Entry, Store, StoreError
+from simharness.study.trial_store import Entry, EntryState, Store, StoreError, merge
 
 ID, OTHER = "ab" * 16, "ac" * 16
 
@@ -103,6 +103,19 @@ class TestDamage:
         store = broken(content, OTHER)
         assert not store.has(OTHER)
         assert store.damaged == {OTHER}
+
+    @pytest.mark.parametrize("lost", ["pcp", "hota"])
+    def test_an_entry_that_lacks_a_score_is_noticed(self, tmp_path, entry, lost):
+        """The same of another code is whole: it has the scores that this code gave."""
+        scores = {key: score for key, score in entry.result.scores.items() if key != lost}
+        lacking = dataclasses.replace(entry, result=dataclasses.replace(entry.result, scores=scores))
+        store = Store(tmp_path / "store")
+        store.write(ID, lacking)
+        store.write(OTHER, dataclasses.replace(lacking, scores_code="other"))
+        assert (store.read(ID), store.damaged) == (None, {ID})
+        assert (store.state(ID), store.state(OTHER)) == (EntryState.MISSING, EntryState.OUTDATED)
+        merged = merge([tmp_path / "store"], tmp_path / "merged")
+        assert (merged.copied, merged.damaged) == (1, (store.file_of(ID),))
 
     def test_a_damaged_entry_can_be_written_again(self, content, broken, entry):
         store = broken(content[:-1])
