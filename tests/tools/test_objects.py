@@ -1,7 +1,12 @@
-"""What ships as an object can be made again."""
+"""What ships as an object or as a picture of a finish can be made again."""
+
+import cv2
+import numpy as np
 
 from simharness.world.scene.objects.object_files import ASSETS
+from simharness.world.scene.rooms.textures import FINISHES
 from tools.objects.__main__ import write_objects
+from tools.objects.finishes import write_finishes
 
 
 def test_the_shipped_objects_are_those_that_the_tool_writes(tmp_path):
@@ -11,3 +16,12 @@ def test_the_shipped_objects_are_those_that_the_tool_writes(tmp_path):
     assert [name for name in made if made[name] != shipped[name]] == []
     pictures = [{file.name for file in (folder / "textures").glob("*.png")} for folder in (tmp_path, ASSETS)]
     assert pictures[0] == pictures[1]
+
+
+def test_the_shipped_finishes_are_those_that_the_tool_draws(tmp_path):
+    write_finishes(tmp_path)
+    names = [sorted(file.name for file in folder.iterdir()) for folder in (tmp_path, FINISHES)]
+    assert names[0] == names[1]
+    for name in names[0]:
+        made, shipped = (cv2.imread(str(folder / name)).astype(float) for folder in (tmp_path, FINISHES))
+        assert np.abs(made - shipped).mean() < 2.0  # versions of the codec may differ

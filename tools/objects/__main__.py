@@ -14,6 +14,7 @@ from simharness.types.random_streams import stream
 from simharness.world.scene.objects.materials import draw_sheet
 from tools.objects import clutter, decoys, gym, home, office, park, plants, shop, stage, ward
 from tools.objects.builder import ObjectBuilder
+from tools.objects.finishes import write_finishes
 
 Draw = Callable[[ObjectBuilder, np.random.Generator], None]
 
@@ -126,4 +127,6 @@ def _write_picture(path: Path, picture: np.ndarray) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
-    write_objects(parser.parse_args().folder)
+    given = parser.parse_args().folder
+    write_objects(given)
+    write_finishes(given.parent / "finishes")
