@@ -79,9 +79,9 @@ def report(
             typer.echo(f"recording: {rerun}")
             return
         from mvpose.commands.progress import reporter
-        from simharness.outputs.study.curves import factors_by_case
-        from simharness.outputs.study.page import THRESHOLDS, check_thresholds, write_report
+        from simharness.outputs.study.page import check_thresholds, write_report
         from simharness.outputs.study.worst_frames import SHOWN
+        from simharness.study.factors import THRESHOLDS, factors_by_case
 
         check_thresholds(thresholds)
         if thresholds and not any(each.numeric for swept in factors_by_case(results).values() for each in swept):

@@ -159,9 +159,9 @@ def _tables(results: "Results") -> "list[ScoreTable]":
     """
     import polars as pl
 
-    from simharness.outputs.study.curves import factors_by_case
     from simharness.outputs.study.tables import tracks_people
     from simharness.scoring.catalogue import HEADLINE
+    from simharness.study.factors import factors_by_case
 
     tracked = results.trials.filter(pl.col("hota").is_not_null().any().over("variant"))
     if any(factors_by_case(results).values()):
@@ -178,10 +178,11 @@ def _tables(results: "Results") -> "list[ScoreTable]":
 def _losses(results: "Results", score: str) -> "ScoreTable":
     """Return what every factor costs: the score at its best and worst value, and where five points are lost."""
     from simharness.cli.score_tables import ScoreTable
-    from simharness.outputs.study.curves import LOST, factors_by_case, losses
+    from simharness.outputs.study.curves import LOST, losses
     from simharness.outputs.study.plots import short
     from simharness.runtime.number_text import fixed
     from simharness.scoring.catalogue import SCORES
+    from simharness.study.factors import factors_by_case
 
     info = SCORES[score]
     by_case = factors_by_case(results)

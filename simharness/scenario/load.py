@@ -15,6 +15,7 @@ Beside the keys of a scenario, a scenario file may have::
     detector.phantoms.rate = { from = 0.0, to = 2.0, steps = 5 }        # scale = "log" for a geometric range
     detector.profile = ["poor", "typical"]
     one_at_a_time = true              # instead: the base, and each key alone
+    refine = 3                        # a run adds up to three values to each key, where scores break
 
     [[sweep.paired]]                  # keys that are varied together
     cameras.count = [3, 5]
@@ -36,7 +37,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,7 @@ from simharness.runtime.version import code_version
 from simharness.scenario.checks import Checker, refuse
 from simharness.scenario.document import Document, read_document
 from simharness.scenario.file_model import MOST_TRIALS
-from simharness.scenario.layers import Key, Origins, merge, set_origin
+from simharness.scenario.layers import Key, Origins, merge, nested, set_origin
 from simharness.scenario.presets import Presets
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.scenario.sections.method_section import wrong_variants
@@ -103,6 +104,8 @@ class Study:
     """The scenario without sweep and cases, at the first seed."""
     data: Mapping[str, Any] = field(default_factory=dict)
     """Keys of the file, of its bases and of the command line, before presets and sweep are resolved."""
+    plan: "ScenarioPlan | None" = None
+    """The file from which it was loaded."""
 
     @property
     def trials(self) -> int:
@@ -112,6 +115,22 @@ class Study:
     def at(self, setting: Setting, seed: int) -> Scenario:
         """Return the scenario of a trial."""
         return setting.scenario.model_copy(update={"seed": seed})
+
+    def with_values(self, added: Mapping[str, Sequence[Value]]) -> "Study":
+        """Return the study with more values of swept keys; its file then has all values, and is not refined.
+
+        Raises:
+            ScenarioError: a setting is not valid.
+        """
+        if not added or self.plan is None:
+            return self
+        plan = replace(self.plan, sweep=self.plan.sweep.with_values(added))
+        data = merge(dict(self.data), {"sweep": {"refine": 0}})
+        for axis in plan.sweep.axes:
+            if axis.keys[0] in added:
+                values = [value for (value,) in axis.values]
+                data = merge(data, nested(("sweep", *axis.keys[0].split(".")), values))
+        return replace(self, settings=tuple(_settings(plan)), data=data, plan=plan)
 
 
 @dataclass(frozen=True)
@@ -240,6 +259,7 @@ def load_study(
         path=Path(path),
         base=plan.base,
         data=plan.document.data,
+        plan=plan,
     )
 
 

@@ -52,6 +52,9 @@ def _lines(plan: ScenarioPlan, note: str) -> list[str]:
     lines += _table(rows)
     if plan.sweep.axes:
         how = "the base, and one key at a time" if plan.sweep.one_at_a_time else "all combinations of"
+        how += (
+            f", up to {_count(plan.sweep.refine, 'more value')} of each where scores break" if plan.sweep.refine else ""
+        )
         lines += ["", f"sweep: {how}", *_table([row for axis in plan.sweep.axes for row in _axis(axis)])]
     if plan.cases[0].name:
         lines += ["", "cases", *_table([(case.name, _changes(case.changes)) for case in plan.cases])]

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema
 
 from simharness.scenario.file_model import ScenarioFile
-from simharness.scenario.sweep import NOT_VARIED
+from simharness.scenario.sweep import MOST_ADDED, NOT_VARIED
 
 Schema = dict[str, Any]
 
@@ -44,7 +44,9 @@ def scenario_schema() -> Schema:
     definitions["Paired"] = _table(keys)
     one_at_a_time = {"type": "boolean", "description": "the base, and each key alone, instead of all combinations"}
     paired = {"type": "array", "items": {"$ref": f"{_DEFS}Paired"}, "description": "keys that are varied together"}
-    properties["sweep"] |= _table({**keys, "one_at_a_time": one_at_a_time, "paired": paired})
+    about = "values that a run adds at most to each key, between those where scores break"
+    refine = {"type": "integer", "minimum": 0, "maximum": MOST_ADDED, "description": about}
+    properties["sweep"] |= _table({**keys, "one_at_a_time": one_at_a_time, "refine": refine, "paired": paired})
     properties["cases"]["additionalProperties"] = _table(case)
     properties["extends"]["minLength"] = properties["variants"]["minItems"] = 1
     del schema["required"]

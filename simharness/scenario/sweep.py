@@ -4,7 +4,7 @@ import itertools
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any
 
@@ -16,6 +16,9 @@ from simharness.scenario.sections.section import Section
 from simharness.scenario.validation_messages import explain, is_key, origin_of, section_at
 
 Value = str | int | float | bool | tuple[Any, ...] | None
+
+MOST_ADDED = 20
+"""Largest number of values by which each key of a sweep may be refined."""
 
 _MOST_STEPS = 10_000
 _HOW = 'write a list, [2, 3, 5], or a range, { from = 0.0, to = 2.0, steps = 5 }, geometric with scale = "log"'
@@ -62,6 +65,20 @@ class Sweep:
     """Whether the settings are the base and each axis alone; else all combinations."""
     origins: Mapping[str, str] = field(default_factory=dict)
     """Origin of the values of each dotted key, for messages."""
+    refine: int = 0
+    """Largest number of values that a run adds to each key where scores break."""
+
+    def with_values(self, added: Mapping[str, Sequence[Value]]) -> "Sweep":
+        """Return the sweep with more values of keys that are varied alone, ascending."""
+        return replace(
+            self,
+            axes=tuple(
+                replace(axis, values=tuple(sorted((*axis.values, *((value,) for value in new)))))  # type: ignore[type-var]
+                if (new := added.get(axis.keys[0], ()))
+                else axis
+                for axis in self.axes
+            ),
+        )
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -110,6 +127,10 @@ class SweepReader:
         one_at_a_time = section.pop("one_at_a_time", False)
         if not isinstance(one_at_a_time, bool):
             self._refuse(("sweep", "one_at_a_time"), f"one_at_a_time: expected true, got {_shown(one_at_a_time)}")
+        refine = section.pop("refine", 0)
+        if isinstance(refine, bool) or not isinstance(refine, int) or not 0 <= refine <= MOST_ADDED:
+            self._refuse(("sweep", "refine"), f"refine: expected 0 to {MOST_ADDED} values, got {_shown(refine)}")
+            refine = 0
         paired = section.pop("paired", [])
         axes = [Axis((dotted,), tuple((value,) for value in values)) for dotted, values in self._varied(section)]
         for axis in axes:
@@ -123,7 +144,7 @@ class SweepReader:
             if clash := next((other for other in keys[:index] if layers.overlap(key, other)), None):
                 also = "" if clash == key else f", because {'.'.join(clash)} is swept"
                 self._refuse(("sweep", *key), f"{'.'.join(key)} is swept twice{also}; remove one of them")
-        return Sweep(tuple(axes), one_at_a_time is True, self._swept)
+        return Sweep(tuple(axes), one_at_a_time is True, self._swept, refine)
 
     def cases(self, section: Any, sweep: Sweep) -> dict[str, dict[str, Any]]:
         """Return the changes of every case of [cases]."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -12,6 +12,7 @@ from mvpose.commands.progress import Reporter, Silence
 from mvpose.files.atomic_files import atomic_folder
 from simharness.scenario.load import Study, Value
 from simharness.scenario.sections.scenario import Scenario
+from simharness.study.factors import refined_values
 from simharness.study.scheduler import Measure, TrialFailure, TrialSuccess, Unit, error_text, run_units
 from simharness.study.stored_trial import StoredTrial
 from simharness.study.stored_trial import run_stored_trial as measure_trial
@@ -81,6 +82,9 @@ def run_study(
 ) -> Results:
     """Run the unfinished trials of a study and write its results.
 
+    Where its sweep is refined, values are added between those where scores break, and run, until their number is
+    reached. Which ones follows from the trials alone, so that the same command continues an interrupted refinement.
+
     Args:
         study: the study.
         out: parent of the result folder, which has the name of the study. The folder appears when it is complete and
@@ -105,12 +109,32 @@ def run_study(
     folder, store = out / study.name, out / "store" if store is None else store
     _check_place(folder, store)
     estimators_of(study.base.method)  # report errors now rather than at every trial
-    opened, planned = Store(store), plan(study)
-    tally = run_planned(planned, opened, workers=workers, scheduler=scheduler, reporter=reporter, measure=measure)
-    order = {id(setting): index for index, setting in enumerate(study.settings)}
-    ordered = sorted(planned, key=lambda each: (order[id(each.setting)], each.seed))
-    failed = {each.trial for each in tally.failed}
-    rows = [(each, entry) for each in ordered for entry in stored_entries(opened, each, failed=each.trial in failed)]
+    opened, swept, done = Store(store), study, list[StudyOutcome]()
+    added: dict[str, tuple[float, ...]] = {}
+    while True:
+        planned = plan(study)
+        done.append(
+            run_planned(planned, opened, workers=workers, scheduler=scheduler, reporter=reporter, measure=measure)
+        )
+        order = {id(setting): index for index, setting in enumerate(study.settings)}
+        ordered = sorted(planned, key=lambda each: (order[id(each.setting)], each.seed))
+        failed = {each.trial for each in done[-1].failed}
+        rows = [
+            (each, entry) for each in ordered for entry in stored_entries(opened, each, failed=each.trial in failed)
+        ]
+        new = _next_values(study, rows, added, folder)
+        if not new:
+            break
+        added = {key: (*added.get(key, ()), *new.get(key, ())) for key in {**added, **new}}
+        study = swept.with_values(added)
+    run = sum(each.run for each in done)
+    tally = replace(
+        done[-1],
+        kept=done[-1].trials - run - len(failed),
+        run=run,
+        damaged=done[0].damaged,
+        seconds=sum(each.seconds for each in done),
+    )
     info = _info(study, tally, command)
     try:
         with atomic_folder(folder, _STUDY) as partial:
@@ -121,6 +145,19 @@ def run_study(
             "same command again"
         ) from error
     return read_study(folder)
+
+
+def _next_values(
+    study: Study, rows: Sequence[tuple[PlannedTrial, Entry]], added: Mapping[str, Sequence[float]], folder: Path
+) -> dict[str, tuple[float, ...]]:
+    """Return the values to add to a study that has these results and was refined by some values already."""
+    most = study.plan.sweep.refine if study.plan else 0
+    if not most or not rows:
+        return {}
+    found = tables(rows, study.factors)
+    info = {"factors": study.factors, "one_at_a_time": study.one_at_a_time, "variants": study.variants}
+    left = {key: most - len(added.get(key, ())) for key in study.factors}
+    return refined_values(Results(info, found.trials, found.frames, found.people, found.failures, folder), left)
 
 
 def run_shard(

@@ -17,17 +17,7 @@ from mvpose.commands.progress import duration
 from mvpose.report.svg_plots import plot_sheet
 from mvpose.report.tables import markdown_table
 from simharness.outputs.study import plots, tables
-from simharness.outputs.study.curves import (
-    Factor,
-    axis_label,
-    axis_names,
-    cases_of,
-    factor_breaking_points,
-    factors,
-    factors_by_case,
-    panels,
-)
-from simharness.outputs.study.page import THRESHOLDS
+from simharness.outputs.study.curves import axis_label, axis_names, panels
 from simharness.outputs.study.plots import mean_over, short
 from simharness.outputs.study.tables import OVER_TIME, failure_rates
 from simharness.runtime.number_text import fixed
@@ -35,6 +25,7 @@ from simharness.scoring.catalogue import AP_MM, SCORES, ScoreInfo
 from simharness.scoring.failure_classes import FailureKind
 from simharness.scoring.stage_blame import Stage
 from simharness.statistics.intervals import Interval, mean_interval
+from simharness.study.factors import THRESHOLDS, Factor, cases_of, factor_breaking_points, factors, factors_by_case
 from simharness.study.study_folder import Results
 from simharness.trial.identity import PROVENANCE, provenance_sentence
 

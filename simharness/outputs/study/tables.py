@@ -11,7 +11,6 @@ import polars as pl
 
 from mvpose.arrays import Floats
 from mvpose.report.tables import NOTHING, Cell
-from simharness.outputs.study.curves import FactorBreakingPoint
 from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES, ScoreInfo
 from simharness.scoring.failure_classes import DISPLACED, FailureKind
@@ -19,6 +18,7 @@ from simharness.statistics.intervals import Interval, mean_interval
 from simharness.statistics.paired_tests import holm, paired
 from simharness.statistics.resampling import pseudo_values
 from simharness.statistics.studentized import unseen_share
+from simharness.study.factors import FactorBreakingPoint
 from simharness.study.study_folder import Results
 
 COLUMNS: tuple[ScoreInfo, ...] = tuple(

@@ -5,7 +5,8 @@ import polars as pl
 import pytest
 from made_study import make_study
 
-from simharness.outputs.study.curves import factor_breaking_points, factors, factors_by_case, grid, panels
+from simharness.outputs.study.curves import grid, panels
+from simharness.study.factors import factor_breaking_points, factors, factors_by_case
 
 VARIANTS = ("full", "fast")
 SEEDS_ADD = np.mean([0.0, 0.5, 1.0, 0.0])  # mean offset of PCP over four seeds

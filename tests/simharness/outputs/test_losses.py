@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_study import make_study
 
-from simharness.outputs.study.curves import factors, finding, losses
+from simharness.outputs.study.curves import finding, losses
 from simharness.outputs.study.plots import spread_apart
+from simharness.study.factors import factors
 
 
 def of(folder, **options):
