@@ -6,7 +6,7 @@ points, and this is repeated. No size is absolute, so that a child is fitted as 
 belong to the skin here, because they are what is seen and touched.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats, Integers
 from mvpose.kernels import njit
+from simharness.world.humans.anatomy import ANATOMY
 from simharness.world.humans.body import Body
 
 _POINTS = 4000  # points on the skin, spread evenly over its area
@@ -49,43 +50,14 @@ class Capsule:
 
 @dataclass(frozen=True)
 class _Patch:
-    """Region of skin that moves rigidly, and the initial layout of its capsules."""
+    """Region of skin that moves rigidly, and the initial layout of its capsules: see ``anatomy.toml``."""
 
     bone: str
-    """Bone that carries the capsules."""
-    bones: tuple[str, ...]
-    """Bones that move this skin; none of them turns relative to ``bone``."""
+    bones: Sequence[str]
     count: int
-    """Number of capsules."""
     layout: Literal["stacked", "chained", "beside"]
-    """"stacked": one above the other, each along the wider axis of its slice; "chained": end to end between the heads
-    of two bones; "beside": next to each other, all parallel to the line between the two heads."""
-    ends: tuple[str, str] = ("", "")
-    """The two bones whose heads give the line of the layout."""
-    span: tuple[float, float] = (0.0, 1.0)
-    """Start and end of a chain, as fractions of that line."""
-
-
-_TRUNK = (
-    _Patch("Hips", ("Hips", "LHipJoint", "RHipJoint"), 1, "stacked"),
-    _Patch("LowerBack", ("LowerBack", "Spine"), 4, "stacked"),
-    _Patch("Spine1", ("Spine1",), 3, "stacked"),
-    _Patch("Neck", ("Neck", "Neck1"), 1, "chained", ("Neck", "Head")),
-    _Patch("Head", ("Head",), 5, "stacked"),
-)
-# Names without "Left" or "Right". A twist bone starts at the head of its parent and moves the far half of the limb.
-_LIMBS = (
-    _Patch("Shoulder", ("Shoulder",), 1, "chained", ("Shoulder", "Arm")),
-    _Patch("Arm", ("Arm",), 1, "chained", ("Arm", "ForeArm"), (0.0, 0.5)),
-    _Patch("ArmTwist", ("ArmTwist",), 1, "chained", ("Arm", "ForeArm"), (0.5, 1.0)),
-    _Patch("ForeArm", ("ForeArm",), 1, "chained", ("ForeArm", "Hand"), (0.0, 0.5)),
-    _Patch("ForeArmTwist", ("ForeArmTwist",), 1, "chained", ("ForeArm", "Hand"), (0.5, 1.0)),
-    _Patch("Hand", ("Hand", "FingerBase", "HandFinger1"), 2, "beside", ("Hand", "HandFinger1")),
-    _Patch("Hand", ("Thumb",), 1, "beside", ("Thumb", "FingerBase")),
-    _Patch("UpLeg", ("UpLeg",), 3, "chained", ("UpLeg", "Leg")),
-    _Patch("Leg", ("Leg",), 2, "chained", ("Leg", "Foot")),
-    _Patch("Foot", ("Foot", "ToeBase"), 3, "beside", ("Foot", "ToeBase")),
-)
+    ends: Sequence[str] = ("", "")
+    span: Sequence[float] = (0.0, 1.0)
 
 
 def _sided(name: str, side: str) -> str:
@@ -93,9 +65,9 @@ def _sided(name: str, side: str) -> str:
 
 
 def _patches() -> Iterator[_Patch]:
-    yield from _TRUNK
+    yield from (_Patch(**patch) for patch in ANATOMY["capsules"]["trunk"])
     for side in ("Left", "Right"):
-        for patch in _LIMBS:
+        for patch in (_Patch(**patch) for patch in ANATOMY["capsules"]["limbs"]):
             bones = tuple(_sided(bone, side) for bone in patch.bones)
             ends = (_sided(patch.ends[0], side), _sided(patch.ends[1], side))
             yield replace(patch, bone=_sided(patch.bone, side), bones=bones, ends=ends)

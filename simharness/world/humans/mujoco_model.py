@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
-from simharness.world.humans.anatomy import DOFS, RANGES, SIDES, mass_fractions
+from simharness.world.humans.anatomy import ANATOMY, HINGES_BY_DOF, RANGES, SIDES, mass_fractions
 from simharness.world.humans.body import Body
 from simharness.world.humans.capsules import Capsule, fit_capsules
 
@@ -53,23 +53,7 @@ class _Rod:
     longitudinal: tuple[float, float]
 
 
-_RODS = {
-    "upper_arm": _Rod(("Arm", "ArmTwist"), "ForeArm", (0.5772, 0.5754), (0.285, 0.278), (0.269, 0.26), (0.158, 0.148)),
-    "forearm": _Rod(
-        ("ForeArm", "ForeArmTwist"), "Hand", (0.4574, 0.4559), (0.276, 0.261), (0.265, 0.257), (0.121, 0.094)
-    ),
-    "thigh": _Rod(("UpLeg",), "Leg", (0.4095, 0.3612), (0.329, 0.369), (0.329, 0.364), (0.149, 0.162)),
-    "shank": _Rod(("Leg",), "Foot", (0.4459, 0.4416), (0.255, 0.271), (0.249, 0.267), (0.103, 0.093)),
-}
-_SEGMENT_OF = {
-    "Hips": "lower_trunk",
-    "LowerBack": "middle_trunk",
-    "Spine1": "upper_trunk",
-    "LeftShoulder": "upper_trunk",
-    "RightShoulder": "upper_trunk",
-    "Neck": "head",
-    "Head": "head",
-}
+_RODS = {name: _Rod(**rod) for name, rod in ANATOMY["rods"].items()}
 
 
 def limb_inertials(body: Body) -> tuple[Inertial, ...]:
@@ -124,56 +108,21 @@ def capsule_masses(body: Body, capsules: Sequence[Capsule]) -> list[float]:
 
 
 def _segment(bone: str) -> str:
-    if bone in _SEGMENT_OF:
-        return _SEGMENT_OF[bone]
+    if bone in ANATOMY["trunk"]:
+        return ANATOMY["trunk"][bone]
     name = bone.removeprefix("Left").removeprefix("Right")
     ends = {"Hand": "hand", "Foot": "foot"} | {part: segment for segment, rod in _RODS.items() for part in rod.bones}
     return ends[name]
 
 
 def _side(bone: str) -> str:
-    return "" if bone in _SEGMENT_OF else bone[:4]
+    return "" if bone in ANATOMY["trunk"] else bone[:4]
 
 
 SKIN_GROUP = 1  # MuJoCo geom group of the capsules
 
 _X, _Y, _Z = np.eye(3)
 _CLAVICLE_DROP = np.tan(np.radians(8.0))  # by eye: arms raised to 45 degrees lift the clavicle by about that angle
-# Axis of every hinge in the neutral pose; for paired joints that of the left one, mirrored for the right one.
-_AXES = {
-    "flexion_trunk": _Y,
-    "bending": -_X,
-    "rotation_trunk": _Z,
-    "hip_flexion": -_Y,
-    "hip_abduction": _X,
-    "hip_rotation": -_Z,
-    "knee_flexion": _Y,
-    "ankle_dorsiflexion": -_Y,
-    "ankle_inversion": -_X,
-    "clavicle_elevation": _X,
-    "shoulder_flexion": -_Y,
-    "shoulder_abduction": _X,
-    "shoulder_rotation": -_Z,
-    "elbow_flexion": -_Y,
-    "forearm_pronation": -_Z,
-    "wrist_flexion": -_X,
-}
-_TRUNK = {"lumbar": "LowerBack", "thorax": "Spine1", "neck": "Neck"}
-_LIMB = {
-    "hip_flexion": "UpLeg",
-    "hip_abduction": "UpLeg",
-    "hip_rotation": "UpLeg",
-    "knee_flexion": "Leg",
-    "ankle_dorsiflexion": "Foot",
-    "ankle_inversion": "Foot",
-    "clavicle_elevation": "Shoulder",
-    "shoulder_flexion": "Arm",
-    "shoulder_abduction": "Arm",
-    "shoulder_rotation": "ArmTwist",
-    "elbow_flexion": "ForeArm",
-    "forearm_pronation": "ForeArmTwist",
-    "wrist_flexion": "Hand",
-}
 
 
 @dataclass(frozen=True)
@@ -192,16 +141,12 @@ class Hinge:
 
 def _hinges() -> tuple[Hinge, ...]:
     result = []
-    for name in DOFS:
-        region, motion = name.split("_", 1)
-        if region in _TRUNK:
-            axis = _AXES["bending" if motion == "bending" else f"{motion}_trunk"]
-            bone = _TRUNK[region]
-        else:
-            axis = _AXES[motion]
-            if region == "right":
-                axis = axis * [-1, 1, -1]  # a rotation axis is a pseudovector under mirroring
-            bone = region.capitalize() + _LIMB[motion]
+    for name, hinge in HINGES_BY_DOF.items():
+        side, axis = name.split("_", 1)[0], {"x": _X, "y": _Y, "z": _Z}[hinge["axis"][-1]]
+        axis = -axis if hinge["axis"].startswith("-") else axis
+        if side == "right":
+            axis = axis * [-1, 1, -1]  # a rotation axis is a pseudovector under mirroring
+        bone = f"{side.capitalize() if side in SIDES else ''}{hinge['bone']}"
         result.append(Hinge(name, bone, axis, RANGES[name]))
     return tuple(result)
 
@@ -217,8 +162,9 @@ def neutral_rotations(body: Body) -> Floats:
     are lowered with the arms. Trunk, fingers and toes keep their rest shape.
     """
     turn = np.tile(np.eye(3), (len(body.bones), 1, 1))
+    bones = {hinge["bone"] for hinge in ANATOMY["limbs"].values()}
     for s, side in enumerate(SIDES):
-        head = {name: body.heads[body.index(side.capitalize() + name)] for name in (*_LIMB.values(), "ToeBase")}
+        head = {name: body.heads[body.index(side.capitalize() + name)] for name in (*bones, "ToeBase")}
         toes = (head["ToeBase"] - head["Foot"]) * [1, 1, 0]
         finger = body.heads[body.index(f"{side.capitalize()}FingerBase")]
         bend = head["Hand"] - head["ForeArm"]

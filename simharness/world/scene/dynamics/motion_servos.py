@@ -4,6 +4,11 @@ Every hinge has a proportional-derivative servo with the strength of a human joi
 walk falls after 1.5 s), so an assisting force and torque pull the pelvis towards its planned pose. Both are bounded, so
 a stronger collision or push has consequences. Servos and assistance act at 480 Hz; the resulting motion is returned at
 the rate of the plans.
+
+Strengths of servos are in ``anatomy.toml``. Torques are about the maximum of adults (Anderson, Madigan and Nussbaum, J.
+Biomech. 40, 2007, for the leg) and those of simulated people (Peng et al., "DeepMimic", SIGGRAPH 2018). Stiffness is
+about half of that in DeepMimic: torques of the plan are fed forward (``inverse_dynamics.py``), and compliant legs
+recover from a stumble that makes stiff ones fall.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats, Integers
 from simharness.scenario.sections.people_section import PushSection
-from simharness.world.humans.anatomy import DOFS
+from simharness.world.humans.anatomy import ANATOMY, DOFS
 from simharness.world.humans.body import Body
 from simharness.world.motion.motion import Motion
 from simharness.world.scene.dynamics.inverse_dynamics import InverseDynamics
@@ -25,23 +30,6 @@ from simharness.world.scene.objects.solids import Solid
 STEP_RATE = 480.0  # Hz, at least
 LEVER = 0.5  # metres: the assisting torque is bounded by the largest assisting force at this lever
 
-# By joint: stiffness (N m / rad) and maximum torque (N m) of an adult of 70 kg and 1.7 m. Torques are about the maximum
-# of adults (Anderson, Madigan and Nussbaum, J. Biomech. 40, 2007, for the leg) and those of simulated people (Peng et
-# al., "DeepMimic", SIGGRAPH 2018). Stiffness is about half of that in DeepMimic: torques of the plan are fed forward
-# (``inverse_dynamics.py``), and compliant legs recover from a stumble that makes stiff ones fall.
-_JOINT_STRENGTHS = {
-    "lumbar": (600.0, 200.0),
-    "thorax": (600.0, 200.0),
-    "neck": (90.0, 50.0),
-    "hip": (360.0, 200.0),
-    "knee": (360.0, 180.0),
-    "ankle": (300.0, 130.0),
-    "clavicle": (240.0, 100.0),
-    "shoulder": (240.0, 100.0),
-    "elbow": (180.0, 60.0),
-    "forearm": (36.0, 15.0),
-    "wrist": (36.0, 15.0),
-}
 _DAMPING = 0.1  # s: damping of a servo divided by its stiffness
 _ADULT = 70.0 * 1.7  # kg m: torques scale with mass and length
 _ASSIST_RATE = 2 * np.pi * 2.0  # rad/s: rate at which unbounded assistance would correct the pelvis
@@ -356,7 +344,7 @@ def _person(model: mujoco.MjModel, body: Body, prefix: str) -> _Person:
     pelvis = int(model.body(f"{prefix}{body.bones[0]}").id)
     mass = float(model.body_subtreemass[pelvis])
     size = mass * body.stature / _ADULT
-    stiffness, strength = size * np.array([_JOINT_STRENGTHS[_joint(name)] for name in DOFS]).T
+    stiffness, strength = size * np.array([ANATOMY["servos"][_joint(name)] for name in DOFS]).T
     return _Person(
         pelvis=pelvis,
         mass=mass,
@@ -370,8 +358,8 @@ def _person(model: mujoco.MjModel, body: Body, prefix: str) -> _Person:
 
 
 def _joint(dof: str) -> str:
-    """Return the key of ``_JOINT_STRENGTHS`` for a degree of freedom: "knee" for "left_knee_flexion"."""
-    return next(word for word in dof.split("_") if word in _JOINT_STRENGTHS)
+    """Return the key of the servos for a degree of freedom: "knee" for "left_knee_flexion"."""
+    return next(word for word in dof.split("_") if word in ANATOMY["servos"])
 
 
 def _replace_foot_capsules(model: mujoco.MjModel) -> None:
