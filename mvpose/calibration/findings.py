@@ -7,6 +7,7 @@ where a difference is measured that good rigs have as well; and *unknown* where 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, Self, get_args
 
@@ -15,44 +16,13 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.camera import Camera, Rig
 from mvpose.checks import Sealed, as_array
+from mvpose.files.input_files import parse_toml
 
 Severity = Literal["alarm", "note", "unknown"]
 Verdict = Literal["fine", "faults", "cannot tell"]
 
 KINDS: Mapping[str, str] = MappingProxyType(
-    {
-        # wrong files (conventions.py)
-        "extrinsics-inverted": "the extrinsics are those from camera to world, expected from world to camera",
-        "rotation-transposed": "the rotation is transposed; the position of the camera is right",
-        "translation-is-center": "the translation holds the position of the camera",
-        "wrong-unit": "the translations are in centimetres, millimetres or another unit that is not the metre",
-        "picture-size": "the size of the pictures is not that of the calibration",
-        "world-turned": "another axis of the world points up than the one that should",
-        "image-size": "the intrinsics are those of pictures of another resolution",
-        "image-cropped": "the intrinsics are those of pictures before they were cropped",
-        "axes-swapped": "x and y of the pictures are exchanged (rotated or transposed pictures)",
-        "axis-flipped": "an axis of the camera or of the picture points the other way",
-        "cameras-swapped": "two cameras have the calibration of each other",
-        "distortion-ignored": "the pictures are distorted, and the calibration has no distortion",
-        "distortion-model": "the distortion is of another model, sign or order of terms, or was removed already",
-        # cameras (cameras.py)
-        "moved-camera": "a camera is not in its calibrated pose",
-        "drifting-camera": "a camera moves away from its calibration during the recording",
-        "focal-length": "the focal length of a camera is wrong",
-        "principal-point": "the principal point of a camera is wrong",
-        # clocks (clocks.py)
-        "clock-offset": "the pictures of a camera are taken earlier or later than their time stamps",
-        "dropped-pictures": "pictures of a camera are missing",
-        "repeated-pictures": "a camera delivers the same picture again",
-        # views (views.py)
-        "mirrored-view": "the pictures of a camera are mirrored",
-        "left-right-exchanged": "the names of left and right joints of a view are exchanged",
-        "other-people": "a camera sees other people than the rest",
-        "large-residual": "keypoints of a camera are farther from the people than is usual",
-        "silent-view": "a camera has no or nearly no detections",
-        # what the recording does not determine
-        "cannot-tell": "the recording does not determine whether the calibration is right",
-    }
+    parse_toml((Path(__file__).parent / "data" / "findings.toml").read_text(encoding="utf-8"))
 )
 """Kinds of findings, and what each states."""
 

@@ -4,7 +4,7 @@ import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
@@ -36,28 +36,7 @@ STAGE_COLORS: Mapping[str, Color] = {
 }
 VARIANT_COLORS: tuple[Color, ...] = ("#3b82c4", "#d9643a", "#2e9e6b", "#8a63c9", "#d9a514", "#c2568f")
 
-STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",  # text stays text: in the page's font, and found by the browser's search
-    "figure.facecolor": "none",
-    "axes.facecolor": "none",
-    "text.parse_math": False,  # names of cameras and files may hold dollars
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "text.color": INK,
-    "axes.labelcolor": FAINT,
-    "axes.edgecolor": LINE,
-    "xtick.color": LINE,
-    "ytick.color": LINE,
-    "xtick.labelcolor": FAINT,
-    "ytick.labelcolor": FAINT,
-    "grid.color": LINE,
-    "grid.linewidth": 0.6,
-    "axes.linewidth": 0.8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-}
+STYLE = mpl.rc_params_from_file(Path(__file__).parent / "templates" / "plots.mplstyle", use_default_template=False)
 """Settings of Matplotlib for all plots."""
 
 

@@ -57,7 +57,7 @@ class _Patch:
     count: int
     layout: Literal["stacked", "chained", "beside"]
     ends: Sequence[str] = ("", "")
-    span: Sequence[float] = (0.0, 1.0)
+    span: tuple[float, float] = (0.0, 1.0)
 
 
 def _sided(name: str, side: str) -> str:

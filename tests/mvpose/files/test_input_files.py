@@ -126,7 +126,7 @@ SHIPPED = {
     "simharness/world/rigs/layouts.py", "simharness/world/humans/body.py", "simharness/detector/reported.py",
     "simharness/capture/outer_views.py", "simharness/world/scene/rooms/kinds.py",
     "simharness/world/humans/clothing_colors.py", "simharness/world/humans/population.py",
-    "simharness/world/humans/anatomy.py", "simharness/world/scene/rooms/textures.py",
+    "simharness/world/humans/anatomy.py", "simharness/world/scene/rooms/textures.py", "mvpose/calibration/findings.py",
     "simharness/outputs/study/curves.py", "simharness/reality/detector_fit/fit_table.py",
     "simharness/reality/detector_fit/profile.py",
     "simharness/trial/kernel_compilation.py", "mvpose/formats/joint_names.py", "mvpose/networks/catalogue/published.py",

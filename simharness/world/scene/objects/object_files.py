@@ -126,7 +126,7 @@ class ObjectFile:
 
     def stretched(self, scale: ArrayLike) -> ObjectModel:
         """Return the model stretched along x, y and z by ``scale`` (3,), in its own colours; no mirror or decoy is."""
-        points = [np.asarray((part.vertices + self.offset) * scale) for part in self.parts]
+        points = [(part.vertices + self.offset) * np.asarray(scale, float) for part in self.parts]
         mesh = self.mesh().moved(np.concatenate(points).astype(np.float32))
         geoms = [part.geoms(each) for part, each in zip(self.parts, points, strict=True)]
         return ObjectModel(mesh, tuple(chain(*geoms)))

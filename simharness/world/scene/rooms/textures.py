@@ -188,7 +188,7 @@ def painted(name: str, rng: np.random.Generator, height: float | None = None) ->
     The picture of a wall is cut off at ``height`` metres above the floor, or mirrored above its upper edge.
     """
     files = sorted(FINISHES.glob(f"{name}.*.webp"))
-    picture = np.asarray(cv2.imread(str(files[rng.integers(len(files))]))[..., ::-1] / 255, float)
+    picture = np.asarray(cv2.imread(str(files[rng.integers(len(files))])), float)[..., ::-1] / 255
     if height is None:
         return tiled_texture(picture, FLOOR_RESOLUTION)
     rows = wall_shape(1.0, height)[0]
