@@ -85,7 +85,7 @@ def mutants_of(package: str, count: int, seed: int) -> list[Mutant]:
 
 
 def read_equivalent(path: Path = EQUIVALENT) -> dict[tuple[str, str], str]:
-    """Return the reason why a mutant changes no correct result, by its file and its description without the line."""
+    """Return the reason why a mutant changes no correct result, by its file and its place and text."""
     entries = tomllib.loads(path.read_text(encoding="utf-8")).get("mutant", [])
     return {(entry["file"], entry["change"]): entry["why"] for entry in entries}
 
@@ -118,7 +118,7 @@ def table(mutants: Sequence[Mutant], outcomes: Mapping[str, Outcome], equivalent
 
 
 def _key(mutant: Mutant) -> tuple[str, str]:
-    return mutant.file, mutant.described.partition(": ")[2]
+    return mutant.file, mutant.described.partition(", ")[2]
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -31,12 +31,14 @@ class Mutation:
         end: index behind the last one.
         text: what stands there instead.
         line: number of the line, from 1.
+        function: name of the function around it; "" outside of functions.
     """
 
     start: int
     end: int
     text: str
     line: int
+    function: str = ""
 
     def applied(self, source: str) -> str:
         """Return the file with the mutation."""
@@ -54,7 +56,7 @@ class Mutation:
             "⟧",
             source[self.end : end],
         )
-        return f"line {self.line}: `{' '.join(''.join(parts).split())}`"
+        return f"line {self.line}, {self.function or 'module'}: `{' '.join(''.join(parts).split())}`"
 
     def rank(self, file: str, seed: int) -> str:
         """Return the key by which a sample is drawn: that of smaller samples comes first in larger ones."""
@@ -75,17 +77,17 @@ def mutations(source: str) -> list[Mutation]:
 
 class _Finder(ast.NodeVisitor):
     def __init__(self, source: str) -> None:
-        self._source, self.mutations, self._inside = source, set[Mutation](), 0
+        self._source, self.mutations, self._functions = source, set[Mutation](), list[str]()
         ends = [0]
         for line in source.splitlines(keepends=True):
             ends.append(ends[-1] + len(line))
         self._starts, self._lines = ends, source.splitlines(keepends=True)
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
-        self._inside += 1
+        self._functions.append(node.name)
         for each in node.body:
             self.visit(each)
-        self._inside -= 1
+        self._functions.pop()
 
     def visit_Raise(self, node: ast.Raise) -> None:
         """Leave out what is only said."""
@@ -97,7 +99,7 @@ class _Finder(ast.NodeVisitor):
         """Leave out text."""
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
-        if node.value is not None and self._inside:
+        if node.value is not None and self._functions:
             self.visit(node.value)
 
     def visit_Compare(self, node: ast.Compare) -> None:
@@ -124,9 +126,9 @@ class _Finder(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_Constant(self, node: ast.Constant) -> None:
-        if self._inside and isinstance(node.value, bool):
+        if self._functions and isinstance(node.value, bool):
             self._replace(node, str(not node.value))
-        elif self._inside and isinstance(node.value, int | float):
+        elif self._functions and isinstance(node.value, int | float):
             self._replace(node, repr(node.value + 1))
 
     def visit_Name(self, node: ast.Name) -> None:
@@ -142,17 +144,17 @@ class _Finder(ast.NodeVisitor):
     def visit_AugAssign(self, node: ast.AugAssign) -> None:
         if type(node.op) in _ARITHMETIC:
             self._between(node.target, node.value, _ARITHMETIC[type(node.op)] + "=")
-        if self._inside:
+        if self._functions:
             self._replace(node, "pass")
         self.generic_visit(node)
 
     def visit_Assign(self, node: ast.Assign) -> None:
-        if self._inside and all(isinstance(each, ast.Subscript | ast.Attribute) for each in node.targets):
+        if self._functions and all(isinstance(each, ast.Subscript | ast.Attribute) for each in node.targets):
             self._replace(node, "pass")
         self.generic_visit(node)
 
     def visit_Expr(self, node: ast.Expr) -> None:
-        if self._inside and isinstance(node.value, ast.Call):
+        if self._functions and isinstance(node.value, ast.Call):
             self._replace(node, "pass")
         if not isinstance(node.value, ast.Constant):
             self.generic_visit(node)
@@ -164,7 +166,7 @@ class _Finder(ast.NodeVisitor):
         self._replace(node, "continue")
 
     def generic_visit(self, node: ast.AST) -> None:
-        if isinstance(node, _TESTED) and self._inside and not _guards_an_error(node):
+        if isinstance(node, _TESTED) and self._functions and not _guards_an_error(node):
             for text in ("True", "False") if not isinstance(node, ast.While) else ("False",):
                 self._replace(node.test, text)
         super().generic_visit(node)
@@ -190,7 +192,7 @@ class _Finder(ast.NodeVisitor):
             self._add(at, at + len(inner), text, left.end_lineno or left.lineno)
 
     def _add(self, start: int, end: int, text: str, line: int) -> None:
-        self.mutations.add(Mutation(start, end, text, line))
+        self.mutations.add(Mutation(start, end, text, line, ".".join(self._functions)))
 
 
 def _guards_an_error(node: ast.AST) -> bool:

@@ -93,13 +93,15 @@ def test_every_equivalent_mutant_has_a_reason_and_a_file():
 def test_equivalent_mutants_count_neither_as_killed_nor_as_survivors():
     bugs = [Bug(str(k), "mvpose/rays.py", (("a", "b"),), "b", ("t",), "outside", why="mutant") for k in range(4)]
     four = [
-        Mutant("p", "mvpose/rays.py", mutations("x = a < b\n")[0], f"line 1: `change {k}`", bugs[k]) for k in range(4)
+        Mutant("p", "mvpose/rays.py", mutations("x = a < b\n")[0], f"line 1, f: `change {k}`", bugs[k])
+        for k in range(4)
     ]
     outcomes = {str(k): Outcome(k < 2, "", 1.0) for k in range(4)}
-    equivalent = {("mvpose/rays.py", "`change 3`"): "no difference"}
+    equivalent = {("mvpose/rays.py", "f: `change 3`"): "no difference"}
     assert scores(four, outcomes, equivalent) == {"p": (2, 3)}
     lines = table(four, outcomes, equivalent).splitlines()
     assert "| `p` | 4 | 1 | 2 | 67 % |" in lines
     assert [line for line in lines if "change" in line and "survivor" not in line] == [
-        "| `mvpose/rays.py` | line 1: `change 2` |  |", "| `mvpose/rays.py` | line 1: `change 3` | no difference |",
+        "| `mvpose/rays.py` | line 1, f: `change 2` |  |",
+        "| `mvpose/rays.py` | line 1, f: `change 3` | no difference |",
     ]  # fmt: skip
