@@ -51,11 +51,13 @@ class FrameClock:
     period: float
     """Time between frames without times, seconds."""
     interval: float
-    """Mean time between the latest frames with pictures, seconds."""
+    """Mean time between the latest frames, seconds."""
     time: float = math.nan
     """Time of the latest frame, seconds; NaN before the first picture."""
     pictured: float = math.nan
     """Time of the latest picture, seconds."""
+    dark: float = 0.0
+    """Number of frames since then, none of which has pictures."""
 
     @property
     def started(self) -> bool:
@@ -103,10 +105,11 @@ class FrameClock:
         """Go on to a frame."""
         if math.isnan(times.now):
             return
+        self.dark += 1.0
         if not math.isnan(times.latest):
             if 0.0 < times.latest - self.pictured < _BLIND:
-                self.interval += _SHARE * (times.latest - self.pictured - self.interval)
-            self.pictured = times.latest
+                self.interval += _SHARE * ((times.latest - self.pictured) / self.dark - self.interval)
+            self.pictured, self.dark = times.latest, 0.0
         self.time = times.now
 
     def _since(self, now: float) -> float:

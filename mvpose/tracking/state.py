@@ -15,11 +15,11 @@ from mvpose.skeleton import Skeleton
 from mvpose.tracking.drift_charts import Charts
 from mvpose.tracking.tracks import Tracks
 
-VERSION = 2
+VERSION = 3
 """Version of the layout; a change of the fields of the arrays' classes needs another."""
 
 _LARGEST = 1 << 28  # bytes of a file: a state with hundreds of people has less than one in a hundred of it
-_SINGLE = {"clock": 3, "clutter": 2, "born": 1}  # sizes of the arrays that describe no track and no camera
+_SINGLE = {"clock": 4, "clutter": 2, "born": 1}  # sizes of the arrays that describe no track and no camera
 _GROUPS = ("tracks", "lost")
 _RECENT: dict[str, tuple[tuple[Any, ...], str]] = {  # fields of RecentPictures, their shapes and kinds
     "latest": (("V",), "f"), "view": (("k",), "i"), "keypoints": (("k", "J", 2), "f"), "scores": (("k", "J"), "f"),

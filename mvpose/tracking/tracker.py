@@ -295,7 +295,7 @@ class Tracker:
         return TrackerState(
             {
                 **self._layout,
-                "clock": np.array([now.interval, now.time, now.pictured]),
+                "clock": np.array([now.interval, now.time, now.pictured, now.dark]),
                 "born": np.array([people.born]),
                 "density": clutter.density,
                 "watched": clutter.watched,

@@ -134,6 +134,9 @@ def test_a_frame_without_pictures_comes_after_the_time_between_the_latest_frames
         clock.take(clock.read(_at(Detections.empty(), k * period), 5))
     expected = period + (0.04 - period) * 0.9**11
     assert clock.read(_nothing(np.nan), 5).elapsed == pytest.approx(expected)
+    for k in range(12, 300):  # frames between two pictures count, also where two of three have none
+        clock.take(clock.read(_at(Detections.empty(), k * period) if k % 3 == 0 else _nothing(np.nan), 5))
+    assert clock.interval == pytest.approx(period, rel=1e-3)
 
 
 @pytest.mark.parametrize("gap", [60.0, 3600.0, 1e6, 1e10])

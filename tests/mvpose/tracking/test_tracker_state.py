@@ -114,7 +114,7 @@ def test_files_of_other_kinds_and_versions_are_refused(middle, tmp_path):
     *_, path = middle
     arrays = dict(TrackerState.load(path).arrays)
     cases = {
-        "version of the layout must be 2, got 1": {**arrays, "version": np.array([1])},
+        "version of the layout must be 3, got 1": {**arrays, "version": np.array([1])},
         "there is no version": {name: value for name, value in arrays.items() if name != "version"},
         "missing or unknown: lost.found": {name: value for name, value in arrays.items() if name != "lost.found"},
         "missing or unknown: more": {**arrays, "more": np.zeros(3)},
