@@ -28,12 +28,14 @@ def heading(blame: Blame) -> str:
 
 
 def conclusion(blame: Blame) -> str:
-    """Return what to mend first, in a sentence or two."""
+    """Return what to mend first, in a sentence or two; nothing where the seeds do not show that it helps."""
     info = SCORES[blame.score]
     if blame.mending is None:
-        return f"Nothing is to be gained: mending all causes together does not improve {info.title}."
+        return f"In these seeds mending all causes together does not improve {info.title}: nothing is to be gained."
     mending = blame.mending
     what = ", ".join(cause.title for cause in mending.about)
+    if not mending.gain.low > 0:
+        return f"No cause is certain: mending {what} gains {points(mending.gain)} points. {_more_seeds(mending.gain)}"
     after = f"{_value(blame, mending.score)}{_ends(mending.score, info.digits)}"
     part = f"{100 * mending.restored:.0f} % of what mending everything would gain"
     if mending.restored < RESTORED:
@@ -44,18 +46,21 @@ def conclusion(blame: Blame) -> str:
 
 
 def surest(blame: Blame) -> str:
-    """Return whether the largest share is above zero for certain, in a sentence; empty where nothing is lost."""
-    if blame.mending is None or not blame.shares:
+    """Return whether the largest share is above zero for certain, in a sentence; empty where no cause is certain."""
+    if blame.mending is None or not blame.shares or not blame.mending.gain.low > 0:
         return ""
     first = blame.shares[0]
-    if not np.isfinite(first.share.low):
-        return "A single seed has no intervals: run more seeds before you decide."
     if first.share.low > 0:
         return f"The largest cause is {first.about.title}, {points(first.share)} points."
-    return (
-        f"The largest cause is {first.about.title}, {points(first.share)} points, but its interval reaches below zero: "
-        "run more seeds before you decide."
-    )
+    return f"Which cause is the largest is not certain: {first.about.title} has {points(first.share)} points."
+
+
+def _more_seeds(gain: Interval) -> str:
+    """Return the advice to run more seeds, with the number at which the interval would end at zero, if it shrinks."""
+    if not np.isfinite(gain.low):
+        return "A single seed has no intervals: run more seeds."
+    needed = gain.n * ((gain.mean - gain.low) / gain.mean) ** 2 if gain.mean > 0 else np.inf
+    return f"Run more seeds, about {-(-needed // 5) * 5:.0f}." if needed <= 1000 else "Run many more seeds."
 
 
 def gain(number: Interval, *, interval: bool = True) -> str:
