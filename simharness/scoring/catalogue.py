@@ -105,7 +105,7 @@ def _failures() -> Iterator[ScoreInfo]:
     for stage in ("detection", "matching", "reconstruction"):
         about = f"failures removed by the truth in place of {stage}, and not in place of an earlier stage"
         yield _lower(f"blame_{stage}", f"Blame {stage}", "%", about)
-    about = "failures that perfect detections do not remove, for a method whose stages cannot be replaced"
+    about = "failures that perfect detections do not remove, for a method that takes and returns no labels"
     yield _lower("blame_method", "Blame method", "%", about)
 
 

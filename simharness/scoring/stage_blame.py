@@ -6,7 +6,10 @@ A frame with failures is estimated again, and the first substitution that remove
 - matching: perfect detections and the true labels.
 - reconstruction: neither removes the failure. The cause is reconstruction itself or its other input: a wrong
   calibration, late pictures, or too few views with the joint inside the picture.
-- method: matching or reconstruction of a user-defined estimator, which takes no labels and whose stages are unknown.
+- method: matching or reconstruction of a user-defined estimator, which takes no labels and returns none.
+
+A user-defined estimator takes no labels, but may return them: matching has the blame where the labels of the perfect
+detections are wrong for the person of the failure, or for anybody if it is a ghost, and reconstruction where they are right.
 
 Perfect detections remove most failures, so matching rarely gets the blame. One more substitution stands beside that
 order: the real detections with the true labels, which shows what a perfect matching alone would remove.
@@ -84,8 +87,9 @@ def blame(
 
     Args:
         recording: T frames, as they were estimated. Heat maps are used if the detections have them.
-        estimator: the method. Only pipelines of mvpose take true labels; for others, failures that perfect detections
-            do not remove are blamed on the method.
+        estimator: the method. Only pipelines of mvpose take true labels; of others the labels that they return are
+            compared with the true ones. Without labels, failures that perfect detections do not remove are blamed on
+            the method.
         estimates: estimates of the method, T.
         failures: :func:`simharness.scoring.failure_classes.find_failures` of these estimates.
 
@@ -244,9 +248,8 @@ class _FrameInput:
     detections: Detections
     truth: Truth
 
-    def removes(self, estimator: Estimator, before: Estimate, failures: Sequence[Failure]) -> list[bool]:
-        """Estimate this input, and return which of the failures of an earlier estimate of the frame are gone."""
-        after = estimator.estimate(self.rig, self.detections)
+    def removes(self, after: Estimate, before: Estimate, failures: Sequence[Failure]) -> list[bool]:
+        """Return which of the failures of an earlier estimate of the frame are gone in one of this input."""
         remaining = failures_of_frame(self.rig, self.detections, self.truth, after)
         kinds = {failure.person: failure.kind for failure in remaining}
         removed_ghosts = _removed_ghosts(before, _ghosts(failures), after, _ghosts(remaining))
@@ -267,21 +270,37 @@ def _blame_frame(
     real: _FrameInput, estimator: Estimator, estimate: Estimate, failures: Sequence[Failure]
 ) -> Iterable[Blamed]:
     perfect = _FrameInput(real.rig, *perfect_detections(real.detections, real.truth))
-    by_detection = perfect.removes(estimator, estimate, failures)
+    after = estimator.estimate(perfect.rig, perfect.detections)
+    by_detection = perfect.removes(after, estimate, failures)
     by_matching = [False] * len(failures)
     last = Stage.RECONSTRUCTION
     labelled = with_labels(estimator, true_labels(perfect.detections, perfect.truth))
-    if labelled is None:
+    if labelled is None and after.matching.people:
+        wrong = _wrongly_matched(after.matching.labels, perfect)
+        by_matching = [bool(wrong) if each.person < 0 else each.person in wrong for each in failures]
+    elif labelled is None:
         last = Stage.METHOD
     elif not all(by_detection):
-        by_matching = perfect.removes(labelled, estimate, failures)
+        by_matching = perfect.removes(labelled.estimate(perfect.rig, perfect.detections), estimate, failures)
     matching_alone: list[bool | None] = [None] * len(failures)
     labelled = with_labels(estimator, true_labels(real.detections, real.truth))
     if labelled is not None:
-        matching_alone = list(real.removes(labelled, estimate, failures))
+        matching_alone = list(real.removes(labelled.estimate(real.rig, real.detections), estimate, failures))
     for failure, detection, matching, alone in zip(failures, by_detection, by_matching, matching_alone, strict=True):
         stage = Stage.DETECTION if detection else Stage.MATCHING if matching else last
         yield Blamed(failure, stage, alone)
+
+
+def _wrongly_matched(labels: Integers, perfect: _FrameInput) -> set[int]:
+    """Return the people of two or more perfect detections that are not one group of their own."""
+    truth = true_labels(perfect.detections, perfect.truth)
+    wrong = set()
+    for person in np.unique(perfect.truth.person[truth >= 0]):
+        theirs = perfect.truth.person == person
+        groups = set(labels[theirs].tolist())
+        if len(groups) > 1 or -1 in groups or np.isin(labels[~theirs], list(groups)).any():
+            wrong.add(int(person))
+    return wrong
 
 
 def _ghosts(failures: Sequence[Failure]) -> list[int]:

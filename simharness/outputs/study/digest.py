@@ -45,7 +45,7 @@ _STAGE_MEANINGS = {
     "matching": "perfect detections do not repair it, but together with the true matching they do",
     "reconstruction": "neither repairs it: the cause is the reconstruction, or its other inputs (a wrong calibration, "
     "late pictures, too few views)",
-    "method": "perfect detections do not repair it, and the user-defined estimator accepts no matching",
+    "method": "perfect detections do not repair it, and the user-defined estimator takes and returns no labels",
 }
 
 SCORED = tuple(dict.fromkeys(HEADS + PRINTED))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from moments import crowd, estimate_of, moment, recorded, ring
 from trials import simulated
 
-from mvpose import COCO17, Camera, Detections, Rig, preset
+from mvpose import COCO17, Camera, Detections, Estimate, Rig, preset
 from mvpose.estimate import Matching
 from mvpose.matching import Matcher
 from mvpose.reconstruction import PictorialStructure, Triangulation
@@ -75,6 +75,43 @@ def exchanging(affinity, view):
     exchanged = (view < 2) & (labels >= 0) & (labels < 2)
     labels[exchanged] = 1 - labels[exchanged]
     return Matching(labels)
+
+
+class Foreign:
+    """Estimator of another package: it takes no labels, and returns them or not."""
+
+    def __init__(self, pipeline, *, labelled=True, shift=0.0):
+        self.pipeline, self.labelled, self.shift = pipeline, labelled, np.array([0.0, 0.0, shift])
+
+    def estimate(self, rig, detections):
+        found = self.pipeline.estimate(rig, detections)
+        labels = found.matching.labels if self.labelled else None
+        return Estimate.of_joints(found.joints + self.shift, labels=labels)
+
+
+class TestForeignStages:
+    def test_wrong_labels_of_perfect_detections_are_blamed_on_matching(self):
+        ours = blamed(replace(FAST, matching=exchanging), MOMENT)
+        foreign = blamed(Foreign(replace(FAST, matching=exchanging)), MOMENT)
+        assert [each[:3] for each in foreign] == [each[:3] for each in ours]
+        assert {(stage, alone) for *_, stage, alone in foreign} == {("matching", None)}
+
+    def test_right_labels_and_wrong_joints_are_blamed_on_reconstruction(self):
+        result = blamed(Foreign(FAST, shift=0.3), MOMENT)
+        assert {stage for _, _, stage, _ in result} == {"reconstruction"}
+        assert len(result) == len(PEOPLE)
+
+    def test_a_wrong_match_does_not_blame_matching_for_the_other_people(self):
+        result = blamed(Foreign(replace(FAST, matching=exchanging), shift=0.3), MOMENT)
+        stages = {person: stage for person, _, stage, _ in result if person >= 0}
+        assert sorted(stages.values()) == ["matching", "matching", "reconstruction"]
+
+    def test_a_phantom_is_blamed_on_detection(self):
+        phantom = moment(RIG, crowd(1, seed=9) + [0.0, 1.4, 0.0])
+        assert blamed(Foreign(FAST), joined(MOMENT, phantom, person=-1)) == [(-1, "ghost", "detection", None)]
+
+    def test_without_labels_the_method_is_blamed(self):
+        assert {each[2] for each in blamed(Foreign(FAST, labelled=False, shift=0.3), MOMENT)} == {"method"}
 
 
 class TestStages:
