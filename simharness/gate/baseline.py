@@ -12,6 +12,7 @@ from mvpose.files.input_files import MIB, parse_json, read_bytes
 from mvpose.files.message_text import one_line, shown
 from simharness.gate.trial_command import TrialKey
 from simharness.scoring.catalogue import TOLERANCES
+from simharness.scoring.pcp import GROUPS
 
 GATED = tuple(TOLERANCES)
 """Keys of the scores that are compared."""
@@ -22,7 +23,13 @@ FRAMES = "frames"
 TIME = "time_ratio"
 """Score beside the gated ones: time of a frame divided by the time of the reference kernel."""
 
-KEPT = (*GATED, FRAMES, TIME)
+GROUP_SCORES = tuple(f"pcp_{group}" for group in GROUPS)
+"""PCP of groups of body parts, which says where a change is."""
+
+DETECTED = "detected_px"
+"""Mean coordinate of all detected keypoints of a trial, pixels, which says whether the input of the method changed."""
+
+KEPT = (*GATED, *GROUP_SCORES, DETECTED, FRAMES, TIME)
 
 _LARGEST = 64 * MIB  # bytes of a baseline; 200,000 trials
 _DIGITS = 4  # decimals: finer than any tolerance, short enough to read in a diff

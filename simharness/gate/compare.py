@@ -1,10 +1,11 @@
 """Comparison of two measurements of one suite, seed by seed, and the result of a gate check."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from simharness.gate.baseline import GATED, TIME, Measurement
+from simharness.gate.changed_stage import changed_stage
 from simharness.gate.score_tests import Pairs, Tested, pairs_of, test_of
 from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate_section import GateSection
@@ -44,6 +45,8 @@ class Change(Tested):
     """Larger than its tolerance, but could not be significant even if all seeds agreed."""
     allowed: Allowed
     """Largest changes that fail nothing."""
+    where: str = ""
+    """Stage that changed first and joints that changed most, where they are known; empty without a verdict."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,10 @@ def compare(before: Measurement, after: Measurement, gate: GateSection) -> Compa
             p[at] = min(1.0, families * value)
             least[at] = families * len(members) * tested[at].least_p
     changes = [_change(*each, gate.level) for each in zip(pairs, tested, allowed, p, least, strict=True)]
+    changes = [
+        each if each.verdict == "same" else replace(each, where=changed_stage(pair, before, after))
+        for each, pair in zip(changes, pairs, strict=True)
+    ]
     uncompared = tuple(score for score in GATED if _has(after, score) and not _has(before, score))
     return Comparison(tuple(changes), before.cases if families > 1 else (), uncompared)
 

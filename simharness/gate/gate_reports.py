@@ -127,6 +127,7 @@ def sentence(change: Change) -> str:
     return (
         f"{change.variant}, {place(change)}: {title(change.score)}: {before} before, {after} now: "
         f"{difference(change)}, allowed {allowed(change)}, p = {change.p:.2g} over {change.n} seeds"
+        f"{f'; {change.where}' if change.where else ''}"
     )
 
 

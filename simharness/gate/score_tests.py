@@ -70,12 +70,13 @@ def pairs_of(scores: Iterable[str], before: Measurement, after: Measurement) -> 
     for case in chain((None,), cases):
         for variant in before.variants:
             for score in scores:
-                pairs = _pairs(score, variant, case, before, after)
+                pairs = pairs_in(score, variant, case, before, after)
                 if pairs.trials:
                     yield pairs
 
 
-def _pairs(score: str, variant: str, case: str | None, before: Measurement, after: Measurement) -> Pairs:
+def pairs_in(score: str, variant: str, case: str | None, before: Measurement, after: Measurement) -> Pairs:
+    """Return the pairs of a score of a variant in a case; over the whole suite where ``case`` is None."""
     rows = {
         trial: (old[score], new, old[FRAMES])
         for trial, old in before.scores.items()

@@ -10,13 +10,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 from numba.core.registry import cpu_target
 from threadpoolctl import threadpool_limits
 
 from mvpose.commands.progress import Reporter
 from mvpose.kernel_lock import locked
 from mvpose.presets import TRACKING, without_repair
-from simharness.gate.baseline import FRAMES, TIME, Measurement, read_baseline
+from simharness.gate.baseline import DETECTED, FRAMES, TIME, Measurement, read_baseline
 from simharness.gate.compare import Comparison, FailedCase, GateResult, compare
 from simharness.gate.frame_times import relative_times
 from simharness.gate.score_tests import require_seeds
@@ -109,7 +110,7 @@ def kept_trials(study: Study, baseline: Path) -> Iterator[Path | None]:
 def measure_beside_reference(
     scenario: Scenario, variants: Sequence[str], stored: StoredTrial | None = None
 ) -> TrialOutput:
-    """Measure a trial; add its number of frames, ``FRAMES``, and the relative time of a frame, ``TIME``.
+    """Measure a trial; add its number of frames, ``FRAMES``, ``DETECTED``, and the relative time of a frame, ``TIME``.
 
     Args:
         scenario: resolved, with its seed.
@@ -123,9 +124,12 @@ def measure_beside_reference(
     trial = run_trial(scenario, variants=variants, until="classify")
     with threadpool_limits(1):
         times = relative_times(trial.detected, trial.pipelines)
+    pixels = np.concatenate([each.detections.keypoints.ravel() for each in trial.detected.frames])
+    detected = float(np.nanmean(pixels)) if np.isfinite(pixels).any() else None
+    added = {FRAMES: float(len(trial.detected.frames)), DETECTED: detected}
     return TrialOutput(
         {
-            name: replace(each, scores={**each.scores, FRAMES: float(len(trial.detected.frames)), TIME: times[name]})
+            name: replace(each, scores={**each.scores, **added, TIME: times[name]})
             for name, each in trial.results.items()
         }
     )

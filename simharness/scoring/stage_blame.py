@@ -9,7 +9,8 @@ A frame with failures is estimated again, and the first substitution that remove
 - method: matching or reconstruction of a user-defined estimator, which takes no labels and returns none.
 
 A user-defined estimator takes no labels, but may return them: matching has the blame where the labels of the perfect
-detections are wrong for the person of the failure, or for anybody if it is a ghost, and reconstruction where they are right.
+detections are wrong for the person of the failure, or for anybody if it is a ghost, and reconstruction where they are
+right.
 
 Perfect detections remove most failures, so matching rarely gets the blame. One more substitution stands beside that
 order: the real detections with the true labels, which shows what a perfect matching alone would remove.

@@ -137,6 +137,12 @@ def test_the_same_estimates_have_the_same_scores(measured):
     assert (len(measured["same"].scores), frames) == (12, {80.0})
 
 
+@pytest.mark.parametrize(("variant", "score", "where"), [("shaky", "mpjpe_mm", "in reconstruction")])
+def test_the_changed_stage_is_named(measured, variant, score, where):
+    changes = compare(measured["same"], measured[variant], GateSection()).with_verdict("worse")
+    assert {change.where.split(",")[0] for change in changes if change.score == score} == {where}
+
+
 @pytest.mark.parametrize(
     ("fault", "score"),
     [

@@ -14,7 +14,7 @@ from mvpose.commands.errors import RunError
 from mvpose.presets import TRACKING
 from simharness.cli import app
 from simharness.gate import frame_times, suite
-from simharness.gate.baseline import FRAMES, GATED, KEPT, TIME
+from simharness.gate.baseline import DETECTED, FRAMES, GATED, KEPT, TIME
 from simharness.gate.frame_times import reference_work, relative_times
 from simharness.gate.score_tests import least_corrected_p
 from simharness.gate.suite import baseline_of, fingerprint, kept_trials, run_suite
@@ -159,7 +159,7 @@ def test_every_trial_is_measured_once_beside_the_reference(study, monkeypatch):
     }
     assert recorder.steps == [(1, 0)] * 4
     for scores in done.scores.values():
-        assert set(scores) == {*SCORES, FRAMES, TIME}
+        assert set(scores) == {*SCORES, DETECTED, FRAMES, TIME}
         assert scores[FRAMES] == 4
         assert 0.005 < scores[TIME] < 50
     kept = done.measurement(study)
