@@ -32,7 +32,7 @@ def read_times(path: Path, frames: int, cameras: Sequence[str]) -> tuple[Floats,
 
     Raises:
         ValueError: no such file, another number of lines or of numbers in a line, names that are not those of the
-            cameras, or times that do not increase or cannot be seconds.
+            cameras, times that do not increase or cannot be seconds, or a camera a second away from the others.
     """
     text = read_bytes(path, what="times of pictures, a line for each frame").decode("utf-8-sig", "replace")
     lines = [re.split(r"[,;\t ]+", line.strip()) for line in text.splitlines() if line.strip()]
@@ -58,6 +58,14 @@ def read_times(path: Path, frames: int, cameras: Sequence[str]) -> tuple[Floats,
         raise ValueError(
             f"{path}: {np.median(steps):.4g} from frame to frame, expected seconds ({_FASTEST:g} to {_SLOWEST:g}): "
             "divide milliseconds by 1000, or nanoseconds by 1000000000; state the rate of a time lapse by --fps"
+        )
+    ahead = [times[:, [camera]] - np.delete(times, camera, axis=1) for camera in range(len(cameras))]  # of all others
+    offsets = [float(np.median(each[np.isfinite(each)])) if np.isfinite(each).any() else 0.0 for each in ahead]
+    offset, camera = max(zip(offsets, cameras, strict=True), key=lambda each: abs(each[0]))
+    if abs(offset) > _SLOWEST:
+        raise ValueError(
+            f"{path}: the times of camera {camera} are {abs(offset):.4g} s {'after' if offset > 0 else 'before'} those "
+            f"of the others, expected at most {_SLOWEST:g} s in a frame: subtract {offset:.4g} from them"
         )
     return times, remark
 

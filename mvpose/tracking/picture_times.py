@@ -20,6 +20,8 @@ _LARGEST = 1e11  # seconds: three thousand years; milliseconds since 1970 are mo
 _OLDEST = 1.0  # seconds: nobody knows where a joint was so long ago, because its velocity is forgotten as fast
 _SHARE = 0.1  # weight of the latest frame in the mean time between frames
 _BLIND = 1.0  # seconds without pictures, after which nobody's place is known anyhow
+_LAPSES = 3  # frames in a row, each this long after the one before, that are no accident
+_UNITS = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 
 
 class FrameTimes(NamedTuple):
@@ -34,7 +36,7 @@ class FrameTimes(NamedTuple):
     pictures: Bools
     """Whether each camera gave a picture that is used, (V,)."""
     too_old: bool
-    """Whether the picture of some camera is too old to be used."""
+    """Whether the picture of some camera is not used: it is too old, or its clock is ahead of those of most others."""
     latest: float
     """Time of the latest picture, seconds; NaN without any."""
 
@@ -58,6 +60,8 @@ class FrameClock:
     """Time of the latest picture, seconds."""
     dark: float = 0.0
     """Number of frames since then, none of which has pictures."""
+    lapses: int = 0
+    """Number of latest frames that came so long after their previous ones that nobody could be followed."""
 
     @property
     def started(self) -> bool:
@@ -80,7 +84,7 @@ class FrameClock:
             now = self.time + self.period if self.started else 0.0
             return FrameTimes(now, self._since(now), np.zeros(cameras), np.ones(cameras, np.bool_), False, now)
         _check(times, detections, cameras)
-        latest = _latest(times)
+        latest, ahead = _latest(times)
         if latest == -math.inf:
             # At half the speed after a while, so that the guess of a long time is not ahead of the next picture.
             step = self.interval if self.time - self.pictured < _BLIND else 0.5 * self.interval
@@ -92,14 +96,20 @@ class FrameClock:
                 "them, or start another tracker"
             )
         now = max(latest, self.time) if self.started else latest
-        lead, pictures, old = _leads(times, now, latest - _OLDEST)
-        if old >= 0:
+        lead, pictures, old = _leads(times, now, latest)
+        if ahead >= 0:
+            warnings.warn(
+                f"camera {ahead}: its picture is {times[ahead] - latest:.1f} s after those of most other cameras, and "
+                "is not used; subtract the offset of its clock from its times",
+                stacklevel=2,
+            )
+        elif old >= 0:
             warnings.warn(
                 f"camera {old}: a picture more than {_OLDEST:g} s before that of another camera is not used; give the "
                 "times of all cameras by one clock, and NaN for a camera without a new picture",
                 stacklevel=2,
             )
-        return FrameTimes(now, self._since(now), lead, pictures, old >= 0, latest)
+        return FrameTimes(now, self._since(now), lead, pictures, max(ahead, old) >= 0, latest)
 
     def take(self, times: FrameTimes) -> None:
         """Go on to a frame."""
@@ -107,8 +117,17 @@ class FrameClock:
             return
         self.dark += 1.0
         if not math.isnan(times.latest):
+            gap = (times.latest - self.pictured) / self.dark
             if 0.0 < times.latest - self.pictured < _BLIND:
-                self.interval += _SHARE * ((times.latest - self.pictured) / self.dark - self.interval)
+                self.interval += _SHARE * (gap - self.interval)
+            self.lapses = self.lapses + 1 if gap > _BLIND else 0
+            if self.lapses == _LAPSES:
+                unit = next((name for name, size in _UNITS.items() if gap < _BLIND * size), "nanoseconds")
+                warnings.warn(
+                    f"{_LAPSES} frames in a row came {gap:.4g} s after the previous one, over which people cannot be "
+                    f"followed: they get new identities. Are the times {unit}? Divide them by {_UNITS[unit]:g}",
+                    stacklevel=2,
+                )
             self.pictured, self.dark = times.latest, 0.0
         self.time = times.now
 
@@ -143,21 +162,35 @@ def _first_bad(times, view):
 
 @njit(cache=True)
 def _latest(times):
-    """Return the greatest time; minus infinity if all are NaN."""
-    latest = -np.inf
-    for time in times:
-        latest = max(latest, time)
-    return latest
+    """Return the time of the latest picture, and a camera that is ahead, -1 for none.
+
+    The pictures of cameras that are ahead of the majority by more than what is too old do not count. The time is minus
+    infinity if there is no picture.
+    """
+    ahead, bound = -1, np.inf
+    while True:
+        latest, count, near = -np.inf, 0, 0
+        for time in times:
+            if time < bound:
+                latest = max(latest, time)
+        for time in times:
+            count += time < bound
+            near += latest - _OLDEST <= time < bound
+        if 2 * near >= count:
+            return latest, ahead
+        for camera in range(len(times)):
+            ahead = camera if times[camera] == latest else ahead
+        bound = latest - _OLDEST
 
 
 @njit(cache=True)
-def _leads(times, now, oldest):
+def _leads(times, now, latest):
     """Return ``lead`` and ``pictures`` of :class:`FrameTimes`, and a camera whose picture is too old, or -1."""
     lead, pictures, old = np.zeros(len(times)), np.zeros(len(times), np.bool_), -1
     for camera in range(len(times)):
-        if times[camera] >= oldest:
+        if latest - _OLDEST <= times[camera] <= latest:
             lead[camera], pictures[camera] = times[camera] - now, True
-        elif times[camera] < oldest:
+        elif times[camera] < latest:
             old = camera if old < 0 else old
     return lead, pictures, old
 

@@ -58,6 +58,19 @@ class TestTimes:
         (folder / "times.csv").write_text("\n".join(lines) + "\n")
         return folder / "times.csv"
 
+    @pytest.mark.parametrize(("count", "camera", "offset"), [(3, 2, 10.0), (3, 0, -1.5), (5, 3, 3600.0)])
+    def test_a_camera_that_is_seconds_away_is_refused(self, tmp_path, count, camera, offset):
+        times = np.arange(20)[:, None] * 0.04 + np.random.default_rng(0).uniform(-0.1, 0.1, (1, count))
+        file, names = tmp_path / "times.txt", [f"c{k}" for k in range(count)]
+        np.savetxt(file, times)
+        np.testing.assert_allclose(read_times(file, 20, names)[0], times)
+        times[:, camera] += offset
+        np.savetxt(file, times)
+        message = rf"times of camera c{camera} are .* s {'after' if offset > 0 else 'before'} those of the others"
+        with pytest.raises(ValueError, match=message) as refusal:
+            read_times(file, 20, names)
+        assert float(str(refusal.value).split()[-3]) == pytest.approx(offset, abs=0.2)  # "subtract 10 from them"
+
     def test_milliseconds_are_refused(self, lab, tmp_path):
         times = self.write(tmp_path, *(str(40 * frame) for frame in range(16)))
         refused(estimate(lab, tmp_path / "out", "--times", times), "40 from frame to frame, expected seconds")

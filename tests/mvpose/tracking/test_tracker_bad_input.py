@@ -225,3 +225,56 @@ def test_whatever_comes_estimates_are_finite_and_in_order(preset, lag):
             assert estimate.matching.labels.shape == (len(frame),)
             assert estimate.matching.labels.max(initial=-1) < len(estimate)
         assert max(map(len, estimates)) <= 6
+
+
+def _clock_after(*times):
+    clock = FrameClock(period=0.04, interval=0.04)
+    for time in times:
+        clock.take(clock.read(_nothing(time), 5))
+    return clock
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9)])
+def test_times_from_zero_in_other_units_are_said_to_be(unit, factor):
+    """They are no times that cannot be: 40 s from frame to frame are a time lapse. It is said once."""
+    times = 0.04 * factor * np.arange(9)
+    clock = _clock_after(*times[:3])
+    said = f"came {times[1]:.4g} s after the previous one, .* Are the times {unit}? Divide them by {factor:g}"
+    with pytest.warns(UserWarning, match=said.replace("+", r"\+").replace("?", r"\?")):
+        clock.take(clock.read(_nothing(times[3]), 5))
+    for time in times[4:]:
+        clock.take(clock.read(_nothing(time), 5))
+
+
+def test_gaps_now_and_then_are_no_wrong_unit():
+    assert _clock_after(*np.cumsum([0.0, 40.0, 40.0, 0.04] * 3)).time == pytest.approx(240.12)
+
+
+@pytest.mark.parametrize("offsets", [{2: 10.0}, {0: 10.0}, {1: 30.0, 4: 10.0}, {1: 1.5, 4: 3.0}])
+def test_a_clock_that_is_ahead_of_most_costs_its_camera_alone(offsets):
+    """The people are those of the cameras that agree, to the byte; the message has the camera and its offset."""
+    rig, frames, truth = film(PATHS, np.arange(10) / RATE)
+    ahead = np.isin(np.arange(5), list(offsets))
+    tracker, alone = _tracker(), _tracker()
+    estimates = []
+    for frame in frames:
+        time = frame.time + [offsets.get(camera, 0.0) for camera in range(5)]
+        camera = min(offsets, key=offsets.get)
+        with pytest.warns(
+            UserWarning, match=rf"camera {camera}: its picture is {offsets[camera]:.1f} s after those of"
+        ):
+            estimates.append(tracker.estimate(rig, _at(frame, time)))
+        left = _at(frame.select(~ahead[frame.view]), np.where(ahead, np.nan, frame.time))
+        expected = alone.estimate(rig, left)
+        assert estimates[-1].time == expected.time
+        assert estimates[-1].joints.tobytes() == expected.joints.tobytes()
+    ids = identities(estimates, truth, reach=0.1)
+    assert (ids == ids[0]).all()
+    assert (ids >= 0).all()
+
+
+def test_of_two_halves_that_disagree_the_later_counts():
+    clock = _clock_after()
+    with pytest.warns(UserWarning, match="camera 0: a picture more than 1 s before"):
+        times = clock.read(_nothing([0.0, 0.0, 9.0, 9.0, np.nan]), 5)
+    assert (times.now, times.pictures.tolist()) == (9.0, [False, False, True, True, False])
