@@ -1,8 +1,8 @@
 """Lens distortion: pictures of a pinhole camera with the same field of view, warped to the lens.
 
 The pinhole picture covers every direction that the lens images and has at least the resolution of the distorted one
-everywhere. Colours are interpolated; depth, ids and parts are those of the nearest pixel, less than 0.75 pixels of the
-distorted picture away from the exact position.
+everywhere. Colours are interpolated; ids and parts are those of the nearest pixel, less than 0.75 pixels of the
+distorted picture away from the exact position; depth is that of the surface there, along the exact ray.
 """
 
 from collections.abc import Callable
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.camera import Camera
+from mvpose.kernels import njit
 from simharness.capture.rendering.renderer import Image
 from simharness.world.rigs.projection import project_to_image, undistorted
 
@@ -54,16 +55,56 @@ class Lens:
         rgb = cv2.remap(image.rgb, self.columns, self.rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
         return Image(
             rgb=rgb.astype(np.uint8, copy=False),
-            depth=self._picked(image.depth, np.inf),
+            depth=self._depth(image.depth),
             ids=self._picked(image.ids, -1),
             parts=None if image.parts is None else self._picked(image.parts, -1),
         )
+
+    def _depth(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+        result = _depth_at(depth, self.columns, self.rows, self.nearest)
+        if self.dark is not None:
+            result[self.dark] = np.inf
+        return result
 
     def _picked(self, values: NDArray, empty: float) -> NDArray:
         result = values.ravel()[self.nearest]
         if self.dark is not None:
             result[self.dark] = empty
         return result
+
+
+@njit(cache=True)
+def _depth_at(depth, columns, rows, nearest):
+    """Return the depth at positions in the picture of a pinhole camera, that of the surface at the nearest pixel.
+
+    The inverse of the depth of a plane is linear in the picture. Its slope at a pixel is, along each axis, the smaller
+    difference to a neighbour, because the other may be another surface: so the result is exact on planes, and never
+    beyond the neighbours.
+
+    Args:
+        depth: picture of the pinhole camera, (H, W), metres; infinite where there is no surface.
+        columns: see :class:`Lens`.
+        rows: see :class:`Lens`.
+        nearest: see :class:`Lens`.
+    """
+    height, width = depth.shape
+    result = np.empty(nearest.shape, depth.dtype)
+    for i in range(nearest.shape[0]):
+        for j in range(nearest.shape[1]):
+            row, column = nearest[i, j] // width, nearest[i, j] % width
+            inverse = 1.0 / depth[row, column]
+            moved = inverse
+            if inverse > 0.0:
+                for down, right, way in ((0, 1, columns[i, j] - column), (1, 0, rows[i, j] - row)):
+                    slope = np.inf
+                    for side in (-1, 1):
+                        y, x = row + side * down, column + side * right
+                        if 0 <= y < height and 0 <= x < width and depth[y, x] < np.inf:
+                            step = side * (1.0 / depth[y, x] - inverse)
+                            slope = step if abs(step) < abs(slope) else slope
+                    moved += slope * way if abs(slope) < np.inf else 0.0
+            result[i, j] = 1.0 / moved if moved > 0.0 else np.inf
+    return result
 
 
 def through_lens(camera: Camera, picture: Callable[[Camera], Image]) -> Image:
