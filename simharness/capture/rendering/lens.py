@@ -23,6 +23,7 @@ _MARGIN = 1  # pixels around the pinhole picture, for interpolation
 _LONGEST_SIDE = 16384  # pixels, limit of OpenGL
 _SAMPLES = 64  # samples of the magnification along each side; it changes smoothly
 _BAND = 64  # rows that are undistorted at once: whole pictures would take several times the memory of the lens
+_STEEPEST = 0.1  # relative change of depth from pixel to pixel of one surface: a floor ten rows below the horizon
 _KEPT = 64  # cached lenses: as many as a rig has cameras
 
 
@@ -78,8 +79,8 @@ def _depth_at(depth, columns, rows, nearest):
     """Return the depth at positions in the picture of a pinhole camera, that of the surface at the nearest pixel.
 
     The inverse of the depth of a plane is linear in the picture. Its slope at a pixel is, along each axis, the smaller
-    difference to a neighbour, because the other may be another surface: so the result is exact on planes, and never
-    beyond the neighbours.
+    difference to a neighbour, because the other may be another surface; where both differ much, it is not known, and
+    the depth is that of the pixel.
 
     Args:
         depth: picture of the pinhole camera, (H, W), metres; infinite where there is no surface.
@@ -96,13 +97,13 @@ def _depth_at(depth, columns, rows, nearest):
             moved = inverse
             if inverse > 0.0:
                 for down, right, way in ((0, 1, columns[i, j] - column), (1, 0, rows[i, j] - row)):
-                    slope = np.inf
+                    slope = _STEEPEST * inverse
                     for side in (-1, 1):
                         y, x = row + side * down, column + side * right
                         if 0 <= y < height and 0 <= x < width and depth[y, x] < np.inf:
                             step = side * (1.0 / depth[y, x] - inverse)
                             slope = step if abs(step) < abs(slope) else slope
-                    moved += slope * way if abs(slope) < np.inf else 0.0
+                    moved += slope * way if abs(slope) < _STEEPEST * inverse else 0.0
             result[i, j] = 1.0 / moved if moved > 0.0 else np.inf
     return result
 

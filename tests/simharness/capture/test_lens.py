@@ -71,12 +71,11 @@ def test_depth_is_that_along_the_own_ray_of_every_pixel(renderer, distortion):
     assert seen.mean() > 0.3
     np.testing.assert_allclose(renderer.render(camera, [floor]).depth[seen], expected[seen], atol=1e-3)
     depth = renderer.render(camera, [floor, wall]).depth
-    faces = (((-1.9, 0, 0), (1, 0, 0)), ((0, 0, 2), (0, 0, 1)), ((0, 1.5, 0), (0, 1, 0)), ((0, -1.5, 0), (0, 1, 0)))
-    error = np.min(
-        [np.abs(depth - each) for each in (expected, *(plane_depth(camera, *face) for face in faces))], axis=0
-    )
-    assert np.quantile(error[depth < 8], 0.99) < 2e-4
-    assert error[depth < 8].max() < 0.03  # at an edge, where the nearest pixel of the pinhole shows the other face
+    faces = [((-1.9, 0, 0), (1, 0, 0)), ((0, 0, 2), (0, 0, 1)), ((0, 1.5, 0), (0, 1, 0)), ((0, -1.5, 0), (0, 1, 0))]
+    near, planes = depth < 8, [expected, *(plane_depth(camera, *face) for face in faces)]
+    error = np.min([np.abs(depth[near] - each[near]) for each in planes], axis=0)
+    assert np.quantile(error, 0.99) < 2e-4
+    assert (error < 0.05 * depth[near]).all()  # at an edge the nearest pixel of the pinhole may show the other face
     face_on = replace(camera, R=np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]]), t=np.array([0, 0, 2.5]))
     np.testing.assert_allclose(renderer.render(face_on, [floor]).depth, 2.5, atol=5e-4)
 
