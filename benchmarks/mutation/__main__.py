@@ -58,9 +58,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.list:
         print("\n".join(f"{each.bug.id} {each.file} {each.described}" for each in mutants))
         return 0
-    # The tests and the changed file say what an outcome holds for; other files may change between the pieces of a run.
-    bench = Bench(options.folder, Records(options.folder / "records.jsonl", ""), workers=options.workers,
-                  limit=options.limit)  # fmt: skip
+    # A mutant that tests killed is known for as long as its file stays; new tests may kill survivors.
+    records = Records(options.folder / "records.jsonl", "")
+    for each in mutants:
+        outcome = records.outcome("tests", each.bug.id, each.bug.digest)
+        if outcome is not None and not outcome.caught:
+            records.forget("tests", each.bug.id, each.bug.digest)
+    bench = Bench(options.folder, records, workers=options.workers, limit=options.limit)
     outcomes = bench.tests([each.bug for each in mutants])
     equivalent = read_equivalent()
     print(table(mutants, outcomes, equivalent))

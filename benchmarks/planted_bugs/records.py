@@ -53,6 +53,10 @@ class Records:
         """Return the value of a key, or None."""
         return self._values.get(key)
 
+    def forget(self, *key: str) -> None:
+        """Forget the value of a key, if there is one; the file keeps it until another is added."""
+        self._values.pop(key, None)
+
     def add(self, *key: str, value: Outcome | dict[str, Any]) -> None:
         """Add a value and write it to the file at once; calls from several threads are safe."""
         plain = asdict(value) if isinstance(value, Outcome) else value
