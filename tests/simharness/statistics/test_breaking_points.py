@@ -24,6 +24,12 @@ def test_means_that_rise_again_are_pooled():
     assert (point.low, point.high) == (None, None)  # one seed has no interval
 
 
+@pytest.mark.parametrize("values", [[2, 1], [0, 1, 1], [0, 2, 1, 3], [], [[0, 1]]])
+def test_values_that_do_not_ascend_are_refused(values):
+    with pytest.raises(ValueError, match="values must be one row that ascends"):
+        breaking_point(values, np.ones((3, max(len(values), 1))), 0.5, better="higher")
+
+
 def test_a_score_at_the_threshold_is_good():
     assert breaking_point([1, 2], [[80, 80]] * 3, 80, better="higher").why == "never"
     assert breaking_point([1, 2], [[80, 79]] * 3, 80, better="higher").value == pytest.approx(1.0)

@@ -1,15 +1,17 @@
 """Closed forms of the scores of identities: a change halfway, people who swap, gaps, ghosts, distances."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from trackeval_oracle import random_case
 
-from mvpose import COCO17, SHELF14
+from mvpose import COCO17, SHELF14, Estimate, Matching
 from simharness.scoring.tracking.identity_figures import COUNTS, SHARES, identity_figures
 from simharness.scoring.tracking.identity_scores import ABSENT, MISSED, clear_mot, hota, identity_scores
-from simharness.scoring.tracking.tracked_frames import roots, tracked_frames
+from simharness.scoring.tracking.tracked_frames import ids_of, roots, tracked_frames
 
 RATE = 10.0
 BODY = np.random.default_rng(0).normal(0, 0.3, (17, 3))
@@ -44,6 +46,16 @@ def test_two_people_who_swap_identities_are_two_switches():
     assert frames.ids[names.track].tolist() == [2, 1]
     assert names.right == 40
     assert hota(frames, distance=0.5).association == pytest.approx(np.full(19, (10 * 10 / 50 + 20 * 20 / 40) / 30))
+
+
+def test_estimates_have_identities_only_if_all_frames_have():
+    named = [
+        Estimate(np.zeros((1, 17, 3)), np.ones((1, 17)), Matching(np.zeros(0, int)), ids=np.array([k]))
+        for k in range(3)
+    ]
+    nameless = replace(named[0], ids=None)
+    assert [each.tolist() for each in ids_of(named) or []] == [[0], [1], [2]]
+    assert [ids_of(each) for each in ([], [nameless], [named[0], nameless, named[1]])] == [None] * 3
 
 
 def test_gaps_and_absence():
