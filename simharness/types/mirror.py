@@ -54,3 +54,9 @@ class Mirror:
             (float(c * nx - s * ny), float(s * nx + c * ny), 0.0),
             self.half,
         )
+
+    def stretched(self, scale: ArrayLike) -> "Mirror":
+        """Return a mirror that faces x, stretched along x, y and z by ``scale`` (3,)."""
+        x, y, z = np.asarray(scale, float).tolist()
+        (cx, cy, cz), (dx, dy) = self.center, self.half
+        return Mirror((x * cx, y * cy, z * cz), self.normal, (y * dx, z * dy))

@@ -1,7 +1,7 @@
 """Geoms of objects for rays and contacts: boxes, cylinders and surfaces, each added to MuJoCo as one geom."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol, Self
 
@@ -140,16 +140,17 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangle mesh as a geom: rays test every triangle, contacts use the convex hull."""
+    """Triangle mesh as a geom: rays test every triangle, contacts use the convex hull, if it ``touches`` anything."""
 
     vertices: Floats
     """Positions, (n, 3), metres."""
     faces: NDArray[np.int32]
     """Vertex indices, (k, 3)."""
+    touches: bool = True
 
     def moved(self, place: ArrayLike, yaw: float) -> "Surface":
         """See :class:`Geom`."""
-        return Surface(carried(self.vertices, place, yaw), self.faces)
+        return replace(self, vertices=carried(self.vertices, place, yaw))
 
     def add_to(self, spec: mujoco.MjSpec, body: Any, name: str) -> None:
         """See :class:`Geom`; the mesh asset gets the same name."""
@@ -161,7 +162,8 @@ class Surface:
             userface=np.asarray(self.faces, np.int32).ravel(),
             inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,  # a surface may be open; its mass is not used
         )
-        body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name)
+        touches = {} if self.touches else {"contype": 0, "conaffinity": 0}
+        body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **touches)
 
 
 def carried(points: ArrayLike, place: ArrayLike, yaw: float) -> Floats:

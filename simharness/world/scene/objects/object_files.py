@@ -11,9 +11,7 @@ floor meet. Lengths are metres, z is up and the front is +x.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -27,7 +25,7 @@ from mvpose.files.message_text import one_line
 from mvpose.skeleton import COCO17
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
-from simharness.world.scene.objects.geoms import Box, Cylinder, Surface, carried
+from simharness.world.scene.objects.geoms import Box, Cylinder, Surface
 from simharness.world.scene.objects.materials import Sheet
 from simharness.world.scene.objects.shapes import bar_mesh, box_mesh, joined, lathe
 from simharness.world.scene.objects.solids import ObjectModel
@@ -56,6 +54,7 @@ class _Part:
         texture: name of its texture.
         uv: texture coordinates of the corners of the faces, (k, 3, 2); None where the texture is projected on them.
         kind: its type in MuJoCo.
+        touches: whether people can touch it.
     """
 
     mesh: Mesh
@@ -64,18 +63,22 @@ class _Part:
     texture: str = ""
     uv: NDArray[np.float32] | None = None
     kind: mujoco.mjtGeom = mujoco.mjtGeom.mjGEOM_MESH
+    touches: bool = True
 
     @property
     def vertices(self) -> Floats:
         """Positions of its vertices in the file, (n, 3), metres."""
         return self.mesh.vertices @ self.turn.T + self.place
 
-    def geoms(self, points: Floats) -> tuple[Box | Surface, ...]:
-        """Return the geom of the part with its vertices at ``points`` (n, 3); none for a sheet, which has no hull."""
-        if np.ptp(self.mesh.vertices, axis=0).min() < _FLAT:
-            return ()
-        is_upright = self.kind == mujoco.mjtGeom.mjGEOM_BOX and np.allclose(self.turn, np.eye(3), atol=1e-6)
-        return (Box.around(points) if is_upright else Surface(points, self.mesh.faces),)
+    def geom(self, points: Floats) -> Box | Surface:
+        """Return the geom of the part with its vertices at ``points`` (n, 3).
+
+        Round geoms are the meshes that pictures show of them, so that rays and pictures agree.
+        """
+        if self.kind == mujoco.mjtGeom.mjGEOM_BOX and self.touches and np.allclose(self.turn, np.eye(3), atol=1e-6):
+            return Box.around(points)
+        is_flat = np.ptp(self.mesh.vertices, axis=0).min() < _FLAT  # without a hull for contacts
+        return Surface(points, self.mesh.faces, touches=self.touches and not is_flat)
 
 
 @dataclass(frozen=True)
@@ -87,9 +90,7 @@ class ObjectFile:
     parts: tuple[_Part, ...]
     """Its parts."""
     textures: Mapping[str, NDArray[np.uint8]]
-    """Its pictures by name, (h, w, 3) uint8; empty for shipped objects, whose textures are those of a sheet."""
-    spec: mujoco.MjSpec
-    """MuJoCo model of the geoms alone."""
+    """Its pictures by name, (h, w, 3) uint8; where it is shown with a sheet, those of the same names replace them."""
     offset: Floats
     """Vector that moves the object to its place on the floor, (3,), metres."""
     size: Floats
@@ -119,39 +120,14 @@ class ObjectFile:
         mesh = joined(*meshes)
         return mesh if sheet is None else replace(mesh, texture=sheet.texture, uv=np.concatenate(uv))
 
-    def model(self, sheet: Sheet | None = None) -> ObjectModel:
-        """Return the model to be placed; see :meth:`mesh`."""
-        x, y, z = self.offset.tolist()
-        return ObjectModel(self.mesh(sheet), (AttachedGeoms(self.spec, (x, y, z)),), self.figure, self.mirror)
-
-    def stretched(self, scale: ArrayLike) -> ObjectModel:
-        """Return the model stretched along x, y and z by ``scale`` (3,), in its own colours; no mirror or decoy is."""
-        points = [(part.vertices + self.offset) * np.asarray(scale, float) for part in self.parts]
-        mesh = self.mesh().moved(np.concatenate(points).astype(np.float32))
-        geoms = [part.geoms(each) for part, each in zip(self.parts, points, strict=True)]
-        return ObjectModel(mesh, tuple(chain(*geoms)))
-
-
-@dataclass(frozen=True)
-class AttachedGeoms:
-    """Geoms of a file, attached to the model of a scene as a whole."""
-
-    spec: mujoco.MjSpec
-    """MuJoCo model of the geoms."""
-    place: tuple[float, float, float]
-    """Position of its origin, (3,), metres."""
-    yaw: float = 0.0
-    """Rotation about z, radians."""
-
-    def moved(self, place: ArrayLike, yaw: float) -> "AttachedGeoms":
-        """See :class:`~simharness.world.scene.objects.geoms.Geom`."""
-        x, y, z = carried(self.place, place, yaw).tolist()
-        return AttachedGeoms(self.spec, (x, y, z), self.yaw + yaw)
-
-    def add_to(self, spec: mujoco.MjSpec, body: Any, name: str) -> None:
-        """See :class:`~simharness.world.scene.objects.geoms.Geom`; names of geoms begin with that of the object."""
-        frame = body.add_frame(pos=self.place, quat=[np.cos(self.yaw / 2), 0.0, 0.0, np.sin(self.yaw / 2)])
-        spec.attach(self.spec.copy(), prefix=f"{name}/", frame=frame)
+    def model(self, sheet: Sheet | None = None, *, scale: ArrayLike = (1.0, 1.0, 1.0)) -> ObjectModel:
+        """Return the model to be placed, stretched along x, y and z by ``scale`` (3,); see :meth:`mesh`."""
+        stretch: Floats = np.asarray(scale, float)
+        points: list[Floats] = [(part.vertices + self.offset) * stretch for part in self.parts]
+        mesh = self.mesh(sheet).moved(np.concatenate(points).astype(np.float32))
+        geoms = (part.geom(each) for part, each in zip(self.parts, points, strict=True))
+        figure = None if self.figure is None else self.figure * stretch
+        return ObjectModel(mesh, tuple(geoms), figure, None if self.mirror is None else self.mirror.stretched(scale))
 
 
 def variants(name: str) -> tuple[Path, ...]:
@@ -163,17 +139,8 @@ def variants(name: str) -> tuple[Path, ...]:
 def draw_shipped(rng: np.random.Generator, name: str, stretch: float, *, height: float | None = None) -> ObjectModel:
     """Draw a variant of a shipped object, stretched in width and height by up to a share, or to a height in metres."""
     files = variants(name)
-    file, (wide, tall) = load_whole(files[rng.integers(len(files))]), 1 + stretch * rng.uniform(-1, 1, 2)
-    return file.stretched((wide, wide, tall if height is None else height / file.size[2]))
-
-
-@lru_cache(maxsize=_KEPT)
-def load_shipped(path: Path) -> ObjectFile:
-    """Return a shipped object, read once in a process; its textures are not read."""
-    spec = mujoco.MjSpec.from_file(str(path))
-    for texture in spec.textures:
-        texture.file, texture.builtin, texture.width, texture.height = "", mujoco.mjtBuiltin.mjBUILTIN_FLAT, 1, 1
-    return replace(_object_file(path, spec), textures={})
+    file, (wide, tall) = load_shipped(files[rng.integers(len(files))]), 1 + stretch * rng.uniform(-1, 1, 2)
+    return file.model(scale=(wide, wide, tall if height is None else height / file.size[2]))
 
 
 def object_dependencies(path: Path) -> tuple[Path, ...]:
@@ -209,8 +176,8 @@ def load_object(path: Path) -> ObjectFile:
     return result
 
 
-load_whole = lru_cache(maxsize=_KEPT)(load_object)
-"""Loading of a shipped object with its own textures, read once in a process."""
+load_shipped = lru_cache(maxsize=_KEPT)(load_object)
+"""Loading of a shipped object, read once in a process."""
 
 
 def _object_file(path: Path, spec: mujoco.MjSpec) -> ObjectFile:
@@ -222,7 +189,6 @@ def _object_file(path: Path, spec: mujoco.MjSpec) -> ObjectFile:
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    geoms = mujoco.MjSpec()
     parts = []
     for geom in range(model.ngeom):
         color = _color(model, geom)
@@ -232,8 +198,9 @@ def _object_file(path: Path, spec: mujoco.MjSpec) -> ObjectFile:
         turn = data.geom_xmat[geom].reshape(3, 3).copy()
         texture = _texture(model, geom)
         kind = mujoco.mjtGeom(int(model.geom_type[geom]))
-        parts.append(_Part(mesh, data.geom_xpos[geom].copy(), turn, texture, uv if texture else None, kind))
-        _add_geom(geoms, model, data, geom, mesh)
+        touches = bool(model.geom_contype[geom] or model.geom_conaffinity[geom])
+        place, uv = data.geom_xpos[geom].copy(), uv if texture else None
+        parts.append(_Part(mesh, place, turn, texture, uv, kind, touches))
     if not parts:
         raise ValueError("it has no geom that is visible (group 0 to 2, alpha above 0): add a geom")
     vertices = np.concatenate([part.vertices for part in parts])
@@ -244,7 +211,7 @@ def _object_file(path: Path, spec: mujoco.MjSpec) -> ObjectFile:
     figure = [sites[name] + offset for name in COCO17.joints] if set(COCO17.joints) <= set(sites) else None
     size = next((numbers.data for numbers in spec.numerics if numbers.name == "size"), high - low)
     shown = None if figure is None else np.array(figure)
-    return ObjectFile(path, tuple(parts), pictures, geoms, offset, np.array(size), shown, _mirror(model, data, offset))
+    return ObjectFile(path, tuple(parts), pictures, offset, np.array(size), shown, _mirror(model, data, offset))
 
 
 def _mirror(model: mujoco.MjModel, data: mujoco.MjData, offset: Floats) -> Mirror | None:
@@ -343,33 +310,6 @@ def _creased(vertices: Floats, faces: NDArray[np.int32]) -> tuple[Floats, NDArra
     points = np.empty((count, 3))
     points[which] = vertices[corners.ravel()]
     return points, which.reshape(-1, 3)
-
-
-def _add_geom(spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, geom: int, mesh: Mesh) -> None:
-    """Add a geom of a compiled model to a spec, at its position in the world, without its appearance.
-
-    Round geoms become the meshes that pictures show of them, so that rays and pictures agree.
-    """
-    quat = np.empty(4)
-    mujoco.mju_mat2Quat(quat, data.geom_xmat[geom])
-    name = model.geom(geom).name or f"geom{geom}"
-    shape: dict[str, Any] = {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": model.geom_size[geom]}
-    if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_BOX:
-        shape = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": name}
-        spec.add_mesh(
-            name=name,
-            uservert=mesh.vertices.ravel(),
-            userface=mesh.faces.ravel(),
-            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,  # a surface may be open; its mass is not used
-        )
-    spec.worldbody.add_geom(
-        name=name,
-        pos=data.geom_xpos[geom],
-        quat=quat,
-        contype=int(model.geom_contype[geom]),
-        conaffinity=int(model.geom_conaffinity[geom]),
-        **shape,
-    )
 
 
 def _within(uv: NDArray[np.float32]) -> Floats:

@@ -5,7 +5,7 @@ import numpy as np
 from simharness.types.random_streams import stream
 from simharness.world.motion.motion import Prop
 from simharness.world.scene.objects.laboratory import BOX_COLORS, taped
-from simharness.world.scene.objects.object_files import load_whole, variants
+from simharness.world.scene.objects.object_files import load_shipped, variants
 from simharness.world.scene.objects.shapes import box_model
 from simharness.world.scene.objects.solids import ObjectModel, Solid
 
@@ -31,5 +31,5 @@ def _model(prop: Prop, tint: int) -> ObjectModel:
     if prop.kind == "box":
         return box_model(*taped(np.array(prop.size), BOX_COLORS[tint % len(BOX_COLORS)], base=0.0, yaw=0.0))
     files = variants(prop.kind)
-    file = load_whole(files[tint % len(files)])
-    return file.stretched(np.array(prop.size) / file.size)
+    file = load_shipped(files[tint % len(files)])
+    return file.model(scale=np.array(prop.size) / file.size)

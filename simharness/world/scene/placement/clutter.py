@@ -17,7 +17,7 @@ from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.laboratory import draw_box, draw_shelf
 from simharness.world.scene.objects.mannequin import draw_mannequin
 from simharness.world.scene.objects.materials import draw_sheet
-from simharness.world.scene.objects.object_files import draw_shipped, load_object, load_shipped, load_whole, variants
+from simharness.world.scene.objects.object_files import draw_shipped, load_object, load_shipped, variants
 from simharness.world.scene.objects.solids import ObjectModel, Solid, yaw_of
 from simharness.world.scene.placement.free_space import (
     BODY_HALF_WIDTH,
@@ -267,7 +267,7 @@ def _decoy(rng: np.random.Generator, name: str, on_wall: bool) -> ObjectModel:
     if name == "mannequin":
         return draw_mannequin(rng)
     files = variants(f"{'wall_' * on_wall}{name.replace(' ', '_')}")
-    return load_whole(files[rng.integers(len(files))]).model()
+    return load_shipped(files[rng.integers(len(files))]).model()
 
 
 def _at_wall(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:

@@ -7,7 +7,7 @@ from walkers import Rays, ring, space
 from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.mannequin import draw_mannequin
-from simharness.world.scene.objects.object_files import load_whole, variants
+from simharness.world.scene.objects.object_files import load_shipped, variants
 from simharness.world.scene.placement.clutter import place_clutter, place_decoys
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH
 
@@ -53,7 +53,7 @@ def test_figures_are_upright_and_face_forward(placed):
 @pytest.mark.parametrize("path", [*variants("poster"), *variants("wall_poster")], ids=lambda path: path.stem)
 def test_the_joints_of_a_poster_lie_on_its_picture(path):
     """The colours at the joints, read through the uv of the texture, are those of skin, shirt and trousers."""
-    model = load_whole(path).model()
+    model = load_shipped(path).model()
     mesh = model.mesh
     printed = np.flatnonzero(np.ptp(mesh.uv[..., 1], axis=1) * mesh.texture.shape[0] > 500)
     assert len(printed) == 2
@@ -81,14 +81,14 @@ def test_a_mannequin_is_a_body_of_one_colour():
 
 @pytest.mark.parametrize("path", variants("coat_stand"), ids=lambda path: path.stem)
 def test_a_coat_occludes_what_is_behind_it(path):
-    solid = load_whole(path).model().at((0, 0), 0.0, kind="decoy", name="coat")
+    solid = load_shipped(path).model().at((0, 0), 0.0, kind="decoy", name="coat")
     chest = solid.figure[[5, 6, 11, 12]].mean(axis=0)
     assert np.isfinite(Rays([solid]).distance(chest + [2, 0, 0], np.array([chest - [2, 0, 0]]))).all()
 
 
 @pytest.mark.parametrize("path", [*variants("mirror"), *variants("wall_mirror")], ids=lambda path: path.stem)
 def test_the_glass_of_a_mirror_lies_on_its_front(path):
-    solid = load_whole(path).model().at((0.7, -0.2), 0.9, kind="decoy", name="mirror")
+    solid = load_shipped(path).model().at((0.7, -0.2), 0.9, kind="decoy", name="mirror")
     glass = solid.mirror
     center, normal = np.array(glass.center), np.array(glass.normal)
     rays = Rays([solid])

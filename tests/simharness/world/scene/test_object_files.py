@@ -18,7 +18,6 @@ from simharness.world.scene.objects.object_files import (
     ASSETS,
     load_object,
     load_shipped,
-    load_whole,
     object_dependencies,
     variants,
 )
@@ -102,7 +101,7 @@ def test_what_mujoco_hides_is_neither_shown_nor_in_the_way(write):
     np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), [0.4, 0.4, 0.5], atol=1e-6)
     assert {tuple(color) for color in mesh.colors.astype(float).round(3).tolist()} == {(0.8, 0.2, 0.1), (0.5, 0.5, 0.5)}
     assert mesh.texture is None
-    assert object_.spec.compile().ngeom == 2
+    assert len(object_.model().geoms) == 2
 
 
 def test_meshes_and_pictures_of_a_material_are_shown(write, tmp_path):
@@ -255,8 +254,8 @@ def test_rooms_name_objects_that_ship():
 @pytest.mark.parametrize("name", ["chair", "potted_plant", "laid_table", "cart"])
 def test_a_stretched_object_is_as_large_as_its_scale_says(name):
     """Mesh and geoms are stretched alike: the seat of a chair with its depth, width and height."""
-    file, scale = load_whole(variants(name)[0]), np.array([1.1, 0.8, 1.3])
-    model = file.stretched(scale)
+    file, scale = load_shipped(variants(name)[0]), np.array([1.1, 0.8, 1.3])
+    model = file.model(scale=scale)
     np.testing.assert_allclose(model.extent.half, file.model().extent.half * scale, rtol=1e-5)
     solid = model.at((0.0, 0.0), 0.0, kind="clutter", name=name)
     middle, half = np.array(solid.hull.center), np.array(solid.hull.half)
@@ -282,7 +281,7 @@ def test_a_box_that_reflects_is_a_mirror(write):
 def test_a_shipped_object_opens_in_mujoco_and_stands_on_the_floor(file):
     model = mujoco.MjModel.from_xml_path(str(file))
     object_, sheet = load_shipped(file), None if file.stem.split(".")[0] in ("poster", "wall_poster") else draw_sheet(0)
-    mesh = load_whole(file).mesh() if sheet is None else object_.mesh(sheet)
+    mesh = load_shipped(file).mesh() if sheet is None else object_.mesh(sheet)
     assert len(object_.parts) == model.ngeom
     assert sheet is None or mesh.texture is sheet.texture
     if file.stem.startswith("wall_") and not file.stem.startswith("wall_bars"):  # it hangs on the plane x = 0
