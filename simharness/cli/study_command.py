@@ -178,11 +178,11 @@ def _tables(results: "Results") -> "list[ScoreTable]":
 def _losses(results: "Results", score: str) -> "ScoreTable":
     """Return what every factor costs: the score at its best and worst value, and where five points are lost."""
     from simharness.cli.score_tables import ScoreTable
-    from simharness.outputs.study.curves import LOST, losses
+    from simharness.outputs.study.curves import losses
     from simharness.outputs.study.plots import short
     from simharness.runtime.number_text import fixed
     from simharness.scoring.catalogue import SCORES
-    from simharness.study.factors import factors_by_case
+    from simharness.study.factors import LOST, factors_by_case
 
     info = SCORES[score]
     by_case = factors_by_case(results)

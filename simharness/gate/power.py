@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from simharness.gate.baseline import GATED, TIME, Measurement
 from simharness.gate.score_tests import least_two_sided_p, pairs_of
 from simharness.scenario.sections.gate_section import GateSection
@@ -101,7 +101,7 @@ def needed_seeds(change: float, spread: float, tolerance: float, level: float) -
     return int(seeds[enough[0]]) if len(enough) else None
 
 
-def _least_changes(seeds: Floats, spread: float, tolerance: float, level: float) -> Floats:
+def _least_changes(seeds: Integers, spread: float, tolerance: float, level: float) -> Floats:
     error, margin = spread / np.sqrt(seeds), float(ndtri(POWER))
     change = np.maximum((stdtrit(seeds - 1, 1 - level / 2) + margin) * error, tolerance + margin * error)
     possible = np.array([least_two_sided_p(int(each)) for each in seeds]) <= level

@@ -73,7 +73,7 @@ class Sweep:
         return replace(
             self,
             axes=tuple(
-                replace(axis, values=tuple(sorted((*axis.values, *((value,) for value in new)))))  # type: ignore[type-var]
+                replace(axis, values=tuple(sorted((*axis.values, *((value,) for value in new)))))
                 if (new := added.get(axis.keys[0], ()))
                 else axis
                 for axis in self.axes

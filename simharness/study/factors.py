@@ -20,6 +20,9 @@ from simharness.study.study_folder import Results
 THRESHOLDS: Mapping[str, float] = {"pcp": 90.0, "precision": 90.0}
 """Default thresholds of the breaking points. Ghosts do not lower PCP; they lower precision."""
 
+LOST = 5.0
+"""Points of a percentage whose loss is reported."""
+
 _NARROW = 0.25  # share of an interval below which a gap at its end is not refined
 
 
@@ -147,12 +150,13 @@ def breaking_along(
 
 
 def factor_breaking_points(
-    factor: Factor, variants: Sequence[str], score: str, threshold: float
+    factor: Factor, variants: Sequence[str], score: str, threshold: float, *, relative: bool = False
 ) -> list[FactorBreakingPoint]:
     """Return the value of a numeric factor at which each variant's score passes the threshold.
 
     A factor may do harm as it grows (clutter) or as it shrinks (cameras); the end with the worse score decides.
-    Variants without the score are left out.
+    Variants without the score are left out. With ``relative`` the threshold is one of changes against the better end,
+    seed by seed.
     """
     better = SCORES[score].better
     points = []
@@ -160,8 +164,11 @@ def factor_breaking_points(
         table = factor.table(variant, score)
         if not np.isfinite(table).any():
             continue
-        ends = [column[np.isfinite(column)].mean() for column in table.T if np.isfinite(column).any()]
+        known = np.flatnonzero(np.isfinite(table).any(axis=0))
+        ends = [float(np.nanmean(table[:, k])) for k in known]
         falls = ends[-1] == ends[0] or (ends[-1] < ends[0]) == (better == "higher")
+        if relative:
+            table = table - table[:, [known[0] if falls else known[-1]]]
         values = np.array(factor.values, float)
         rising, point = breaking_along(values, table, threshold, better=better, rising=bool(falls))
         swept = (float(values[0]), float(values[-1]))
@@ -183,8 +190,10 @@ def refined_values(results: Results, left: Mapping[str, int]) -> dict[str, tuple
         for factor in factors(results, case):
             if not factor.numeric or factor.along:
                 continue
-            for score, threshold in THRESHOLDS.items():
-                for each in factor_breaking_points(factor, results.info["variants"], score, threshold):
+            wanted = [*((score, threshold, False) for score, threshold in THRESHOLDS.items()), ("pcp", -LOST, True)]
+            for score, threshold, relative in wanted:
+                variants = results.info["variants"]
+                for each in factor_breaking_points(factor, variants, score, threshold, relative=relative):
                     gap = _gap(factor.values, each.point)
                     gaps.setdefault(factor.key, Counter()).update([gap] if gap else [])
     added = {}

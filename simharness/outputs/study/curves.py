@@ -24,7 +24,7 @@ from simharness.scoring.catalogue import SCORES, ScoreInfo
 from simharness.statistics.breaking_points import BreakingPoint
 from simharness.statistics.intervals import Interval, mean_interval
 from simharness.study.causes.cause_shares import Blame, blame
-from simharness.study.factors import Factor, breaking_along
+from simharness.study.factors import LOST, Factor, breaking_along
 from simharness.study.study_folder import Results
 
 
@@ -94,9 +94,6 @@ def _description(key: str) -> str:
         section, description = field.annotation, field.description
     return description or ""
 
-
-LOST = 5.0
-"""Points of a percentage whose loss is reported."""
 
 _ALIKE = 0.02  # relative difference of breaking points that one number describes
 

@@ -15,14 +15,21 @@ from simharness.outputs import TEMPLATES
 from simharness.outputs.blame_section import blame_section
 from simharness.outputs.run.plots import stage_times
 from simharness.outputs.study import plots, tables
-from simharness.outputs.study.curves import LOST, Loss, finding, grid, losses, panels
+from simharness.outputs.study.curves import Loss, finding, grid, losses, panels
 from simharness.outputs.study.tables import failure_section
 from simharness.outputs.study.worst_frames import WorstFramePictures, show, worst_frames
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scoring.catalogue import SCORES
 from simharness.study.causes.blame_text import read_blame
 from simharness.study.causes.cause_shares import Blame
-from simharness.study.factors import THRESHOLDS, Factor, FactorBreakingPoint, factor_breaking_points, factors_by_case
+from simharness.study.factors import (
+    LOST,
+    THRESHOLDS,
+    Factor,
+    FactorBreakingPoint,
+    factor_breaking_points,
+    factors_by_case,
+)
 from simharness.study.study_folder import Results
 
 CURVES = ("pcp", "recall", "mpjpe_mm", "ghosts")

@@ -90,8 +90,17 @@ def test_an_interrupted_refinement_goes_on_and_ends_with_the_same_values(tmp_pat
     assert set(whole[0]) < set(points(more)[0])
 
 
+def test_the_loss_of_five_points_is_refined(tmp_path, monkeypatch):
+    made = make_study(tmp_path, factors={"faults.rotation": [0.0, 1.0, 3.0]}, slope=-4.0, variants=("full",))
+    monkeypatch.setattr(study_factors, "THRESHOLDS", {})
+    assert refined_values(made, {"faults.rotation": 1}) == {"faults.rotation": (2.0,)}  # 4 points are lost at 1
+    (lost,) = factor_breaking_points(factors(made)[0], ["full"], "pcp", -5.0, relative=True)
+    assert lost.point.value == pytest.approx(1.25)
+
+
 def test_integers_without_one_between_them_and_breaks_that_seeds_hide_are_not_refined(tmp_path, monkeypatch):
     made = make_study(tmp_path, factors={"cameras.count": [2, 4, 5, 6]}, slope=8.0, variants=("full",))
+    monkeypatch.setattr(study_factors, "LOST", 200.0)
     monkeypatch.setattr(study_factors, "THRESHOLDS", {"pcp": 84.0})  # 76, 92, 100, 108: between 2 and 4
     assert refined_values(made, {"cameras.count": 5}) == {"cameras.count": (3,)}
     assert refined_values(made, {"cameras.count": 0}) == {}
