@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from mvpose import COCO17, Detections, Estimate, Rig
 from mvpose.arrays import Floats
 from mvpose.checks import set_arrays
+from mvpose.recording import People
 from simharness.types.truth import Truth
 
 _SAME_TIME = 1e-6  # seconds: nobody moves a hundredth of a millimetre in it
@@ -59,6 +61,27 @@ class Recording:
     def __len__(self) -> int:
         """T, the number of frames."""
         return len(self.time)
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: cameras and true paths from above, and counts of each camera."""
+        from mvpose.report.recording_plots import paths_from_above  # with Matplotlib, which estimates do not need
+        from mvpose.report.svg_plots import plot_sheet
+
+        people = People(self.time, np.arange(self.people), np.stack([each.joints for each in self.truth]))
+        plot = plot_sheet([[paths_from_above(f"recording-{id(self)}", people, self.rig)]])
+        views = np.concatenate([each.view for each in self.detections])
+        false = np.concatenate([each.person < 0 for each in self.truth])
+        rows = [
+            f"<tr><th>{escape(camera.name)}<td>{(views == view).sum()}<td>{false[views == view].sum()}"
+            for view, camera in enumerate(self.rig)
+        ]
+        seconds = self.time[-1] - self.time[0]
+        return (
+            f"<div><b>{len(self)} frames in {seconds:.2f} s, {self.people} people, {len(self.rig)} cameras</b>"
+            f'<div style="display: flex; align-items: center; gap: 1em"><div style="flex: none">{plot}</div>'
+            "<table style='text-align: right'><tr><th>camera<th>detections<th>of nobody"
+            f"{''.join(rows)}</table></div></div>"
+        )
 
     def at_times_of(self, estimates: Sequence[Estimate]) -> "Recording":
         """Return the recording with the true joints at the times of estimates, T, that are not those of the frames.
