@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simharness.types.mesh import Mesh
-from simharness.world.scene.objects.geoms import Box, Cylinder, carried
+from simharness.world.scene.objects.geoms import Box, carried
 from simharness.world.scene.objects.materials import Material, Sheet
 from simharness.world.scene.objects.shapes import bar_mesh, box_mesh, joined, lathe, quad_mesh
 
@@ -59,11 +59,7 @@ class Furnishing:
         sides: int = 8,
     ) -> Self:
         """Add a round bar from one point to another, metres."""
-        a, b = np.asarray(start, float), np.asarray(end, float)
-        length = float(np.linalg.norm(b - a))
-        x, y, z = ((a + b) / 2).tolist()
-        i, j, k = ((b - a) / length).tolist()
-        return self.part(bar_mesh(Cylinder((x, y, z), radius, length / 2, (i, j, k)), color, sides=sides), material)
+        return self.part(bar_mesh(start, end, radius, color, sides=sides), material)
 
     def turned(
         self,

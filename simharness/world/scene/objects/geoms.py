@@ -1,4 +1,4 @@
-"""Geoms of objects for rays and contacts: boxes, cylinders and surfaces, each added to MuJoCo as one geom."""
+"""Geoms of objects for rays and contacts: boxes and surfaces, each added to MuJoCo as one geom."""
 
 import math
 from dataclasses import dataclass, replace
@@ -106,36 +106,6 @@ class Box:
 
         quat = [np.cos(self.yaw / 2), 0.0, 0.0, np.sin(self.yaw / 2)]
         body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_BOX, pos=self.center, size=self.half, quat=quat)
-
-
-@dataclass(frozen=True)
-class Cylinder:
-    """Round bar or disc.
-
-    Attributes:
-        center: centre, (3,), metres.
-        radius, half: radius and half the length, metres.
-        axis: unit vector along the axis, (3,).
-    """
-
-    center: Point
-    radius: float
-    half: float
-    axis: Point = (0.0, 0.0, 1.0)
-
-    def moved(self, place: ArrayLike, yaw: float) -> "Cylinder":
-        """See :class:`Geom`."""
-        axis = _carried(self.axis, (0.0, 0.0), yaw)
-        return Cylinder(_carried(self.center, place, yaw), self.radius, self.half, axis)
-
-    def add_to(self, spec: mujoco.MjSpec, body: Any, name: str) -> None:
-        """See :class:`Geom`."""
-        import mujoco
-
-        quat = np.empty(4)
-        mujoco.mju_quatZ2Vec(quat, np.array(self.axis))
-        size = [self.radius, self.half, 0.0]
-        body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_CYLINDER, pos=self.center, size=size, quat=quat)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
 from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.shape import Shape
-from simharness.world.scene.objects.geoms import Cylinder, Surface
+from simharness.world.scene.objects.geoms import Surface
 from simharness.world.scene.objects.shapes import bar_mesh, joined
 from simharness.world.scene.objects.solids import ObjectModel
 
@@ -49,9 +49,9 @@ def draw_mannequin(rng: np.random.Generator) -> ObjectModel:
         colors=np.tile(color.astype(np.float32), (len(body.faces), 1)),
         smooth=True,
     )
-    foot = Cylinder((0.0, 0.0, base / 2), 0.27, base / 2)
-    mesh = joined(statue, bar_mesh(foot, _BASE, sides=28))
-    return ObjectModel(mesh, (Surface(statue.vertices.astype(float), statue.faces), foot), body.joints(bones) + offset)
+    foot = bar_mesh((0.0, 0.0, 0.0), (0.0, 0.0, base), 0.27, _BASE, sides=28)
+    geoms = tuple(Surface(mesh.vertices.astype(float), mesh.faces) for mesh in (statue, foot))
+    return ObjectModel(joined(statue, foot), geoms, body.joints(bones) + offset)
 
 
 def _posed(body: Body, turns: Mapping[str, Floats]) -> Floats:

@@ -25,7 +25,7 @@ from mvpose.files.message_text import one_line
 from mvpose.skeleton import COCO17
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
-from simharness.world.scene.objects.geoms import Box, Cylinder, Surface
+from simharness.world.scene.objects.geoms import Box, Surface
 from simharness.world.scene.objects.materials import Sheet
 from simharness.world.scene.objects.shapes import bar_mesh, box_mesh, joined, lathe
 from simharness.world.scene.objects.solids import ObjectModel
@@ -259,7 +259,7 @@ def _shape(model: mujoco.MjModel, geom: int, color: Floats) -> tuple[Mesh, NDArr
     if kind == mujoco.mjtGeom.mjGEOM_BOX:
         return box_mesh([Box((0.0, 0.0, 0.0), (a, b, c))], color[None]), None
     if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        return bar_mesh(Cylinder((0.0, 0.0, 0.0), a, b), color, sides=sides), None
+        return bar_mesh((0.0, 0.0, -b), (0.0, 0.0, b), a, color, sides=sides), None
     round_ = {"mjGEOM_SPHERE": (a, a, a, 0.0), "mjGEOM_CAPSULE": (a, a, a, b), "mjGEOM_ELLIPSOID": (a, b, c, 0.0)}
     if kind.name not in round_:
         raise ValueError(

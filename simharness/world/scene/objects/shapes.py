@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
-from simharness.world.scene.objects.geoms import Box, Cylinder
+from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.solids import ObjectModel
 
 # Corners of each side of a Box in the order of its corners, counter-clockwise from outside: -x, +x, -y, +y, -z, +z.
@@ -46,15 +46,16 @@ def box_mesh(boxes: Sequence[Box], colors: ArrayLike) -> Mesh:
     return quad_mesh(vertices, np.arange(len(vertices)).reshape(-1, 4), colors.reshape(-1, 3))
 
 
-def bar_mesh(bar: Cylinder, color: ArrayLike, *, sides: int = 14) -> Mesh:
-    """Return the mesh of a cylinder with its ends."""
-    profile = [(0.0, -bar.half), (bar.radius, -bar.half), (bar.radius, bar.half), (0.0, bar.half)]
-    upright = lathe(profile, color, sides=sides)
-    along = np.array(bar.axis)
+def bar_mesh(start: ArrayLike, end: ArrayLike, radius: float, color: ArrayLike, *, sides: int = 14) -> Mesh:
+    """Return the mesh of a round bar from one point to another, metres, with its ends."""
+    a, b = np.asarray(start, float), np.asarray(end, float)
+    length = float(np.linalg.norm(b - a))
+    half, along = length / 2, (b - a) / length
+    upright = lathe([(0.0, -half), (radius, -half), (radius, half), (0.0, half)], color, sides=sides)
     across = np.cross(along, [0.0, 1.0, 0.0] if abs(along[1]) < 0.9 else [1.0, 0.0, 0.0])
     across /= np.linalg.norm(across)
     axes = np.stack([across, np.cross(along, across), along])
-    return replace(upright, vertices=(upright.vertices @ axes + bar.center).astype(np.float32))
+    return replace(upright, vertices=(upright.vertices @ axes + (a + b) / 2).astype(np.float32))
 
 
 def lathe(profile: ArrayLike, colors: ArrayLike, *, sides: int = 16, squash: float = 1.0) -> Mesh:
