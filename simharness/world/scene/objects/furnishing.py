@@ -27,26 +27,14 @@ class Furnishing:
         self._meshes: list[Mesh] = []
         self._uv: list[NDArray[np.float32]] = []
 
-    def box(
-        self,
-        center: Sequence[float],
-        size: Sequence[float],
-        color: ArrayLike,
-        material: Material = "plain",
-        *,
-        yaw: float = 0.0,
-    ) -> Self:
-        """Add a box of ``size`` x, y, z in metres; ``yaw`` turns it about its own vertical axis."""
-        dx, dy, dz = (float(v) / 2 for v in size)
-        mesh = box_mesh([Box((0.0, 0.0, 0.0), (dx, dy, dz))], np.asarray(color, float)[None])
-        return self.part(mesh, material, center=center, yaw=yaw)
-
     def block(
         self, low: Sequence[float], high: Sequence[float], color: ArrayLike, material: Material = "plain"
     ) -> Self:
         """Add a box from its lowest to its highest corner, metres."""
         a, b = np.asarray(low, float), np.asarray(high, float)
-        return self.box(((a + b) / 2).tolist(), (b - a).tolist(), color, material)
+        dx, dy, dz = ((b - a) / 2).tolist()
+        mesh = box_mesh([Box((0.0, 0.0, 0.0), (dx, dy, dz))], np.asarray(color, float)[None])
+        return self.part(mesh, material, center=((a + b) / 2).tolist())
 
     def bar(
         self,
@@ -73,18 +61,14 @@ class Furnishing:
         """Add a body of revolution: see :func:`simharness.world.scene.objects.shapes.lathe`."""
         return self.part(lathe(profile, color, sides=sides), material, center=at)
 
-    def print(self, name: str, corners: ArrayLike, *, tint: float = 1.0) -> Self:
-        """Add a print on a flat sheet with corners (4, 3): lower left, lower right, upper right, upper left."""
-        mesh = quad_mesh(np.asarray(corners, float), np.array([[0, 1, 2, 3]]), np.full((1, 3), tint))
-        place = np.array([[0, 1], [1, 1], [1, 0], [0, 1], [1, 0], [0, 0]], float).reshape(2, 3, 2)
-        self._meshes.append(mesh)
-        self._uv.append(self.sheet.uv(name, place))
-        return self
-
     def front_print(self, name: str, x: float, y: float, z: float, size: tuple[float, float]) -> Self:
         """Add a print of width and height ``size`` around (x, y, z) that faces +x."""
         w, h = size[0] / 2, size[1] / 2
-        return self.print(name, [(x, y - w, z - h), (x, y + w, z - h), (x, y + w, z + h), (x, y - w, z + h)])
+        corners = np.array([(x, y - w, z - h), (x, y + w, z - h), (x, y + w, z + h), (x, y - w, z + h)])
+        place = np.array([[0, 1], [1, 1], [1, 0], [0, 1], [1, 0], [0, 0]], float).reshape(2, 3, 2)
+        self._meshes.append(quad_mesh(corners, np.array([[0, 1, 2, 3]]), np.ones((1, 3))))
+        self._uv.append(self.sheet.uv(name, place))
+        return self
 
     def round_print(self, name: str, center: Sequence[float], radius: float) -> Self:
         """Add a round print around a centre that faces +x."""
@@ -96,19 +80,12 @@ class Furnishing:
         self._uv.append(self.sheet.uv(name, (0.5 + 0.5 * rim * [1, -1])[fan]))
         return self
 
-    def part(
-        self, mesh: Mesh, material: Material = "plain", *, center: Sequence[float] = (0.0, 0.0, 0.0), yaw: float = 0.0
-    ) -> Self:
-        """Add a mesh of one material, turned by a yaw, then moved to ``center``.
-
-        Wood that is painted white shows no grain.
-        """
+    def part(self, mesh: Mesh, material: Material = "plain", *, center: Sequence[float] = (0.0, 0.0, 0.0)) -> Self:
+        """Add a mesh of one material, moved to ``center``. Wood that is painted white shows no grain."""
         if material == "wood" and len(mesh.colors) and mesh.colors.min() > _PAINTED:
             material = "plain"
         self._uv.append(self.sheet.projected(mesh, material, len(self._meshes)))
-        x, y, z = (float(v) for v in center)
-        vertices = carried(mesh.vertices.astype(float), (x, y), yaw) + [0.0, 0.0, z]
-        self._meshes.append(mesh.moved(vertices.astype(np.float32)))
+        self._meshes.append(mesh.moved((mesh.vertices.astype(float) + center).astype(np.float32)))
         return self
 
     def group(self, other: "Furnishing", place: Sequence[float] = (0.0, 0.0, 0.0), yaw: float = 0.0) -> Self:

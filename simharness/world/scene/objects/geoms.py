@@ -102,8 +102,6 @@ class Box:
 
     def add_to(self, spec: mujoco.MjSpec, body: Any, name: str) -> None:
         """See :class:`Geom`."""
-        import mujoco
-
         quat = [np.cos(self.yaw / 2), 0.0, 0.0, np.sin(self.yaw / 2)]
         body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_BOX, pos=self.center, size=self.half, quat=quat)
 
@@ -124,8 +122,6 @@ class Surface:
 
     def add_to(self, spec: mujoco.MjSpec, body: Any, name: str) -> None:
         """See :class:`Geom`; the mesh asset gets the same name."""
-        import mujoco
-
         spec.add_mesh(
             name=name,
             uservert=self.vertices.ravel(),
