@@ -6,19 +6,22 @@ the wall nowhere. Sizes of courts are those of FIBA (Official Basketball Rules, 
 far as the floor has room.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
+from mvpose.files.input_files import parse_toml
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.furnishing import Furnishing
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.materials import draw_sheet
+from simharness.world.scene.objects.object_files import ASSETS
 from simharness.world.scene.objects.shapes import quad_mesh
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.kinds import room_kinds
@@ -34,10 +37,6 @@ _LEAVES = np.array([[0.84, 0.83, 0.80], [0.62, 0.48, 0.34], [0.55, 0.60, 0.64], 
 _FRAMES = np.array([[0.90, 0.90, 0.88], [0.90, 0.90, 0.88], [0.36, 0.37, 0.39], [0.60, 0.46, 0.32]])
 _EDGE = 0.35  # metres between lines and walls, at least
 _OUT = 0.6  # metres from the baseline to the wall behind it
-_WIDTH, _HALF, _KEY, _DEEP, _CIRCLE, _ARC, _BASKET = 15.0, 14.0, 4.9, 5.8, 1.8, 6.75, 1.575  # metres, of basketball
-_LINE, _THIN = 0.05, 0.04  # metres: widths of lines of basketball and badminton
-_LENGTH, _SERVICE, _BACK, _DOUBLES, _SINGLES = 13.40, 1.98, 0.76, 6.10, 5.18  # metres, of badminton
-_HIGH = (0.0012, 0.0024)  # metres above the floor: of two lines that cross, one is above the other
 _COLORS = np.array([[0.16, 0.20, 0.42], [0.62, 0.14, 0.12], [0.12, 0.12, 0.13], [0.10, 0.34, 0.24]])
 _PALE = np.array([[0.93, 0.93, 0.91], [0.90, 0.80, 0.25]])
 
@@ -230,8 +229,11 @@ def make_court(room: RoomSection, seed: int) -> tuple[Solid, ...]:
     color, pale = _COLORS[rng.integers(len(_COLORS))], _PALE[rng.integers(len(_PALE))]
     long, wide = max(room.size[:2]), min(room.size[:2])
     limits = np.array([long, wide]) / 2 - _EDGE
-    strips = [(path, _LINE, _HIGH[1], color) for path in _basketball(long, wide)]
-    strips += [(path, _THIN, _HIGH[0], pale) for path in _badminton()]
+    courts = parse_toml((ASSETS / "courts.toml").read_text(encoding="utf-8"))
+    strips = []
+    for court, start, shade in (("basketball", -long / 2 + _OUT, color), ("badminton", 0.0, pale)):
+        about = courts[court]
+        strips += [(path, about["width"], about["height"], shade) for path in _lines_of(about, start)]
     vertices, colors = [], []
     for path, width, height, shade in strips:
         for a, b in pairwise(_subdivided(path)):
@@ -245,34 +247,13 @@ def make_court(room: RoomSection, seed: int) -> tuple[Solid, ...]:
     return (Solid("room", "court lines", mesh, (), Box.around(mesh.vertices)),)
 
 
-def _basketball(long: float, wide: float) -> list[Floats]:
-    """Return the lines of half a court: its baseline is at -x, and its middle line and circle where they fit."""
-    first = -long / 2 + _OUT
-    side, key, far = min(_WIDTH / 2, wide / 2 - _EDGE), _KEY / 2, first + _DEEP
-    turn = np.linspace(-np.pi / 2, np.pi / 2, 33)
-    bow = np.column_stack([np.cos(turn), np.sin(turn)])
-    around = np.concatenate([bow, -bow[1:]])
-    return [
-        np.array([[first, -side], [first, side]]),
-        np.array([[first, side], [long / 2, side]]),
-        np.array([[first, -side], [long / 2, -side]]),
-        np.array([[first, -key], [far, -key], [far, key], [first, key]]),
-        [far, 0.0] + _CIRCLE * bow,
-        [first + _BASKET, 0.0] + _ARC * bow,
-        [first + _HALF, 0.0] + _CIRCLE * around,
-        np.array([[first + _HALF, -side], [first + _HALF, side]]),
-    ]
-
-
-def _badminton() -> list[Floats]:
-    """Return the lines of a court around the origin."""
-    x, doubles, singles = _LENGTH / 2, _DOUBLES / 2, _SINGLES / 2
-    lines = [np.array([[-x, y], [x, y]]) for y in (-doubles, -singles, singles, doubles)]
-    for sign in (-1.0, 1.0):
-        for at in (x, x - _BACK, _SERVICE):
-            lines.append(np.array([[sign * at, -doubles], [sign * at, doubles]]))
-        lines.append(np.array([[sign * _SERVICE, 0.0], [sign * x, 0.0]]))
-    return lines
+def _lines_of(court: Mapping[str, Any], start: float) -> Iterator[Floats]:
+    """Yield the lines of a court (n, 2), metres, that begins at ``start`` along x: polygons, then arcs."""
+    for line in court["lines"]:
+        yield [start, 0.0] + np.array(line, float)
+    for arc in court.get("arcs", ()):
+        turn = np.radians(np.linspace(*arc["degrees"], 33))
+        yield [start + arc["x"], 0.0] + arc["radius"] * np.column_stack([np.cos(turn), np.sin(turn)])
 
 
 def _subdivided(path: ArrayLike, step: float = 0.1) -> Floats:
