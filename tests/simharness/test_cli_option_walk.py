@@ -28,6 +28,7 @@ from mvpose.formats.people.people_formats import write_people
 from mvpose.recording import People
 from simharness.capture.rendering import room_light
 from simharness.cli import app
+from simharness.gate.baseline import Measurement
 from simharness.gate.compare import Comparison, GateResult
 from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate_section import GateSection
@@ -252,7 +253,7 @@ def _stand_ins(study):
     checked = GateResult("ci", ("full",), GateSection(), Comparison((), ()), (), 1, key, "simharness run", 1.0)
     validated = _Validated()
     rehearsed = SimpleNamespace(sentences=(), to_json=dict)
-    scores = SimpleNamespace(scores=(), suite="ci", fingerprint="")
+    scores = Measurement("ci", "", "", "", {TrialKey("base", 0, "full"): {}})
     measured = SimpleNamespace(failed=(), measurement=lambda suite: scores)
     figures = SimpleNamespace(summary=dict)
     fitted = SimpleNamespace(real=figures, annotation=figures)
