@@ -34,7 +34,9 @@ class AuditError(RunError):
     """Failed check: the simulated trial is not what its scenario describes."""
 
 
-def audit(scenario: Scenario, scene: Scene, exposures: ExposureSchedule, sequence: Sequence, views: Views) -> None:
+def audit(
+    scenario: Scenario, scene: Scene, exposures: ExposureSchedule, sequence: Sequence, views: Views, *, every: int = 1
+) -> None:
     """Check a simulated trial before its detections are made.
 
     Clocks and calibration are checked in all frames. Projections are checked in three frames, and one per cent of the
@@ -46,6 +48,7 @@ def audit(scenario: Scenario, scene: Scene, exposures: ExposureSchedule, sequenc
         exposures: time and camera of every picture.
         sequence: true poses at the frames' times.
         views: truth in the pictures.
+        every: step between the frames that were filmed.
 
     Raises:
         AuditError: a failed check, with its place, the expected and the actual value.
@@ -53,17 +56,17 @@ def audit(scenario: Scenario, scene: Scene, exposures: ExposureSchedule, sequenc
     check_clocks(scenario.faults, exposures, sequence.time, cameras=scenario.cameras, period=1.0 / scenario.rate)
     check_calibration(scenario.faults, exposures)
     playback = Playback(scene)
-    frames = np.unique(np.linspace(0, len(views) - 1, min(len(views), _FRAMES)).astype(int))
+    frames = np.unique(np.linspace(0, len(views) - 1, min(len(views), _FRAMES)).astype(int) // every * every)
     if not exposures.readout:  # a picture of a rolling shutter has no single time
         for frame in map(int, frames):
             _check_projection(playback, exposures, views, frame)
     if scenario.rendering.renderer != "rays":
-        _check_pictures(scenario, playback, exposures, views)
+        _check_pictures(scenario, playback, exposures, views, every)
 
 
-def sampled_pictures(exposures: ExposureSchedule, seed: int) -> list[tuple[int, int]]:
+def sampled_pictures(exposures: ExposureSchedule, seed: int, every: int = 1) -> list[tuple[int, int]]:
     """Return frame and view of the delivered pictures that an audit renders again: one per cent, at least three."""
-    delivered = np.argwhere(exposures.delivered)
+    delivered = np.argwhere(exposures.delivered[::every]) * [every, 1]
     count = max(_PICTURES_LEAST, round(_PICTURES * len(delivered)))
     chosen = stream(seed, "audit", "pictures").permutation(len(delivered))[:count]
     return [(int(frame), int(view)) for frame, view in delivered[np.sort(chosen)]]
@@ -180,12 +183,14 @@ def _projected(camera: Camera, joints: Floats) -> Floats:
     return np.asarray(pixels, float).reshape(*joints.shape[:-1], 2)
 
 
-def _check_pictures(scenario: Scenario, playback: Playback, exposures: ExposureSchedule, views: Views) -> None:
+def _check_pictures(
+    scenario: Scenario, playback: Playback, exposures: ExposureSchedule, views: Views, every: int
+) -> None:
     """Check in sampled pictures that visible joints show their person, at about the depth of the joint."""
     picture_source = picture_source_of(scenario, playback)
     radii = [body.joint_radii for body in playback.scene.bodies]
     shown, deep, count = 0, 0, 0
-    pictures = sampled_pictures(exposures, scenario.seed)
+    pictures = sampled_pictures(exposures, scenario.seed, every)
     for frame, view in pictures:
         persons, joints = np.nonzero(views.visibility[frame, view] == Visibility.VISIBLE)
         image, camera = picture_source.image(exposures, frame, view), exposures.camera(frame, view)

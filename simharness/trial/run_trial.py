@@ -117,6 +117,7 @@ def run_trial(
     compile_ahead: bool = False,
     known: Known | None = None,
     reporter: Reporter | None = None,
+    every: int = 1,
 ) -> TrialResult:
     """Run a trial up to a goal. All variants get the same detections.
 
@@ -132,6 +133,8 @@ def run_trial(
             builds and simulates.
         known: results of stages that need not run again.
         reporter: receiver of progress.
+        every: step between the frames whose detections are needed; the others get pictures of those, as of a camera
+            that stood still. Only for goals up to "detect".
 
     Raises:
         ValueError: the scenario cannot be built at this seed or needs more memory than the machine has, or the goal is
@@ -150,7 +153,7 @@ def run_trial(
         if known.detected is None:
             require_memory([scenario])
             simulation, detected, pipelines = _simulate(
-                scenario, stages, workers, previews, compile_ahead and goal >= _GOALS.index("estimate")
+                scenario, stages, workers, previews, compile_ahead and goal >= _GOALS.index("estimate"), every
             )
         else:
             simulation, detected = None, known.detected
@@ -179,7 +182,7 @@ def with_variants(scenario: Scenario, variants: Sequence[str]) -> Scenario:
 
 
 def _simulate(
-    scenario: Scenario, stages: Stages, workers: int, previews: Collection[int], compile_ahead: bool
+    scenario: Scenario, stages: Stages, workers: int, previews: Collection[int], compile_ahead: bool, every: int
 ) -> tuple[Simulation, DetectedSequence, Mapping[str, Estimator]]:
     """Run the stages from the build to the detections."""
     compilation = None
@@ -189,10 +192,13 @@ def _simulate(
         compilation.start()
     with stages.stage("build", 1, input_errors=True):
         trial = build_trial(scenario)
-    simulation = capture_trial(trial, stages, workers=workers, previews=previews)
+    shown = np.arange(scenario.frames)[:, None]
+    if ((trial.exposures.source != shown) & trial.exposures.delivered).any():  # pictures of other frames
+        every = 1
+    simulation = capture_trial(trial, stages, workers=workers, previews=previews, every=every)
     with stages.stage("audit", 1):
-        audit(scenario, trial.scene, trial.exposures, simulation.sequence, simulation.views)
-    detected = detect_trial(simulation, stages, workers=workers)
+        audit(scenario, trial.scene, trial.exposures, simulation.sequence, simulation.views, every=every)
+    detected = detect_trial(simulation, stages, workers=workers, every=every)
     if compilation is not None:
         with stages.stage("compile", 1):
             compilation.wait()

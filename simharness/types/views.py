@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from collections.abc import Sequence as Many
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Self
 
@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.checks import set_arrays
+
+_OVER_TIME = ("pixels", "visibility", "boxes", "area_visible", "source")
 
 
 class Visibility(IntEnum):
@@ -90,6 +92,16 @@ class Views:
     def __len__(self) -> int:
         return len(self.pixels)
 
+    def held(self, every: int, frames: int) -> Self:
+        """Return the views of as many frames, of which these are every n-th; the others show the picture before."""
+        rows = np.arange(frames) // every
+        alike = self.lookalikes
+        return replace(
+            self,
+            **{key: getattr(self, key)[rows] for key in _OVER_TIME},
+            lookalikes=LookalikeViews(alike.names, alike.pixels[rows], alike.visible[rows]),
+        )
+
     @classmethod
     def concatenate(cls, parts: Many[Self]) -> Self:
         """Join the views of consecutive frames.
@@ -105,9 +117,8 @@ class Views:
         names = {part.lookalikes.names for part in parts}
         if len(names) != 1:
             raise ValueError(f"parts to join must have the same lookalikes, got {sorted(names)}")
-        keys = ("pixels", "visibility", "boxes", "area_visible", "source")
         return cls(
-            **{key: np.concatenate([getattr(part, key) for part in parts]) for key in keys},
+            **{key: np.concatenate([getattr(part, key) for part in parts]) for key in _OVER_TIME},
             previews={frame: pictures for part in parts for frame, pictures in part.previews.items()},
             lookalikes=LookalikeViews(
                 parts[0].lookalikes.names,

@@ -70,8 +70,8 @@ def export_sequence(
 ) -> Path:
     """Write a scenario as a sequence in the layout of the CMU Panoptic toolbox (:mod:`.layout`).
 
-    The folder appears when it is complete. All frames are detected before the first is written, because detector errors
-    depend on earlier frames; pictures are rendered and written one by one.
+    The folder appears when it is complete. All written frames are detected before the first is written; pictures are
+    rendered and written one by one.
 
     Args:
         scenario: resolved scenario with its seed; its method is not run.
@@ -87,7 +87,7 @@ def export_sequence(
         RunError: any error after that.
     """
     reporter, start = reporter or Silence(), time.perf_counter()
-    result = run_trial(scenario, until="detect", reporter=reporter)
+    result = run_trial(scenario, until="detect", reporter=reporter, every=plan.every)
     assert result.simulation is not None
     trial, sequence = result.simulation.trial, result.simulation.sequence
     exposures, detected = trial.exposures, result.detected.frames

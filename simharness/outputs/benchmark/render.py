@@ -134,7 +134,8 @@ def _layers(scenario: Scenario, plan: RenderPlan, reporter: Reporter) -> tuple[T
             return build_trial(scenario), None
     first = scenario.method.variants[:1]
     until: Goal = "estimate" if "estimates" in plan.overlay else "detect"
-    result = run_trial(scenario, variants=first, until=until, reporter=reporter)
+    every = plan.every if until == "detect" else 1  # estimates of trackers depend on all frames
+    result = run_trial(scenario, variants=first, until=until, reporter=reporter, every=every)
     recording = result.recording
     return result.trial, _Layers(recording.truth, recording.detections, result.estimates.get(first[0]))
 

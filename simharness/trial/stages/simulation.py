@@ -32,7 +32,9 @@ class Simulation:
     """True feet and hands, where the detector reports them."""
 
 
-def capture_trial(trial: Trial, stages: Stages, *, workers: int = 1, previews: Collection[int] = ()) -> Simulation:
+def capture_trial(
+    trial: Trial, stages: Stages, *, workers: int = 1, previews: Collection[int] = (), every: int = 1
+) -> Simulation:
     """Simulate the true poses and capture all frames.
 
     Args:
@@ -40,13 +42,15 @@ def capture_trial(trial: Trial, stages: Stages, *, workers: int = 1, previews: C
         stages: timer and reporter of the stages ``simulate``, ``film`` and ``feet and hands``.
         workers: number of processes that share the frames.
         previews: frames whose colour pictures are kept.
+        every: step between the frames that are needed; the others get the pictures of the needed frame before.
     """
     frames = range(trial.scenario.frames)
+    needed = frames[::every]
     with stages.stage("simulate", 1):
         sequence = simulate(trial.scene)
-    with stages.stage("film", len(frames)) as advance:
+    with stages.stage("film", len(needed)) as advance:
         capture = CaptureFrames(trial.scenario, trial.scene, trial.exposures, frozenset(previews))
-        views = Views.concatenate(map_frames(capture, frames, workers=workers, progress=advance))
+        views = Views.concatenate(map_frames(capture, needed, workers=workers, progress=advance))
     outer = None
     if (name := trial.scenario.detector.skeleton) != COCO17.name:
         skeleton = skeleton_by_name(name)
@@ -54,10 +58,10 @@ def capture_trial(trial: Trial, stages: Stages, *, workers: int = 1, previews: C
             film = FilmOuterJoints(trial.scene, trial.exposures, skeleton)
             parts = map_frames(film, frames, workers=workers, progress=advance)
             outer = OuterTruth(skeleton, film.truth(), OuterViews.concatenate(parts))
-    return Simulation(trial, sequence, views, outer)
+    return Simulation(trial, sequence, views.held(every, len(frames)), outer)
 
 
-def detect_trial(simulation: Simulation, stages: Stages, *, workers: int = 1) -> DetectedSequence:
+def detect_trial(simulation: Simulation, stages: Stages, *, workers: int = 1, every: int = 1) -> DetectedSequence:
     """Detect people in the captured frames; networks of the scenario read its pictures.
 
     The detections carry the times of the pictures as the method is given them.
@@ -66,6 +70,7 @@ def detect_trial(simulation: Simulation, stages: Stages, *, workers: int = 1) ->
         simulation: from :func:`capture_trial`.
         stages: timer and reporter of the stages ``detect`` and ``read``.
         workers: number of processes that share the frames.
+        every: as :func:`capture_trial`.
     """
     trial, sequence = simulation.trial, simulation.sequence
     scenario, exposures = trial.scenario, trial.exposures
@@ -81,9 +86,10 @@ def detect_trial(simulation: Simulation, stages: Stages, *, workers: int = 1) ->
             outer=simulation.outer,
         )
     if ReadFrames.needed(scenario):
-        with stages.stage("read", len(frames)) as advance:
+        needed = frames[::every]
+        with stages.stage("read", len(needed)) as advance:
             reading = ReadFrames(scenario, trial.scene, exposures, tuple(detected))
-            parts = map_frames(reading, frames, workers=workers, progress=advance)
-            detected = [each for part in parts for each in part]
+            parts = map_frames(reading, needed, workers=workers, progress=advance)
+            detected[::every] = [each for part in parts for each in part]
     detected = [each.at_times(time) for each, time in zip(detected, exposures.known_time, strict=True)]
     return DetectedSequence(sequence.time, exposures.believed_rig, tuple(detected))

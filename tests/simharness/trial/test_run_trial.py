@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
+from trials import Recorder
 from trials import measured as measure
 
 from mvpose.commands.errors import RunError
@@ -122,3 +124,33 @@ def test_a_study_does_not_depend_on_the_number_of_workers(tmp_path):
     assert without_times(one.trials).drop("seconds").equals(without_times(two.trials).drop("seconds"))
     for table in ("frames", "people", "failures"):
         assert without_times(getattr(one, table)).equals(without_times(getattr(two, table)))
+
+
+@pytest.mark.parametrize(
+    ("more", "filmed"),
+    [
+        (["rendering.renderer=raster", "duration=0.8"], 2),
+        (["detector.profile=poor", 'appearance.source="drawn"', "duration=1.6"], 3),
+        (["detector.skeleton=halpe26", "faults.dropped=0.3", "cameras.trigger=free", "duration=1.6"], 3),
+        (["faults.frozen=0.5", "duration=1.6"], 8),  # pictures of frames between
+    ],
+)
+def test_of_every_third_frame_all_is_as_if_all_were_filmed(more, filmed):
+    keys = {"duration", "rendering.renderer"} & {each.partition("=")[0] for each in more}
+    kept = [each for each in CHEAP if each.partition("=")[0] not in keys]
+    scenario, recorder = load(QUICKSTART, overrides=[*kept, *more]), Recorder()
+    whole = module.run_trial(scenario, until="detect").detected.frames
+    thin = module.run_trial(scenario, until="detect", reporter=recorder, every=3).detected.frames
+    assert ("film", filmed, 0) in recorder.stages
+    assert len(thin) == len(whole) == scenario.frames
+    compared = 0
+    for one, other in zip(whole[::3], thin[::3], strict=True):
+        pairs = [(one.detections, other.detections), (one.truth, other.truth)]
+        if one.whole is not None:
+            pairs.append((one.whole.detections, other.whole.detections))
+        for expected, got in pairs:
+            for key, value in vars(expected).items():
+                if isinstance(value, np.ndarray):
+                    np.testing.assert_array_equal(getattr(got, key), value, err_msg=key)
+                    compared += value.size
+    assert compared > 1000
