@@ -1,4 +1,4 @@
-# make demo | test | lint | docs | wheels | results: each makes .venv on first use and installs what it needs.
+# make demo | test | test-slow | lint | docs | wheels | results: each makes .venv on first use and installs what it needs.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -11,13 +11,17 @@ STUDIES := angle calibration clocks clutter crowd detector look_alike panoptic p
 
 PROJECTS := pyproject.toml mvpose/pyproject.toml tools/build_backend.py
 
-.PHONY: demo test lint docs wheels results clean
+.PHONY: demo test test-slow lint docs wheels results clean
 
 demo: $(RUN)
 	$(BIN)/simharness run quickstart
 
+# Those marked `slow`, one in forty, take nearly half of the time of all; CI runs both parts.
 test: $(DEV)
-	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal -m "not slow"
+
+test-slow: $(DEV)
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal -m slow
 
 lint: $(DEV)
 	$(BIN)/ruff check .

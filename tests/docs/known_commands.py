@@ -98,7 +98,7 @@ PLAN = (  # run by tests/simharness/planning
     "simharness plan my-room.toml --cameras 6 --lens wide --failing 1 --workers 2",
     "simharness rehearse results/plans/lab/planned.toml --people 4",
 )
-MAKE = ("make demo", "make test", "make docs", "make lint", "make lint docs", "make results")
+MAKE = ("make demo", "make test", "make test-slow", "make docs", "make lint", "make lint docs", "make results")
 CI = ".ci/run"
 PYTEST = ('pytest -m "not slow"', "pytest tests/simharness/detector")
 MVPOSE = (  # run by tests/mvpose/cli

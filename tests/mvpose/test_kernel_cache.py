@@ -415,6 +415,7 @@ def processes(count, code, folder, **environment):
     return answers
 
 
+@pytest.mark.slow
 def test_processes_may_start_at_once(tmp_path):
     """In numba's own cache, two signatures may get one file, and a caller then runs the code of the other."""
     Toy(tmp_path)

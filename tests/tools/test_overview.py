@@ -74,6 +74,7 @@ def tiles(record):
     return module._tiles(record, VIEWS)
 
 
+@pytest.mark.slow
 def test_five_panels_stand_in_the_order_of_the_story_each_with_its_package(drawn):
     names = [each.get("id") for each in drawn.iter(f"{SVG}g") if each.get("id")]
     assert names == ["simulate", "detect", "match", "reconstruct", "score"]
@@ -293,6 +294,7 @@ class TestScore:
 class TestFile:
     """The command, and the picture that it made for the README."""
 
+    @pytest.mark.slow
     def test_the_command_writes_what_is_drawn(self, folder, record, tmp_path):
         out = tmp_path / "overview.svg"
         digest = RESULTS / "crowd" / "digest.json"

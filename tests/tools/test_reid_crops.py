@@ -89,6 +89,7 @@ def test_box_noise_has_the_given_deviation_and_truncation():
     np.testing.assert_array_equal(short[:, :3], frame[:, :3])
 
 
+@pytest.mark.slow
 def test_sensors_of_a_site_differ_within_the_given_range_and_cameras_stay_within_its_walls():
     sites = [make_site(seed, views=5, casts=(0.5, 1.5)) for seed in range(9)]
     strengths = [site.sensors[0].white_balance / SENSOR_SPREAD.white_balance for site in sites]
@@ -107,6 +108,7 @@ def test_sensors_of_a_site_differ_within_the_given_range_and_cameras_stay_within
     assert (still.gain, still.white_balance, still.exposure) == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_sites_have_the_rooms_and_the_light_of_scenarios():
     sites = [make_site(seed, views=3) for seed in range(40, 52)]
     assert len({site.room.kind for site in sites}) > 4
@@ -151,6 +153,7 @@ def test_crops_have_the_vignetting_of_their_place_in_the_picture(site):
     assert corner.mean() == pytest.approx(expected, rel=0.05)
 
 
+@pytest.mark.slow
 def test_all_groups_at_a_site_are_filmed_by_the_same_cameras(poses):
     two = [Group(10**12 + k, 1, site=5) for k in range(2)]
     first, second = (make_site(group.site, views=3) for group in two)
@@ -214,6 +217,7 @@ def test_look_alike_changes_clothes_only(crops, poses):
             assert not np.array_equal(crops.images[k], alike.images[rows[key]])
 
 
+@pytest.mark.slow
 def test_crops_are_rendered_once_and_then_read_from_the_cache(tmp_path):
     job = RenderJob(groups("held-out", 5, 2, size=2), Recipe(moments=1, views=2))
     first = render_crops(job, tmp_path)
@@ -250,6 +254,7 @@ def test_training_validation_and_held_out_people_and_sites_are_disjoint():
     assert not training & validation
 
 
+@pytest.mark.slow
 def test_the_digest_covers_all_modules_that_are_imported_for_rendering():
     """All modules of the project that a new process loads for rendering are part of the key of the cache."""
     code = (

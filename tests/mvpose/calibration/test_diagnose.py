@@ -128,6 +128,7 @@ def test_no_detections_are_no_error(recording):
     assert np.isnan(diagnosis.residuals).all()
 
 
+@pytest.mark.slow
 def test_a_camera_that_was_turned_far_is_no_crop_and_a_crop_is_no_turned_camera(recording):
     rig, frames = recording
     camera = rig[2]
@@ -140,6 +141,7 @@ def test_a_camera_that_was_turned_far_is_no_crop_and_a_crop_is_no_turned_camera(
     assert ("image-cropped", 2) in found
 
 
+@pytest.mark.slow
 def test_cameras_that_are_all_off_have_moved_and_have_no_other_mistake(recording):
     rig, frames = recording
     _, found = alarms(disturbed(rig, 2.0, 0.2, seed=5), frames)
@@ -147,6 +149,7 @@ def test_cameras_that_are_all_off_have_moved_and_have_no_other_mistake(recording
     assert {kind for kind, _ in found} == {"moved-camera"}
 
 
+@pytest.mark.slow
 def test_distortion_that_no_camera_of_the_calibration_has_is_one_finding():
     right = Rig([replace(each, distortion=np.array([-0.25, 0.08, 0.0, 0.0, 0.0])) for each in uneven(4)])
     frames, _ = film(right, walk(3, frames=_FRAMES, period=_PERIOD, radius=2.0), noise=3.0)

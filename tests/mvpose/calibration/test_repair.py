@@ -158,6 +158,7 @@ def test_bad_arguments_are_refused(frames, arguments, text):
         repair(RIG, frames, period=PERIOD, **arguments)
 
 
+@pytest.mark.slow
 def test_the_size_of_people_decides_that_of_the_rig_where_asked(frames):
     """A rig 30 % too large: the lengths of limbs give its size, and nothing else changes."""
     large = resized(RIG, 1.3)

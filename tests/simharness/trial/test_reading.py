@@ -57,6 +57,7 @@ def test_descriptors_are_read_from_the_pictures_and_stored(scenario, tmp_path):
     assert distance[same & ~np.eye(len(same), dtype=bool)].mean() < distance[~same].mean()
 
 
+@pytest.mark.slow
 def test_the_result_does_not_depend_on_the_workers(scenario, tmp_path):
     mean_color(tmp_path / "colors.onnx")
     path = scenario('[appearance]\nsource = "pictures"\nnetwork = "colors.onnx"\n')

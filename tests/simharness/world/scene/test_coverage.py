@@ -51,6 +51,7 @@ def test_zero_adds_nothing():
     assert place_clutter(0, ClutterSection(coverage=0.0), space()) == ()
 
 
+@pytest.mark.slow
 def test_unreachable_coverage_is_refused():
     high = ring(3, radius=1.2, height=5.0)  # they look down on all people
     with pytest.raises(ValueError, match=r"clutter.coverage = 0.8 cannot be reached: with \d+ added objects 0\.\d\d"):
