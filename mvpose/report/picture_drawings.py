@@ -128,12 +128,12 @@ def _dots(camera: Camera, points: Floats, radius: float) -> str:
     )
 
 
-def jpeg_uri(rgb: NDArray[np.uint8]) -> str:
-    """Return a picture (h, w, 3) as the data URI of a JPEG file of at most 960 pixels."""
+def jpeg_uri(rgb: NDArray[np.uint8], *, widest: int = _WIDEST, quality: int = _QUALITY) -> str:
+    """Return a picture (h, w, 3) as the data URI of a JPEG file of at most ``widest`` pixels a side."""
     from PIL import Image
 
     picture = Image.fromarray(rgb)
-    picture.thumbnail((_WIDEST, _WIDEST))
+    picture.thumbnail((widest, widest))
     buffer = io.BytesIO()
-    picture.save(buffer, "JPEG", quality=_QUALITY)
+    picture.save(buffer, "JPEG", quality=quality)
     return "data:image/jpeg;base64," + base64.b64encode(buffer.getvalue()).decode()

@@ -56,9 +56,6 @@ Head = Annotated[
     HeadMapping,
     typer.Option(help="Rule that makes the head of Shelf's 14 joints from COCO-17; it changes PCP by one point."),
 ]
-SummaryFile = Annotated[
-    Path | None, typer.Option("--json", metavar="FILE", help="Write the summary to this file as well.", dir_okay=False)
-]
 
 
 @app.command("recording")
@@ -66,7 +63,7 @@ SummaryFile = Annotated[
 def evaluate_recording(
     recording: RecordingFile,
     folder: RecordingFolder = None,
-    json_file: SummaryFile = None,
+    json_file: JsonFile = None,
     head: Head = HeadMapping.VOXELPOSE,
     method: list[str] | None = option(
         None,
@@ -126,7 +123,7 @@ def evaluate_poses(
         ),
     ],
     folder: RecordingFolder = None,
-    json_file: SummaryFile = None,
+    json_file: JsonFile = None,
     head: Head = HeadMapping.VOXELPOSE,
     first: int | None = option(
         None,

@@ -52,11 +52,6 @@ class AnnotationModel:
     noise: float
     """Share of the variance of the random part that is drawn anew in every frame."""
 
-    @property
-    def rms(self) -> Floats:
-        """Root mean square of the distance of each annotated joint from the true one, (A, 14) metres."""
-        return np.sqrt((self.shift**2).sum(axis=-1) + 3 * self.deviation**2)
-
     @classmethod
     def drawn(cls, config: AnnotationSection, actors: int, *, seed: int) -> Self:
         """Return the errors of a simulated annotation of A actors, whose shifts are drawn.

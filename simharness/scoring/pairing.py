@@ -28,6 +28,12 @@ class Pairing:
     present: NDArray[np.bool_]
     """Which of the P people are in the frame, that is have at least one defined joint, (P,)."""
 
+    def owners(self, count: int) -> NDArray[np.int64]:
+        """Return the true person of each of ``count`` estimates, (n,); -1 for a ghost."""
+        owner = np.full(count, -1)
+        owner[self.estimate[self.estimate >= 0]] = np.flatnonzero(self.estimate >= 0)
+        return owner
+
 
 def pair(truth: ArrayLike, estimate: ArrayLike, *, limit: float = LIMIT) -> Pairing:
     """Pair the people of one frame: the largest number of pairs within the limit, at the least total distance.

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -96,7 +97,7 @@ def write_objects(folder: Path) -> None:
     (folder / "textures").mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.xml"):
         old.unlink()
-    draws: dict[str, tuple[Draw | Callable[[ObjectBuilder, int], None], int]] = {**OBJECTS, **PROPS}
+    draws: dict[str, tuple[Callable[[ObjectBuilder, Any], None], int]] = {**OBJECTS, **PROPS}
     for name, (draw, variants) in draws.items():
         for k in range(variants):
             builder, stem = ObjectBuilder(), f"{name}.{k + 1}" if k else name

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import cv2
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from mvpose.report.film_file import FilmFile
 from mvpose.report.limbs import COCO17_BODY, SMALL_FACE, plain_face
 from mvpose.report.overlay import BoxTag, Mark, Overlay, legend, mosaic, rooms_in_grid
 from mvpose.report.palette import TRUTH, UNMATCHED, Color, person_color
+from mvpose.report.picture_drawings import jpeg_uri
 from simharness.capture.picture import ScenePictures, scaled
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.pairing import LIMIT, pair
@@ -51,24 +51,10 @@ class PagePicture:
     rgb: Rgb = field(repr=False)
     """Pixels, (h, w, 3) uint8."""
 
-    def png(self) -> bytes:
-        """Return the picture as a PNG file, without loss."""
-        return _encoded(self.rgb, ".png", [])
-
     @property
     def uri(self) -> str:
         """Picture as a data URI for a page: JPEG, at most 2400 pixels wide."""
-        shrink = min(1.0, _MAX_WIDTH / self.rgb.shape[1])
-        small = cv2.resize(self.rgb, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
-        jpeg = _encoded(small.astype(np.uint8, copy=False), ".jpg", [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-        return "data:image/jpeg;base64," + base64.b64encode(jpeg).decode()
-
-
-def _encoded(rgb: Rgb, suffix: str, options: list[int]) -> bytes:
-    done, encoded = cv2.imencode(suffix, cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), options)
-    if not done:
-        raise RuntimeError(f"OpenCV cannot encode a picture of shape {rgb.shape} as {suffix}")
-    return encoded.tobytes()
+        return jpeg_uri(self.rgb, widest=_MAX_WIDTH, quality=_JPEG_QUALITY)
 
 
 def draw_pictures(
@@ -178,9 +164,7 @@ def annotate(
     overlay = Overlay(rgb)
     assigned = truth.person
     if estimate is not None:
-        owner = np.full(len(estimate), -1)  # true person of each estimate
-        partner = pair(truth.joints, estimate.joints).estimate
-        owner[partner[partner >= 0]] = np.flatnonzero(partner >= 0)
+        owner = pair(truth.joints, estimate.joints).owners(len(estimate))
         # True person of each detection by the matching of the method; label -1 has none.
         assigned = np.append(owner, -1)[estimate.matching.labels_of(len(truth.person))]
         for joints, person in zip(estimate.joints, owner, strict=True):

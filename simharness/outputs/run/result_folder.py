@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import polars as pl
+from PIL import Image
 
 from mvpose.commands.output_files import check_writable, make_folder
 from mvpose.commands.progress import Reporter, Silence, Stages
@@ -90,7 +91,7 @@ def run(
         if found:
             write_blame(found, partial)
         if pictures:
-            (partial / "mosaic.png").write_bytes(pictures[0].png())
+            Image.fromarray(pictures[0].rgb).save(partial / "mosaic.png")
         if film:
             (partial / "film.mp4").write_bytes(film.mp4)
     return folder

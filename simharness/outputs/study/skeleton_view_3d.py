@@ -46,10 +46,7 @@ class Replay:
     def owners(self, frame: int) -> NDArray[np.int64]:
         """Return the true person of each estimate of a frame, (n,), -1 for a ghost."""
         estimate = self.estimates[frame]
-        partner = pair(self.truth[frame].joints, estimate.joints).estimate
-        owner = np.full(len(estimate), -1)
-        owner[partner[partner >= 0]] = np.flatnonzero(partner >= 0)
-        return owner
+        return pair(self.truth[frame].joints, estimate.joints).owners(len(estimate))
 
 
 def replay(scenario: Scenario, variant: str) -> Replay:

@@ -3,9 +3,12 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
+from mvpose.files.input_files import parse_toml
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.validation import Validation
@@ -27,28 +30,6 @@ _FORMATS: Mapping[str, tuple[int, float, str]] = {
     **{group: (1, 100.0, "%") for group in ("tree", "ears", "behind", "ambiguous")},
 }
 _PERCENT_BOUND = {"tree", "ears", "behind"}  # groups whose bounds are shares
-
-MEASUREMENTS: Mapping[str, str] = {
-    "bones.shank": "shank, variation, mm",
-    "bones.thigh": "thigh, variation, mm",
-    "bones.forearm": "forearm, variation, mm",
-    "bones.upper arm": "upper arm, variation, mm",
-    "true_bones.shank": "annotated shank, variation, mm",
-    "true_bones.thigh": "annotated thigh, variation, mm",
-    "true_bones.forearm": "annotated forearm, variation, mm",
-    "true_bones.upper arm": "annotated upper arm, variation, mm",
-    "behind": "joints hidden by others, %",
-    "affinity.different": "different people above 0.5, %",
-    "affinity.same": "one person below 0.5, %",
-    "ears": "ears in fewer than two views, %",
-    "detected": "people detected per view, %",
-    "phantoms": "phantoms per view and frame",
-    "others": "people not annotated, per frame",
-    "score.q10": "score of limbs, 10 % quantile",
-    "score.q50": "score of limbs, median",
-    "score.q90": "score of limbs, 90 % quantile",
-}
-"""Titles of measurements by key; the others are named by :func:`measurement_title`."""
 
 
 @dataclass(frozen=True)
@@ -220,10 +201,17 @@ def measurement_rows(validation: Validation) -> list[tuple[str, ComparedCells]]:
     return rows
 
 
+@cache
+def _titles() -> Mapping[str, str]:
+    """Return the titles of measurements by key; the others are named by :func:`measurement_title`."""
+    return parse_toml((Path(__file__).parents[1] / "data" / "measurements.toml").read_text(encoding="utf-8"))
+
+
 def measurement_title(key: str) -> str:
     """Return the title of a measurement."""
-    if key in MEASUREMENTS:
-        return MEASUREMENTS[key]
+    titles = _titles()
+    if key in titles:
+        return titles[key]
     group, _, name = key.partition(".")
     if group == "tree":
         child, _, parent = name.partition("|")

@@ -262,10 +262,6 @@ class SubsetComparison:
     ranks: Mapping[str, Interval]
     """Spearman's correlation of reality and twins over the pairs of cameras, by variant."""
 
-    def mean_difference(self, variant: str) -> float:
-        """Return the mean over camera counts of the absolute difference between twins and reality, points."""
-        return float(np.mean([abs(each[variant].difference) for each in self.curves.values()]))
-
 
 def compare_subsets(
     evidence: Evidence, cameras: int, variants: Sequence[str], *, rule: HeadRule = FILLED

@@ -128,7 +128,8 @@ SHIPPED = {
     "simharness/world/humans/clothing_colors.py", "simharness/world/humans/population.py",
     "simharness/world/humans/anatomy.py", "simharness/world/scene/rooms/fittings.py",
     "simharness/world/scene/rooms/textures.py", "mvpose/calibration/findings.py",
-    "simharness/outputs/study/curves.py", "simharness/reality/detector_fit/fit_table.py",
+    "simharness/outputs/study/curves.py", "simharness/outputs/validation/tables.py",
+    "simharness/reality/detector_fit/fit_table.py",
     "simharness/reality/detector_fit/profile.py",
     "simharness/trial/kernel_compilation.py", "mvpose/formats/joint_names.py", "mvpose/networks/catalogue/published.py",
 }  # fmt: skip

@@ -80,7 +80,8 @@ class TestDrawn:
         np.testing.assert_allclose(away.mean(axis=0), annotation.shift, atol=0.004)
         np.testing.assert_allclose(away.std(axis=0), 0.02, rtol=0.15)
         assert away.std(axis=0).mean() == pytest.approx(0.02, rel=0.02)
-        np.testing.assert_allclose(annotation.rms[0], np.sqrt((away[:, 0] ** 2).sum(axis=-1).mean(axis=0)), rtol=0.1)
+        rms = np.sqrt((annotation.shift**2).sum(axis=-1) + 3 * annotation.deviation**2)
+        np.testing.assert_allclose(rms[0], np.sqrt((away[:, 0] ** 2).sum(axis=-1).mean(axis=0)), rtol=0.1)
 
     def test_memory(self, still):
         """The autocorrelation is (1 - noise) exp(-lag / life)."""

@@ -1,6 +1,6 @@
 """Objects added until a given share of the joints in the pictures is occluded."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
@@ -39,12 +39,6 @@ def lines_in(space: FreeSpace) -> SightLines:
     count = int(np.clip(_LINES / each, *_TIMES))
     chosen = shown[np.unique(np.linspace(0, len(shown) - 1, min(count, len(shown))).round().astype(int))]
     return lines_of_sight(space.rig, space.time[chosen], space.joints[chosen])
-
-
-def share_hidden(space: FreeSpace, solids: Sequence[Solid]) -> float:
-    """Return the share of joints in the pictures, over people, cameras and times, that solids occlude."""
-    lines = lines_in(space)
-    return float(lines.hidden(solids).mean()) if len(lines) else 0.0
 
 
 def cover(seed: int, share: float, fillers: Mapping[str, Draw], site: Site) -> None:

@@ -252,7 +252,8 @@ def _lines_of(court: Mapping[str, Any], start: float) -> Iterator[Floats]:
     for line in court["lines"]:
         yield [start, 0.0] + np.array(line, float)
     for arc in court.get("arcs", ()):
-        turn = np.radians(np.linspace(*arc["degrees"], 33))
+        low, high = arc["degrees"]
+        turn = np.radians(np.linspace(low, high, 33))
         yield [start + arc["x"], 0.0] + arc["radius"] * np.column_stack([np.cos(turn), np.sin(turn)])
 
 

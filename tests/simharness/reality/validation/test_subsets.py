@@ -72,7 +72,6 @@ def test_a_recording_is_its_own_best_twin(passes):
     assert own.ranks["fast"].mean == pytest.approx(1.0)
     other = compare_subsets(Evidence.of_tallies(recordings[0], results[0], results[1:]), 4, ("full", "fast"))
     assert other.curves[2]["fast"].difference < 0
-    assert other.mean_difference("fast") > own.mean_difference("fast") == 0
     assert other.sampled == ()
 
 
