@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import gammainccinv, gammaincinv, ndtr, stdtrit
+from scipy.special import gammainccinv, gammaincinv
 
 from mvpose.arrays import Floats
 from simharness.statistics.studentized import mean_ends
@@ -118,15 +118,14 @@ def scene_scores(values: Sequence[float | None] | ArrayLike) -> Floats:
 def _rare_ends(events: Floats, event: float) -> tuple[float, float] | None:
     """Return the ends of the interval of the mean of rare events (n,); None where they are not rare.
 
-    The variance of the mean comes from few scenes, so tails are expanded in the ratio of Student's t to the normal
-    distribution (Hesterberg, The American Statistician 2015). The upper end allows for one more event, of the largest
-    weight (Fay & Feuer) times 1 + 3 / k, because the largest of k weights is not the largest possible one.
+    The upper end allows for one more event, of the largest weight (Fay & Feuer) times 1 + 3 / k, because the largest of k
+    weights is not the largest possible one. This also covers that the variance comes from few scenes.
     """
     n = len(events)
     hit = int((events > 1e-9 * event).sum())
     if hit > RARE or hit == n:
         return None
-    tail = float(ndtr(-np.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + LEVEL) / 2)))
+    tail = (1 - LEVEL) / 2
     mean, variance = (float(events.mean()), float(events.var(ddof=1)) / n) if hit else (0.0, 0.0)
     weight = float(events.max()) * (1 + 3 / hit) / n if hit else event / n
     low = variance / mean * float(gammaincinv(mean**2 / variance, tail)) if hit else 0.0
