@@ -118,8 +118,8 @@ def scene_scores(values: Sequence[float | None] | ArrayLike) -> Floats:
 def _rare_ends(events: Floats, event: float) -> tuple[float, float] | None:
     """Return the ends of the interval of the mean of rare events (n,); None where they are not rare.
 
-    The upper end allows for one more event, of the largest weight (Fay & Feuer) times 1 + 3 / k, because the largest of k
-    weights is not the largest possible one. This also covers that the variance comes from few scenes.
+    The upper end allows for one more event, of the largest weight (Fay & Feuer) times 1 + 3 / k, because the largest of
+    k weights is not the largest possible one. This also covers that the variance comes from few scenes.
     """
     n = len(events)
     hit = int((events > 1e-9 * event).sum())
