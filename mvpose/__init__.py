@@ -11,19 +11,15 @@ if TYPE_CHECKING:
     from mvpose.presets import preset
     from mvpose.skeleton import COCO17, PANOPTIC19, SHELF14, Skeleton
 
-_MODULES = {
-    "COCO17": "mvpose.skeleton",
-    "PANOPTIC19": "mvpose.skeleton",
-    "SHELF14": "mvpose.skeleton",
-    "Camera": "mvpose.camera",
-    "Detections": "mvpose.detections",
-    "Estimate": "mvpose.estimate",
-    "Matching": "mvpose.estimate",
-    "Pipeline": "mvpose.pipeline",
-    "Rig": "mvpose.camera",
-    "Skeleton": "mvpose.skeleton",
-    "preset": "mvpose.presets",
+_NAMES = {
+    "camera": ("Camera", "Rig"),
+    "detections": ("Detections",),
+    "estimate": ("Estimate", "Matching"),
+    "pipeline": ("Pipeline",),
+    "presets": ("preset",),
+    "skeleton": ("COCO17", "PANOPTIC19", "SHELF14", "Skeleton"),
 }
+_MODULES = {name: f"mvpose.{module}" for module, names in _NAMES.items() for name in names}
 
 __all__ = [
     "COCO17",

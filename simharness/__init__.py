@@ -12,24 +12,16 @@ if TYPE_CHECKING:
     from simharness.types.truth import KeypointError, Truth
     from simharness.types.views import Views, Visibility
 
-_MODULES = {
-    "Blame": "simharness.api",
-    "ForeignProgram": "simharness.trial.foreign_program",
-    "KeypointError": "simharness.types.truth",
-    "Recording": "simharness.types.recording",
-    "Scenario": "simharness.scenario.sections.scenario",
-    "Sequence": "simharness.types.sequence",
-    "TrialResult": "simharness.api",
-    "Truth": "simharness.types.truth",
-    "Views": "simharness.types.views",
-    "Visibility": "simharness.types.views",
-    "assert_robust": "simharness.api",
-    "blame": "simharness.api",
-    "load_scenario": "simharness.api",
-    "run_trial": "simharness.api",
-    "score": "simharness.api",
-    "simulate": "simharness.api",
+_NAMES = {
+    "api": ("Blame", "TrialResult", "assert_robust", "blame", "load_scenario", "run_trial", "score", "simulate"),
+    "scenario.sections.scenario": ("Scenario",),
+    "trial.foreign_program": ("ForeignProgram",),
+    "types.recording": ("Recording",),
+    "types.sequence": ("Sequence",),
+    "types.truth": ("KeypointError", "Truth"),
+    "types.views": ("Views", "Visibility"),
 }
+_MODULES = {name: f"simharness.{module}" for module, names in _NAMES.items() for name in names}
 
 __all__ = [
     "Blame",

@@ -9,7 +9,7 @@ import simharness
 def test_every_public_name_can_be_imported():
     for name in simharness.__all__:
         assert getattr(simharness, name).__name__ == name
-    with pytest.raises(AttributeError, match="it has Blame, KeypointError, Recording, Scenario"):
+    with pytest.raises(AttributeError, match="it has Blame, ForeignProgram, KeypointError, Recording"):
         _ = simharness.Nothing
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
-from simharness.world.humans.added_mesh import AddedMesh, add_mesh, attached, grid, hull, rigid
+from simharness.world.humans.added_mesh import AddedMesh, add_mesh, attached, grid, hull, rigid, rounded
 from simharness.world.humans.body import Body, FacePart
 from simharness.world.humans.clothing_colors import Color
 from simharness.world.humans.head_wear import glasses, hat, mask
@@ -80,6 +80,7 @@ def accessory_colors(look: Look) -> Mapping[FacePart, Color]:
 _TORSO = 0.57  # height of an adult's neck over the hips, metres
 _PACK = np.array([0.15, 0.29, 0.42])  # depth, width, height of a backpack for an adult, metres
 _BAG = np.array([0.27, 0.085, 0.21])  # length, depth, height of a shoulder bag, metres
+_ROUND = 0.45  # power of the superellipsoid of a bag
 _PUSHED = np.radians(30.0)  # angle by which a shoulder bag is pushed back from the side, so that the arm hangs free
 _PRESSED = 0.015  # depth by which a shoulder bag is pressed into the clothes, metres
 _STRAP = 0.036  # width of a strap, metres
@@ -198,15 +199,6 @@ def _rounded_box(middle: Floats, half: Floats) -> tuple[Floats, NDArray[np.int32
     """Return a box with rounded edges, a superellipsoid, of half sizes (3,)."""
     up = np.linspace(np.pi / 2, -np.pi / 2, 8)
     around = np.linspace(0, 2 * np.pi, 12, endpoint=False) + np.pi / 4
-    wide, high = _power(np.cos(up)), _power(np.sin(up))
-    ball = np.stack(
-        np.broadcast_arrays(
-            wide[:, None] * _power(np.cos(around)), wide[:, None] * _power(np.sin(around)), high[:, None]
-        ),
-        axis=-1,
-    )
+    wide, high, x, y = (rounded(each, _ROUND) for each in (np.cos(up), np.sin(up), np.cos(around), np.sin(around)))
+    ball = np.stack(np.broadcast_arrays(wide[:, None] * x, wide[:, None] * y, high[:, None]), axis=-1)
     return middle + half * ball.reshape(-1, 3), grid(8, 12, closed=True)
-
-
-def _power(value: Floats) -> Floats:
-    return np.sign(value) * np.abs(value) ** 0.45

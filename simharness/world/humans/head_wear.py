@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
-from simharness.world.humans.added_mesh import AddedMesh, FacePoints, grid, hull, hull_reach, rigid
+from simharness.world.humans.added_mesh import AddedMesh, FacePoints, grid, hull, hull_reach, rigid, rounded
 from simharness.world.humans.body import Body, FacePart
 
 Sheet = tuple[Floats, NDArray[np.int32]]
@@ -35,7 +35,9 @@ def glasses(body: Body, *, kind: str) -> list[AddedMesh]:
     half_width, half_height, power = (value * k for value, k in zip(_LENS[kind], (scale, scale, 1.0), strict=True))
     middle = np.array([max(face.eye[1], half_width + 0.006 * scale), face.eye[2] - 0.002 * scale])
     around = np.linspace(0, 2 * np.pi, _LENS_CORNERS, endpoint=False)
-    outline = np.column_stack([half_width * _power(np.cos(around), power), half_height * _power(np.sin(around), power)])
+    outline = np.column_stack(
+        [half_width * rounded(np.cos(around), 2 / power), half_height * rounded(np.sin(around), 2 / power)]
+    )
     below = body.vertices[np.unique(body.faces[body.part == FacePart.MASK])].astype(float)
     front = _lens_plane(
         np.concatenate([face.face[face.face[:, 0] > face.ear[0]], below]), middle, half_width, half_height
@@ -190,8 +192,3 @@ def _disc(outline: Floats) -> Sheet:
 
 def _directions(bearing: Floats) -> Floats:
     return np.column_stack([np.cos(bearing), np.sin(bearing)])
-
-
-def _power(value: Floats, power: float) -> Floats:
-    """Return the coordinate of a superellipse."""
-    return np.sign(value) * np.abs(value) ** (2 / power)
