@@ -32,6 +32,22 @@ def quad_mesh(vertices: Floats, quads: NDArray[np.int_], colors: Floats) -> Mesh
     )
 
 
+def outline(half: Floats, each: int) -> Floats:
+    """Return the outline (n, 3) of a rectangle on the floor, counter-clockwise from above, ``each`` points a side."""
+    corners = np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]) * half
+    share = np.arange(each)[:, None] / each
+    sides = [a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    return np.pad(np.concatenate(sides), ((0, 0), (0, 1)))
+
+
+def ring_mesh(rings: Floats, colors: Floats) -> Mesh:
+    """Return the mesh between closed rings (m, s, 3), from the inner to the outer one; ``colors`` ((m - 1) * s, 3)."""
+    sides = rings.shape[1]
+    k, after = np.arange(sides), (np.arange(sides) + 1) % sides
+    first = np.array([k, k + sides, after + sides, after]).T
+    return quad_mesh(rings.reshape(-1, 3), np.concatenate([first + n * sides for n in range(len(rings) - 1)]), colors)
+
+
 def box_mesh(boxes: Sequence[Box], colors: ArrayLike) -> Mesh:
     """Return one mesh of several boxes.
 

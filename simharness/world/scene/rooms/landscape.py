@@ -26,7 +26,7 @@ from simharness.types.srgb import from_linear, to_linear
 from simharness.world.scene.objects.geoms import Box, carried
 from simharness.world.scene.objects.materials import draw_sheet
 from simharness.world.scene.objects.object_files import load_shipped, variants
-from simharness.world.scene.objects.shapes import joined, quad_mesh
+from simharness.world.scene.objects.shapes import joined, outline, ring_mesh
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.textures import smooth_noise
 from simharness.world.scene.rooms.weather import Weather, clouds
@@ -320,22 +320,13 @@ def make_surroundings(room: RoomSection, seed: int, rig: Rig) -> tuple[Solid, ..
 
 def _meadow(rng: np.random.Generator, half: Floats, radius: float) -> Mesh:
     """Return a ring of ground between a rectangle and a circle."""
-    share = np.arange(_PER_SIDE)[:, None] / _PER_SIDE
-    corners = np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]) * half
-    inner = np.concatenate([a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
+    inner = outline(half, _PER_SIDE)
     outer = radius * inner / np.linalg.norm(inner, axis=1, keepdims=True)
     steps = (np.arange(_RINGS + 1) / _RINGS)[:, None, None] ** 1.8
     rings = inner + steps * (outer - inner)
-    sides = len(inner)
-    k, after = np.arange(sides), (np.arange(sides) + 1) % sides
-    rows = [
-        np.column_stack([n * sides + k, (n + 1) * sides + k, (n + 1) * sides + after, n * sides + after])
-        for n in range(_RINGS)
-    ]
-    flat = rings.reshape(-1, 2)
-    quads = np.concatenate(rows)
-    mesh = quad_mesh(np.pad(flat, ((0, 0), (0, 1))), quads, np.ones((len(quads), 3)))
-    return replace(mesh, smooth=True, texture=_lawn(rng), uv=(flat / _PATCH)[mesh.faces].astype(np.float32))
+    mesh = ring_mesh(rings, np.ones((_RINGS * len(inner), 3)))
+    uv = (rings.reshape(-1, 3)[:, :2] / _PATCH)[mesh.faces].astype(np.float32)
+    return replace(mesh, smooth=True, texture=_lawn(rng), uv=uv)
 
 
 def _lawn(rng: np.random.Generator) -> np.ndarray:

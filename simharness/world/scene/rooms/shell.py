@@ -19,7 +19,7 @@ from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.humans.clothing_colors import Color
 from simharness.world.scene.objects.geoms import Box
-from simharness.world.scene.objects.shapes import quad_mesh
+from simharness.world.scene.objects.shapes import outline, quad_mesh, ring_mesh
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.fittings import make_court, make_fittings
 from simharness.world.scene.rooms.kinds import settled
@@ -153,18 +153,9 @@ def _ground(room: RoomSection, seed: int, texture: TiledTexture) -> Solid:
     shown = np.array(light.background) / np.sqrt((light.key * light.direction[2] + light.sky) * np.array(light.tint))
     mean = texture.texture.reshape(-1, 3).mean(axis=0) / 255
     steps = round(AROUND / _RIM)
-    rings = np.stack([_outline(half + AROUND * k / steps) for k in range(steps + 1)])
-    sides = rings.shape[1]
-    k = np.arange(sides)
-    after = (k + 1) % sides
-    quads = np.concatenate(
-        [
-            np.column_stack([n * sides + k, (n + 1) * sides + k, (n + 1) * sides + after, n * sides + after])
-            for n in range(steps)
-        ]
-    )
-    fade = np.repeat(((np.arange(steps) + 1) / steps) ** 1.5, sides)[:, None]
-    mesh = quad_mesh(rings.reshape(-1, 3), quads, (1 - fade) * mean + fade * np.clip(shown, 0, 1))
+    rings = np.stack([outline(half + AROUND * k / steps, 8) for k in range(steps + 1)])
+    fade = np.repeat(((np.arange(steps) + 1) / steps) ** 1.5, rings.shape[1])[:, None]
+    mesh = ring_mesh(rings, (1 - fade) * mean + fade * np.clip(shown, 0, 1))
     slab = Box((0.0, 0.0, -_THICK / 2), (float(half[0] + AROUND), float(half[1] + AROUND), _THICK / 2))
     return Solid("room", "ground", mesh, (slab,), slab)
 
@@ -186,14 +177,6 @@ def _open_ground(x: float, y: float, texture: TiledTexture) -> Solid:
     mesh = replace(_textured_grid(grid, grid[..., :2], texture, (1.0, 1.0, 1.0), beside), smooth=True)
     slab = Box((0.0, 0.0, -_THICK / 2), (x + AROUND, y + AROUND, _THICK / 2))
     return Solid("room", "ground", mesh, (slab,), slab)
-
-
-def _outline(half: Floats, each: int = 8) -> Floats:
-    """Return the outline (n, 3) of a rectangle on the floor, counter-clockwise from above, in equal parts."""
-    corners = np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]) * half
-    share = np.arange(each)[:, None] / each
-    sides = [a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
-    return np.pad(np.concatenate(sides), ((0, 0), (0, 1)))
 
 
 def _ticks(low: float, high: float, step: float) -> Floats:
