@@ -1,11 +1,13 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from instances import f1, filmed, instance, sort_by_view
 from scipy.optimize import linear_sum_assignment
 from test_admm import lower_bound
 
 from mvpose.matching import admm, match, objective
-from mvpose.matching.clustering import cluster
+from mvpose.matching.clustering import _contract, cluster
 
 
 def partitions(view):
@@ -134,3 +136,31 @@ def test_cycle_consistency_beats_pairs_of_views():
             values.append(f1(match(affinity, view, method=method).labels, person, view))
     assert np.mean(scores["admm"]) > np.mean(scores["hungarian"]) + 0.05
     assert np.mean(scores["clustering"]) > np.mean(scores["hungarian"]) + 0.05
+
+
+def _joined_greedily(gain):
+    """Partition by the definition: the two parts of the greatest positive gain are joined until there are none."""
+    parts, gain = [[k] for k in range(len(gain))], gain.copy()
+    np.fill_diagonal(gain, -np.inf)
+    while len(parts) > 1:
+        a, b = np.unravel_index(gain.argmax(), gain.shape)
+        if not gain[a, b] > 1e-12:
+            break
+        gain[a] += gain[b]
+        gain[:, a] += gain[:, b]
+        gain[a, a] = -np.inf
+        parts[a] += parts.pop(b)
+        gain = np.delete(np.delete(gain, b, axis=0), b, axis=1)
+    return {frozenset(part) for part in parts}
+
+
+@given(st.integers(0, 10_000), st.integers(1, 14), st.floats(0.0, 0.5), st.floats(-0.6, 0.3))
+@settings(max_examples=60)
+def test_parts_are_contracted_as_by_trying_all_pairs_each_time(seed, count, apart, mean):
+    rng = np.random.default_rng(seed)
+    gain = rng.normal(mean, 1.0, (count, count))
+    gain[rng.random((count, count)) < apart] = -np.inf
+    gain = np.triu(gain, 1) + np.triu(gain, 1).T
+    np.fill_diagonal(gain, 0.0)
+    part = _contract(gain.copy())
+    assert {frozenset(np.flatnonzero(part == each).tolist()) for each in np.unique(part)} == _joined_greedily(gain)

@@ -242,6 +242,17 @@ def test_a_joint_inherits_the_ambiguity_of_its_parent():
     assert np.trace(covariance[2]) > 0.9 * np.trace(covariance[1])
 
 
+@pytest.mark.parametrize(("depth", "ambiguous"), [(1.9, True), (2.1, False)])
+def test_a_second_depth_behind_the_camera_is_none(depth, ambiguous):
+    """A parent 1 m away: the other depth of a joint mirrors its own at the parent, so it is 2 m minus that."""
+    joints, origin = np.array([[0.0, 1.0, 0.3], [0.0, depth, 0.0]]), np.zeros((1, 3))
+    directions, weights = np.tile([0.0, 1.0, 0.0], (2, 1, 1, 1)), np.array([[[0.0]], [[1.0]]])
+    graph = bone_graph(Skeleton("two", ("one", "other"), (-1, 0), (0, 1), (0.1, 0.1)))
+    covariance = np.zeros((2, 3, 3))
+    _add_ambiguity(covariance, joints, origin, directions, weights, graph, np.ones(2), np.zeros(2), np.zeros(3))
+    assert np.trace(covariance[1]) == pytest.approx(4.0 * (depth - 1.0) ** 2 / 2 if ambiguous else 0.0)
+
+
 def log_posterior(joints, rays):
     """Likelihood times prior of a whole pose, written out from the docstrings."""
     noise, (length, deviation) = Noise(), bone_lengths(COCO17)
