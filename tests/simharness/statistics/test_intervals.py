@@ -103,6 +103,17 @@ def test_single_events_of_equal_weight_have_an_exact_lower_end():
     assert result.high > gamma.isf(0.025, 4) * 0.02 / 2000
 
 
+@pytest.mark.parametrize(("scenes", "rate"), [(10, 0.2), (20, 0.1)])
+def test_the_largest_of_a_few_events_is_not_the_largest_possible_one(scenes, rate):
+    """Events of exponential weight in a few scenes: the upper end lies above the mean in 95 of 100 draws.
+
+    With the largest weight seen as the largest possible one it does in 91; 2000 draws have a deviation of half a point.
+    """
+    rng = np.random.default_rng(7)
+    weights = np.where(rng.random((2000, scenes)) < rate, rng.exponential(1.0, (2000, scenes)), 0.0)
+    assert np.mean([mean_interval(each, unit="per frame").high >= rate for each in weights]) > 0.94
+
+
 def test_a_mirrored_percentage_has_a_mirrored_interval():
     values = np.array([0.0, 0.0, 3.0, 0.0, 7.0, 0.0, 0.0, 1.0])
     one, other = mean_interval(values, unit="%"), mean_interval(100 - values, unit="%")
