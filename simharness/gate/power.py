@@ -9,9 +9,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import ndtri, stdtrit
 
-from mvpose.arrays import Floats, Integers
+from mvpose.arrays import Floats
 from simharness.gate.baseline import GATED, TIME, Measurement
 from simharness.gate.score_tests import least_two_sided_p, pairs_of
 from simharness.scenario.sections.gate_section import GateSection
@@ -58,10 +59,10 @@ def power_of(measurement: Measurement, gate: GateSection) -> list[Power]:
         level = _level(measurement, gate)
         limit = math.log(gate.slowdown) if score == TIME else gate.tolerance_of(score)
         (seeds, spread), *_ = [(n, size) for whole, n, size in rows if whole]
-        single = [least_change(n, size, limit, level / cases) for whole, n, size in rows if not whole]
+        single = [least_changes(n, size, limit, level / cases) for whole, n, size in rows if not whole]
         needed = {wish: needed_seeds(wish * limit, spread, limit, level) for wish in WISHED}
-        whole = least_change(seeds, spread, limit, level)
-        found.append(Power(score, variant, limit, whole, float(np.median(single or [whole])), needed))
+        whole = float(least_changes(seeds, spread, limit, level))
+        found.append(Power(score, variant, limit, whole, float(np.median(single)) if single else whole, needed))
     return found
 
 
@@ -82,29 +83,26 @@ def even_changes(measurement: Measurement, gate: GateSection) -> str:
     )
 
 
-def least_change(seeds: int, spread: float, tolerance: float, level: float) -> float:
-    """Return the mean change that is found with the probability :data:`POWER`: significant and above its tolerance.
-
-    Args:
-        seeds: number of seeds.
-        spread: standard deviation of the change over seeds.
-        tolerance: largest change that counts as none.
-        level: significance level of one test; infinite change where no result of so few seeds is significant.
-    """
-    return float(_least_changes(np.array([seeds]), spread, tolerance, level)[0])
-
-
 def needed_seeds(change: float, spread: float, tolerance: float, level: float) -> int | None:
     """Return the least number of seeds with which a mean change is found; None: more than :data:`MOST`."""
     seeds = np.arange(2, MOST + 1)
-    enough = np.flatnonzero(_least_changes(seeds, spread, tolerance, level) <= change)
+    enough = np.flatnonzero(least_changes(seeds, spread, tolerance, level) <= change)
     return int(seeds[enough[0]]) if len(enough) else None
 
 
-def _least_changes(seeds: Integers, spread: float, tolerance: float, level: float) -> Floats:
+def least_changes(seeds: ArrayLike, spread: float, tolerance: float, level: float) -> Floats:
+    """Return the mean changes (...) that are found with the probability :data:`POWER`: significant, above tolerance.
+
+    Args:
+        seeds: numbers of seeds, (...).
+        spread: standard deviation of the change over seeds.
+        tolerance: largest change that counts as none.
+        level: level of one test; the change is infinite where no result of so few seeds is significant.
+    """
+    seeds = np.asarray(seeds)
     error, margin = spread / np.sqrt(seeds), float(ndtri(POWER))
     change = np.maximum((stdtrit(seeds - 1, 1 - level / 2) + margin) * error, tolerance + margin * error)
-    possible = np.array([least_two_sided_p(int(each)) for each in seeds]) <= level
+    possible = np.vectorize(least_two_sided_p)(seeds) <= level
     return np.where(possible, change, np.inf)
 
 

@@ -6,7 +6,7 @@ Refinement: of two swept values between which a score breaks, the value in the m
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -130,25 +130,6 @@ class FactorBreakingPoint:
     """Lowest and highest value of the factor."""
 
 
-def breaking_along(
-    values: Floats, table: Floats, threshold: float, *, better: Literal["higher", "lower"], rising: bool
-) -> tuple[bool, BreakingPoint]:
-    """Return ``rising``, and the value of a factor at which the mean of scores (n, k) passes a threshold.
-
-    Args:
-        values: values of the factor, (k,), ascending.
-        table: scores by seed and value, (n, k).
-        threshold: worst good value of the mean.
-        better: direction of better scores.
-        rising: whether the score gets worse as the factor grows; else as it shrinks.
-    """
-    if rising:
-        return rising, breaking_point(values, table, threshold, better=better)
-    mirrored = breaking_point(-values[::-1], table[:, ::-1], threshold, better=better)
-    flipped = [None if end is None else 0.0 - end for end in (mirrored.value, mirrored.high, mirrored.low)]
-    return rising, BreakingPoint(flipped[0], flipped[1], flipped[2], mirrored.why)
-
-
 def factor_breaking_points(
     factor: Factor, variants: Sequence[str], score: str, threshold: float, *, relative: bool = False
 ) -> list[FactorBreakingPoint]:
@@ -165,14 +146,19 @@ def factor_breaking_points(
         if not np.isfinite(table).any():
             continue
         known = np.flatnonzero(np.isfinite(table).any(axis=0))
-        ends = [float(np.nanmean(table[:, k])) for k in known]
-        falls = ends[-1] == ends[0] or (ends[-1] < ends[0]) == (better == "higher")
+        first, last = (float(np.nanmean(table[:, k])) for k in known[[0, -1]])
+        falls = first == last or (last < first) == (better == "higher")
         if relative:
             table = table - table[:, [known[0] if falls else known[-1]]]
         values = np.array(factor.values, float)
-        rising, point = breaking_along(values, table, threshold, better=better, rising=bool(falls))
+        if falls:
+            point = breaking_point(values, table, threshold, better=better)
+        else:
+            mirrored = breaking_point(-values[::-1], table[:, ::-1], threshold, better=better)
+            ends = [None if end is None else 0.0 - end for end in (mirrored.value, mirrored.high, mirrored.low)]
+            point = BreakingPoint(ends[0], ends[1], ends[2], mirrored.why)
         swept = (float(values[0]), float(values[-1]))
-        points.append(FactorBreakingPoint(factor.key, variant, score, threshold, rising, point, swept))
+        points.append(FactorBreakingPoint(factor.key, variant, score, threshold, bool(falls), point, swept))
     return points
 
 

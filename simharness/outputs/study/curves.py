@@ -24,7 +24,7 @@ from simharness.scoring.catalogue import SCORES, ScoreInfo
 from simharness.statistics.breaking_points import BreakingPoint
 from simharness.statistics.intervals import Interval, mean_interval
 from simharness.study.causes.cause_shares import Blame, blame
-from simharness.study.factors import LOST, Factor, breaking_along
+from simharness.study.factors import LOST, Factor, factor_breaking_points
 from simharness.study.study_folder import Results
 
 
@@ -138,8 +138,7 @@ def losses(factor: Factor, variants: Sequence[str], score: str) -> list[Loss]:
             rising, best, worst = False, known[means.argmax()], known[means.argmin()]
         point = None
         if factor.numeric and info.unit == "%":
-            change = sign * (table - table[:, [best]])
-            _, point = breaking_along(np.array(factor.values, float), change, -LOST, better="higher", rising=rising)
+            point = factor_breaking_points(factor, [variant], score, -sign * LOST, relative=True)[0].point
         at_best, at_worst = (mean_interval(table[:, k], unit=info.unit) for k in (best, worst))
         found.append(Loss(variant, factor.values[best], factor.values[worst], at_best, at_worst, point, rising))
     return found

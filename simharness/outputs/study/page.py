@@ -15,7 +15,7 @@ from simharness.outputs import TEMPLATES
 from simharness.outputs.blame_section import blame_section
 from simharness.outputs.run.plots import stage_times
 from simharness.outputs.study import plots, tables
-from simharness.outputs.study.curves import Loss, finding, grid, losses, panels
+from simharness.outputs.study.curves import finding, grid, panels
 from simharness.outputs.study.tables import failure_section
 from simharness.outputs.study.worst_frames import WorstFramePictures, show, worst_frames
 from simharness.scenario.sections.cameras_section import CamerasSection
@@ -26,7 +26,6 @@ from simharness.study.factors import (
     LOST,
     THRESHOLDS,
     Factor,
-    FactorBreakingPoint,
     factor_breaking_points,
     factors_by_case,
 )
@@ -268,9 +267,10 @@ def _breaking(
     for key, by_case in panels(swept).items():
         rows = []
         for case, factor in by_case.items():
-            lost = {each.variant: each for each in losses(factor, variants, "pcp")} if factor.numeric else {}
+            lost = factor_breaking_points(factor, variants, "pcp", -LOST, relative=True) if factor.numeric else []
             if lost:
-                cells = [tables.breaking_cell(_point_of(factor, lost.get(variant))) for variant in variants]
+                found = {each.variant: each for each in lost}
+                cells = [tables.breaking_cell(found.get(variant)) for variant in variants]
                 rows.append({"case": case, "broken": f"{LOST:g} points of PCP lost", "cells": cells})
             for score, threshold in thresholds.items() if factor.numeric else ():
                 info = SCORES[score]
@@ -286,14 +286,6 @@ def _breaking(
         if rows:
             tables_by_factor.append({"factor": key, "rows": rows})
     return tables_by_factor
-
-
-def _point_of(factor: Factor, loss: Loss | None) -> FactorBreakingPoint | None:
-    """Return where points are lost as a breaking point of the table."""
-    if loss is None or loss.point is None:
-        return None
-    swept = (float(factor.values[0]), float(factor.values[-1]))
-    return FactorBreakingPoint(factor.key, loss.variant, "pcp", -LOST, loss.rising, loss.point, swept)
 
 
 def _times(results: Results, variants: Sequence[str]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import pytest
 
 from simharness.gate.baseline import FRAMES, KEPT, TIME, Measurement
 from simharness.gate.compare import compare
-from simharness.gate.power import POWER, even_changes, least_change, needed_seeds, power_of, power_rows
+from simharness.gate.power import POWER, even_changes, least_changes, needed_seeds, power_of, power_rows
 from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.statistics.paired_tests import hochberg, holm, paired
@@ -28,7 +28,7 @@ def measured(score, *, seeds, variants=("full",), cases=("a", "b")):
 
 @pytest.mark.parametrize(("seeds", "level"), [(8, 0.05), (12, 0.0125), (20, 0.004)])
 def test_the_least_change_is_found_in_four_of_five_runs(seeds, level):
-    change = least_change(seeds, 2.0, 0.5, level)
+    change = least_changes(seeds, 2.0, 0.5, level)
     rng = np.random.default_rng(seeds)
     runs = rng.normal(change, 2.0, (300, seeds))
     found = [
@@ -36,11 +36,11 @@ def test_the_least_change_is_found_in_four_of_five_runs(seeds, level):
     ]
     assert POWER - 0.08 < np.mean(found) < POWER + 0.08
     assert needed_seeds(change, 2.0, 0.5, level) == seeds
-    assert least_change(seeds, 0.0, 0.5, level) == 0.5  # alike in all seeds: from its tolerance on
+    assert least_changes(seeds, 0.0, 0.5, level) == 0.5  # alike in all seeds: from its tolerance on
 
 
 def test_seeds_that_are_too_few_show_no_change_at_all():
-    assert math.isinf(least_change(6, 1.0, 0.5, 2**-6))
+    assert math.isinf(least_changes(6, 1.0, 0.5, 2**-6))
     assert needed_seeds(100.0, 1.0, 0.5, 2**-6) == 7
     assert needed_seeds(0.4, 1.0, 0.5, 0.05) is None  # less than its tolerance
 
@@ -48,8 +48,8 @@ def test_seeds_that_are_too_few_show_no_change_at_all():
     noise = rng.normal(0, 3, 40)
     suite = measured(lambda case, seed, variant: {"pcp": 50 + noise[seed]}, seeds=40)
     pcp = next(each for each in power_of(suite, GATE) if each.score == "pcp")
-    assert pcp.whole == pytest.approx(least_change(40, noise.std(ddof=1), 0.5, 0.025), rel=1e-6)
-    assert pcp.case == pytest.approx(least_change(40, noise.std(ddof=1), 0.5, 0.0125), rel=1e-6)
+    assert pcp.whole == pytest.approx(least_changes(40, noise.std(ddof=1), 0.5, 0.025), rel=1e-6)
+    assert pcp.case == pytest.approx(least_changes(40, noise.std(ddof=1), 0.5, 0.0125), rel=1e-6)
     assert pcp.seeds[2] > 40 > pcp.seeds[10]
     assert power_rows([pcp])[0][:2] == ("PCP, %", "full")
     assert "from its tolerance on" in even_changes(suite, GATE)
