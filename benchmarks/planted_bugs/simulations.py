@@ -46,11 +46,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     original = run_trial._simulate
 
     def simulate(
-        scenario: Scenario, stages: Stages, workers: int, previews: Collection[int], compile_ahead: bool
+        scenario: Scenario, stages: Stages, workers: int, previews: Collection[int], compile_ahead: bool, every: int
     ) -> tuple[Simulation, DetectedSequence, Mapping[str, Any]]:
         path = Path(folder) / f"{_digest(scenario)}.pickle"
         if first == "scenes" or not path.is_file():
-            simulation, detected, pipelines = original(scenario, stages, workers, previews, compile_ahead)
+            simulation, detected, pipelines = original(scenario, stages, workers, previews, compile_ahead, every)
             if keep == "keep":
                 path.parent.mkdir(parents=True, exist_ok=True)
                 write_atomic(path, pickle.dumps((_without_scene(simulation), detected)))

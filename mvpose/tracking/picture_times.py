@@ -6,7 +6,7 @@ that of the picture follows from the velocity of its track, and the ray is turne
 
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -60,7 +60,7 @@ class FrameClock:
     """Time of the latest picture, seconds."""
     dark: float = 0.0
     """Number of frames since then, none of which has pictures."""
-    lapses: int = 0
+    lapses: int = field(default=0, kw_only=True)
     """Number of latest frames that came so long after their previous ones that nobody could be followed."""
 
     @property
