@@ -77,10 +77,8 @@ def even_changes(measurement: Measurement, gate: GateSection) -> str:
     if least_two_sided_p(seeds) <= level:
         return "A change that is alike in all seeds is shown from its tolerance on."
     enough = needed_seeds(1.0, 0.0, 0.0, level)
-    return (
-        f"A change of one variant is never shown among {len(measurement.variants)} variants that change, only one of "
-        f"all variants alike: {f'{enough} seeds are enough' if enough else 'choose a higher gate.level'}."
-    )
+    more = f"{enough} seeds are enough" if enough else "choose a higher gate.level"
+    return f"A change is shown only if all variants show it, never one variant that changes among others: {more}."
 
 
 def needed_seeds(change: float, spread: float, tolerance: float, level: float) -> int | None:

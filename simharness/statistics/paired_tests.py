@@ -64,7 +64,7 @@ def paired(
       enumerated; with more, ``draws`` flips are drawn, and p is at least 1 / (1 + draws) (Phipson & Smyth, 2010).
     - Student's t corrected for skewness (:mod:`simharness.statistics.studentized`).
 
-    The least p-value is :func:`least_p`. Pairs must be independent of each other.
+    Pairs must be independent of each other.
 
     Args:
         before: score of each scene.
@@ -145,11 +145,6 @@ def paired_counts(
     # A ratio of two sums has the error of the mean of its residuals (linearisation).
     low, high = mean_ends(rate + (change - rate * frames) / frames.mean())
     return Paired(rate, float(low), float(high), _p(change, alternative), len(change))
-
-
-def least_p(pairs: int) -> float:
-    """Return the least one-sided p-value of :func:`paired` with ``DRAWS``: of so many pairs that all change alike."""
-    return 2.0**-pairs if pairs <= EXACT else max(2.0**-pairs, 1 / (1 + DRAWS))
 
 
 def holm(p: Sequence[float]) -> list[float]:
