@@ -124,6 +124,7 @@ MODULES = tuple(
         "benchmarks.simulator",
         "benchmarks.tracking",
         "benchmarks.planted_bugs",
+        "benchmarks.mutation",
         "benchmarks.whole_body",
         "tools.page_pictures",
         "tools.reid",

@@ -4,32 +4,23 @@ A mended cause is one that the scenario does not have: a class of detector error
 a fault, joints that nobody hides. Every error has random draws of its own, so mending one changes no other draw: two
 results that differ in one cause are paired.
 
-How to add a cause: one :class:`Cause` in :data:`CAUSES`.
+How to add a cause: one entry in ``study/data/causes.toml``.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
+from pydantic import BaseModel
 
 from mvpose.arrays import Floats
 from mvpose.estimators import Estimator
+from mvpose.files.input_files import parse_toml
 from mvpose.files.message_text import listed
-from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
-from simharness.scenario.sections.detector_section import (
-    BiasSection,
-    BoxesSection,
-    DropSection,
-    FaceSection,
-    GuessSection,
-    KeypointsSection,
-    ScoresSection,
-    Shares,
-)
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.sections.section import Section
 from simharness.scoring.assessment import assess
 from simharness.scoring.stage_blame import true_labels
 from simharness.trial.audit import audit
@@ -43,9 +34,7 @@ from simharness.world.rigs.extra_camera import with_camera_in_gap
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.placement.free_space import WALL_MARGIN
 
-
-def _unchanged(scenario: Scenario) -> Scenario:
-    return scenario
+SectionT = TypeVar("SectionT", bound=BaseModel)
 
 
 @dataclass(frozen=True)
@@ -58,8 +47,8 @@ class Cause:
     """Name for people."""
     mended: str
     """What the system has when the cause is mended, for users who decide what to buy or mend."""
-    change: Callable[[Scenario], Scenario] = _unchanged
-    """Function that takes the cause out of a scenario."""
+    keys: Sequence[str] = ()
+    """Keys of a scenario that have their defaults when it is mended."""
     reveals: Visibility | None = None
     """Visibility of joints that become visible; None: of none."""
     labels: bool = False
@@ -67,128 +56,27 @@ class Cause:
     camera: bool = False
     """Whether the rig has one more camera."""
 
-
-def _sections(scenario: Scenario, **changes: dict[str, Any]) -> Scenario:
-    """Return the scenario with other values of keys, by section."""
-    sections = {name: getattr(scenario, name).model_copy(update=values) for name, values in changes.items()}
-    return scenario.model_copy(update=sections)
-
-
-def _detector(scenario: Scenario, section: str, **values: Any) -> Scenario:
-    """Return the scenario with other values in a section of [detector]."""
-    changed = getattr(scenario.detector, section).model_copy(update=values)
-    return _sections(scenario, detector={section: changed})
+    def change(self, scenario: Scenario) -> Scenario:
+        """Return a scenario without the cause."""
+        for key in self.keys:
+            scenario = _with_default(scenario, key)
+        return scenario
 
 
-def _defaults(section: type[Section], *keys: str) -> dict[str, Any]:
-    """Return the defaults of keys of a section, with which its errors do not occur."""
-    values = section()
-    return {key: getattr(values, key) for key in keys}
+def _with_default(section: SectionT, key: str) -> SectionT:
+    """Return a section with the default of one key, which may be one of its own sections."""
+    first, _, rest = key.partition(".")
+    default = type(section).model_fields[first].get_default(call_default_factory=True)
+    return section.model_copy(update={first: _with_default(getattr(section, first), rest) if rest else default})
 
 
-def _without_gross_errors(scenario: Scenario) -> Scenario:
-    none = Shares()
-    return _detector(
-        scenario, "keypoints", miss=none, miss_some=None, miss_few=None, stray=none, guess=GuessSection(), border=0.0
-    )
+def _read_causes() -> tuple[Cause, ...]:
+    entries = parse_toml(Path(__file__).parent.with_name("data").joinpath("causes.toml").read_text(encoding="utf-8"))
+    shown = {name: Visibility[entry.pop("reveals")] for name, entry in entries.items() if "reveals" in entry}
+    return tuple(Cause(name, **entry, reveals=shown.get(name)) for name, entry in entries.items())
 
 
-def _without_swaps(scenario: Scenario) -> Scenario:
-    return _detector(scenario, "keypoints", inversion=Shares(), swap=Shares(), swap_crowded=None)
-
-
-def _without_phantoms(scenario: Scenario) -> Scenario:
-    phantoms = scenario.detector.phantoms.model_copy(update={"rate": 0.0})
-    decoys = scenario.detector.decoys.model_copy(update={"share": 0.0})
-    return _sections(scenario, detector={"phantoms": phantoms, "decoys": decoys})
-
-
-def _without_clock_errors(scenario: Scenario) -> Scenario:
-    faults = _defaults(FaultsSection, "clock_offset", "clock_jitter", "rolling_shutter")
-    return _sections(scenario, faults=faults, cameras=_defaults(CamerasSection, "trigger"))
-
-
-def _with_all_pictures(scenario: Scenario) -> Scenario:
-    return _sections(
-        scenario,
-        faults=_defaults(FaultsSection, "dropped", "frozen", "dead"),
-        cameras=_defaults(CamerasSection, "every"),
-    )
-
-
-_BOXES = ("missed", "missed_hidden", "least_visible", "merged", "split", "duplicates", "jitter")
-_SCORES = ("overconfident", "underconfident", "deviation")
-_CALIBRATION = ("focal", "center", "rotation", "translation", "rotation_drift", "translation_drift", "swapped")
-
-CAUSES: tuple[Cause, ...] = (
-    Cause(
-        "dropped-joints",
-        "dropped joints",
-        "a detector that reports every joint in the picture",
-        lambda scenario: _detector(scenario, "keypoints", drop=DropSection(), face=FaceSection()),
-    ),
-    Cause(
-        "gross-errors",
-        "gross errors",
-        "a detector without far misses, and without guesses of joints that it does not see",
-        _without_gross_errors,
-    ),
-    Cause(
-        "swaps", "inversions and swaps", "a detector that confuses no left with right, and no people", _without_swaps
-    ),
-    Cause(
-        "noise",
-        "noise",
-        "keypoints at the true pixel: higher resolution, or a more exact detector",
-        lambda scenario: _detector(scenario, "keypoints", **_defaults(KeypointsSection, "scatter", "jitter")),
-    ),
-    Cause(
-        "bias",
-        "other joint centres",
-        "a detector whose joints are those of the truth",
-        lambda scenario: _sections(scenario, detector={"bias": BiasSection()}),
-    ),
-    Cause(
-        "boxes",
-        "missed and merged boxes",
-        "a detector that finds every person once, in one box",
-        lambda scenario: _detector(scenario, "boxes", **_defaults(BoxesSection, *_BOXES)),
-    ),
-    Cause("phantoms", "phantoms", "a detector that finds nobody where nobody is", _without_phantoms),
-    Cause(
-        "scores",
-        "misleading scores",
-        "keypoint scores that say exactly which error a keypoint has",
-        lambda scenario: _detector(scenario, "scores", **_defaults(ScoresSection, *_SCORES)),
-    ),
-    Cause(
-        "hidden-by-people",
-        "hidden by people",
-        "people who do not hide each other: cameras further up",
-        reveals=Visibility.OCCLUDED_BY_PERSON,
-    ),
-    Cause(
-        "hidden-by-things",
-        "hidden by things",
-        "a room without things in the way",
-        reveals=Visibility.OCCLUDED_BY_CLUTTER,
-    ),
-    Cause(
-        "calibration",
-        "calibration",
-        "a true calibration that stays true",
-        lambda scenario: _sections(scenario, faults=_defaults(FaultsSection, *_CALIBRATION)),
-    ),
-    Cause(
-        "clocks",
-        "clocks",
-        "all cameras triggered at once, with a global shutter",
-        _without_clock_errors,
-    ),
-    Cause("lost-pictures", "lost pictures", "every camera delivers every picture", _with_all_pictures),
-    Cause("matching", "matching", "a matching without mistakes", labels=True),
-    Cause("one-more-camera", "too few cameras", "one more camera, in the widest gap between the others", camera=True),
-)
+CAUSES: tuple[Cause, ...] = _read_causes()
 """Causes in the order of tables."""
 
 _BY_NAME = {cause.name: cause for cause in CAUSES}
