@@ -94,7 +94,4 @@ def _ends(values: Floats, margin: Floats) -> tuple[float | None, float | None]:
     good, past = int(np.argmin([*(low > 0), False])), int(np.argmin([*(high < 0)[::-1], False]))
     if max(good, past) == len(values):  # the break is outside
         return None, None
-    return (
-        float(values[good - 1]) if good else None,
-        float(values[-past]) if past else None,
-    )
+    return (float(values[good - 1]) if good else None, float(values[-past]) if past else None)

@@ -89,11 +89,7 @@ class ForeignProgram:
             given.seek(0)
             try:
                 process = subprocess.Popen(
-                    self.command,
-                    stdin=given,
-                    stdout=subprocess.PIPE,
-                    stderr=subprocess.PIPE,
-                    process_group=group,
+                    self.command, stdin=given, stdout=subprocess.PIPE, stderr=subprocess.PIPE, process_group=group
                 )
             except OSError as error:
                 raise self._failure(f"cannot be started: {error.strerror}: install it or correct the command") from None

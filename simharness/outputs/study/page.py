@@ -22,13 +22,7 @@ from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scoring.catalogue import SCORES
 from simharness.study.causes.blame_text import read_blame
 from simharness.study.causes.cause_shares import Blame
-from simharness.study.factors import (
-    LOST,
-    THRESHOLDS,
-    Factor,
-    factor_breaking_points,
-    factors_by_case,
-)
+from simharness.study.factors import LOST, THRESHOLDS, Factor, factor_breaking_points, factors_by_case
 from simharness.study.study_folder import Results
 
 CURVES = ("pcp", "recall", "mpjpe_mm", "ghosts")

@@ -15,14 +15,7 @@ from mvpose.skeleton import COCO17
 from simharness.detector.detect import Detected
 from simharness.detector.error_classes import classify
 from simharness.detector.false_positives import MIN_JOINTS
-from simharness.detector.viewing_conditions import (
-    OUTSIDE,
-    VISIBLE,
-    Conditions,
-    image_axes,
-    overlaps,
-    pixel_offsets,
-)
+from simharness.detector.viewing_conditions import OUTSIDE, VISIBLE, Conditions, image_axes, overlaps, pixel_offsets
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.association import Association
 from simharness.reality.detector_fit.consensus import Consensus

@@ -1,11 +1,13 @@
 """Lighting of a room by its name in the scenario; outdoors the sun, the sky and the panorama around the scene."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 
+from mvpose.files.input_files import parse_toml
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.lighting import AreaLight, Lighting, LightSources, Panorama, Sun, Vector
 from simharness.types.random_streams import stream
@@ -30,48 +32,20 @@ class Mood:
     every: int = 1
     """Every how many lamps one is on."""
 
-
-LIGHTS: Mapping[str, Lighting] = MappingProxyType(
-    {
-        "day": Lighting(),
-        "warm": Lighting(
-            direction=(-0.30, 0.42, 0.86),
-            key=0.58,
-            sky=0.36,
-            tint=(1.0, 0.84, 0.64),
-            background=(0.87, 0.80, 0.70),
-        ),
-        "side": Lighting(direction=(0.86, 0.34, 0.50), key=0.78, sky=0.28, fill=0.10, background=(0.80, 0.84, 0.90)),
-        "dim": Lighting(
-            direction=(-0.25, -0.35, 0.90),
-            key=0.22,
-            sky=0.15,
-            fill=0.07,
-            tint=(0.86, 0.92, 1.0),
-            background=(0.36, 0.40, 0.46),
-        ),
-    }
-)
-"""Lightings by name: daylight; lamps in the evening; a low sun from one side; little light."""
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "window", tuple(self.window))
+        object.__setattr__(self, "lamp", tuple(self.lamp))
 
 
-# Colours of light are those of black bodies and of daylight after the larger part of a camera's white balance: sky
-# 7500 K, sun 5200 K, lamps 4000 K and 2700 K. Radiances are relative: an overcast sky has 2000 to 6000 cd/m2, a ceiling
-# panel of an office 4000, a lamp in a living room half of it on a smaller part of the ceiling (EN 12464-1).
-MOODS: Mapping[str, Mood] = MappingProxyType(
-    {
-        "day": Mood(window=(5.2, 5.7, 6.3), lamp=(5.0, 4.9, 4.5), brightness=0.88),
-        "warm": Mood(window=(0.10, 0.14, 0.22), lamp=(7.0, 5.1, 3.1), brightness=0.78),
-        "side": Mood(
-            window=(5.4, 5.9, 6.6),
-            lamp=(0.0, 0.0, 0.0),
-            sun=Sun((0.80, 0.34, 0.50), (3.6, 3.35, 3.0)),
-            brightness=0.8,
-        ),
-        "dim": Mood(window=(0.06, 0.075, 0.11), lamp=(2.6, 2.3, 1.9), brightness=0.4, every=3),
-    }
-)
-"""Moods of the lightings of :data:`LIGHTS`, by their names."""
+def _read_lights() -> tuple[dict[str, Lighting], dict[str, Mood]]:
+    entries = parse_toml(Path(__file__).parents[1].joinpath("data", "lights.toml").read_text(encoding="utf-8"))
+    suns = {name: Sun(**entry.pop("sun")) for name, entry in entries.items() if "sun" in entry}
+    moods = {name: Mood(**entry.pop("mood"), sun=suns.get(name)) for name, entry in entries.items()}
+    return {name: Lighting(**entry) for name, entry in entries.items()}, moods
+
+
+LIGHTS, MOODS = map(MappingProxyType, _read_lights())
+"""Lightings in closed form, and moods, by the names of lightings."""
 
 
 def room_lighting(room: RoomSection, seed: int, areas: Sequence[AreaLight] | None = None) -> Lighting:
