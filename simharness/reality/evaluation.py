@@ -10,12 +10,14 @@ They are percentages of correct parts (PCP). Those of Dong et al. were made with
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from mvpose import COCO17, Detections, Estimate, Matching
 from mvpose.estimators import Estimator, SequenceEstimator
+from mvpose.files.input_files import parse_toml
 from mvpose.recording import People
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
@@ -195,20 +197,12 @@ class PublishedPcp(NamedTuple):
     average: float
 
 
-ABLATION: dict[str, dict[str, PublishedPcp]] = {
-    "campus": {
-        "full": PublishedPcp(97.6, 93.3, 98.0, 96.3),
-        "appearance": PublishedPcp(97.6, 93.3, 96.5, 95.8),
-        "geometry": PublishedPcp(97.4, 90.1, 89.4, 92.3),
-        "no-3dps": PublishedPcp(90.6, 89.2, 97.7, 92.5),
-        "no-matching": PublishedPcp(84.8, 89.0, 71.5, 81.8),
-    },
-    "shelf": {
-        "full": PublishedPcp(98.8, 94.1, 97.8, 96.9),
-        "appearance": PublishedPcp(98.6, 60.5, 94.3, 84.5),
-        "geometry": PublishedPcp(97.2, 79.5, 96.5, 91.1),
-        "no-3dps": PublishedPcp(97.9, 89.5, 97.8, 95.1),
-        "no-matching": PublishedPcp(98.1, 91.1, 92.8, 94.0),
-    },
-}
+def _published() -> dict[str, dict[str, PublishedPcp]]:
+    text = (Path(__file__).parent / "data" / "published.toml").read_text(encoding="utf-8")
+    return {
+        name: {preset: PublishedPcp(*row) for preset, row in rows.items()} for name, rows in parse_toml(text).items()
+    }
+
+
+ABLATION = _published()
 """Table 2, by data set and by the equivalent preset of :class:`mvpose.Pipeline`."""

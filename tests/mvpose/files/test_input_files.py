@@ -131,7 +131,7 @@ SHIPPED = {
     "simharness/outputs/study/curves.py", "simharness/outputs/validation/tables.py",
     "simharness/reality/detector_fit/fit_table.py",
     "simharness/reality/detector_fit/profile.py", "simharness/study/causes/cause_catalogue.py",
-    "simharness/world/scene/rooms/room_lighting.py",
+    "simharness/world/scene/rooms/room_lighting.py", "simharness/reality/evaluation.py",
     "simharness/trial/kernel_compilation.py", "mvpose/formats/joint_names.py", "mvpose/networks/catalogue/published.py",
 }  # fmt: skip
 CALLS = re.compile(
