@@ -295,20 +295,8 @@ def _dome(cameras: CamerasSection) -> Floats:
     return np.column_stack([_at(cameras.start + _GOLDEN * np.arange(count), radius), z])
 
 
-# HD cameras of the Panoptic Studio. cmu0 to cmu4: the rigs used to test transfer of methods between rigs; the others
-# are cmu0 with fewer or more cameras, each set a prefix of the next.
-_PANOPTIC = {
-    "panoptic": tuple(range(31)),
-    "cmu0": (3, 6, 12, 13, 23),
-    "cmu1": (1, 2, 3, 4, 6, 7, 10),
-    "cmu2": (12, 16, 18, 19, 22, 23, 30),
-    "cmu3": (10, 12, 16, 18),
-    "cmu4": (6, 7, 10, 12),
-    "panoptic3": (3, 6, 12),
-    "panoptic4": (3, 6, 12, 13),
-    "panoptic6": (3, 6, 12, 13, 23, 10),
-    "panoptic7": (3, 6, 12, 13, 23, 10, 16),
-}
+_DATA = importlib.resources.files("simharness.world.rigs") / "data"
+_PANOPTIC: dict[str, list[int]] = tomllib.loads((_DATA / "panoptic.toml").read_text(encoding="utf-8"))["sets"]
 PRESETS = ("campus", "shelf", *_PANOPTIC)
 
 
@@ -324,12 +312,8 @@ def preset_rig(name: str, *, only: Sequence[str] = ()) -> Rig:
     """
     if name not in PRESETS:
         raise ValueError(f"cameras.preset = {name!r} is no published rig; expected one of {', '.join(PRESETS)}")
-    file = (
-        importlib.resources.files("simharness.world.rigs")
-        / "data"
-        / f"{'panoptic' if name in _PANOPTIC else name}.toml"
-    )
-    data = tomllib.loads(file.read_text(encoding="utf-8"))
+    file = f"{'panoptic' if name in _PANOPTIC else name}.toml"
+    data = tomllib.loads((_DATA / file).read_text(encoding="utf-8"))
     cameras = [_camera(key, entry, data["size"]) for key, entry in data["cameras"].items()]
     if name in _PANOPTIC:
         cameras = [cameras[index] for index in _PANOPTIC[name]]
