@@ -1,6 +1,6 @@
 """Lighting of a room by its name in the scenario; outdoors the sun, the sky and the panorama around the scene."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -37,14 +37,14 @@ class Mood:
         object.__setattr__(self, "lamp", tuple(self.lamp))
 
 
-def _read_lights() -> tuple[dict[str, Lighting], dict[str, Mood]]:
+def _read_lights() -> tuple[Mapping[str, Lighting], Mapping[str, Mood]]:
     entries = parse_toml(Path(__file__).parents[1].joinpath("data", "lights.toml").read_text(encoding="utf-8"))
     suns = {name: Sun(**entry.pop("sun")) for name, entry in entries.items() if "sun" in entry}
     moods = {name: Mood(**entry.pop("mood"), sun=suns.get(name)) for name, entry in entries.items()}
-    return {name: Lighting(**entry) for name, entry in entries.items()}, moods
+    return MappingProxyType({name: Lighting(**entry) for name, entry in entries.items()}), MappingProxyType(moods)
 
 
-LIGHTS, MOODS = map(MappingProxyType, _read_lights())
+LIGHTS, MOODS = _read_lights()
 """Lightings in closed form, and moods, by the names of lightings."""
 
 
