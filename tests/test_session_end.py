@@ -15,7 +15,7 @@ def test_a_worker_that_has_finished_is_not_interrupted(request, worker, ignored)
         for each in request.config.pluginmanager.get_plugins()
         if getattr(each, "__file__", None) == str(Path(__file__).with_name("conftest.py"))
     )
-    before = signal.getsignal(signal.SIGINT)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a program in the background ignores it
     try:
         conftest.pytest_sessionfinish(SimpleNamespace(config=SimpleNamespace(**worker)))
         assert (signal.getsignal(signal.SIGINT) is signal.SIG_IGN) == ignored

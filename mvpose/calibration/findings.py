@@ -5,6 +5,7 @@ where a difference is measured that good rigs have as well; and *unknown* where 
 """
 
 import math
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,13 +17,12 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.camera import Camera, Rig
 from mvpose.checks import Sealed, as_array
-from mvpose.files.input_files import parse_toml
 
 Severity = Literal["alarm", "note", "unknown"]
 Verdict = Literal["fine", "faults", "cannot tell"]
 
 KINDS: Mapping[str, str] = MappingProxyType(
-    parse_toml((Path(__file__).parent / "data" / "findings.toml").read_text(encoding="utf-8"))
+    tomllib.loads((Path(__file__).parent / "data" / "findings.toml").read_text(encoding="utf-8"))
 )
 """Kinds of findings, and what each states."""
 

@@ -81,6 +81,7 @@ class TestBadInput:
         result = simharness("run", QUICKSTART, *TINY, "--set", "cameras.radius=4.5")
         assert_refused(result, "camera 'cam", "wall", "cameras.radius")
 
+    @pytest.mark.slow
     def test_people_that_do_not_fit(self, simharness):
         result = simharness("run", QUICKSTART, "--set", "people.count=12", "--set", "people.area=0.5")
         assert_refused(result, "people.")
@@ -127,6 +128,7 @@ class TestBadInput:
         fast, custom = json.loads(summary.read_text())["variants"].values()
         assert custom["pcp"] == fast["pcp"] > 90
 
+    @pytest.mark.slow
     def test_nothing_is_left_behind(self, simharness, tmp_path):
         simharness("run", QUICKSTART, *TINY, "--set", "cameras.radius=4.5")
         assert list(tmp_path.rglob("*.json")) == list(tmp_path.rglob("*.html")) == []

@@ -9,6 +9,7 @@ from tools.objects.__main__ import write_objects
 from tools.objects.finishes import write_finishes
 
 
+@pytest.mark.slow
 def test_the_shipped_objects_are_those_that_the_tool_writes(tmp_path):
     write_objects(tmp_path)
     made, shipped = ({file.name: file.read_text() for file in folder.glob("*.xml")} for folder in (tmp_path, ASSETS))

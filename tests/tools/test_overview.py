@@ -32,6 +32,9 @@ NUMBER = re.compile(r"-?\d+\.?\d*")
 MIN_LETTERS = 22  # pixels in a picture 1660 wide: 11 at the 830 of a README
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Small run of the scene of the picture."""
@@ -74,7 +77,6 @@ def tiles(record):
     return module._tiles(record, VIEWS)
 
 
-@pytest.mark.slow
 def test_five_panels_stand_in_the_order_of_the_story_each_with_its_package(drawn):
     names = [each.get("id") for each in drawn.iter(f"{SVG}g") if each.get("id")]
     assert names == ["simulate", "detect", "match", "reconstruct", "score"]
@@ -294,8 +296,7 @@ class TestScore:
 class TestFile:
     """The command, and the picture that it made for the README."""
 
-    @pytest.mark.slow
-    def test_the_command_writes_what_is_drawn(self, folder, record, tmp_path):
+        def test_the_command_writes_what_is_drawn(self, folder, record, tmp_path):
         out = tmp_path / "overview.svg"
         digest = RESULTS / "crowd" / "digest.json"
         assert main([str(folder), str(digest), str(out), "--frame", str(FRAME), "--views", "4,3,2"]) == 0

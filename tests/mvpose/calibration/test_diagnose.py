@@ -50,6 +50,7 @@ def test_nothing_is_wrong_with_a_right_rig(recording):
     assert diagnosis.evidence
 
 
+@pytest.mark.slow
 def test_the_camera_that_moved_is_named_with_its_size(recording):
     rig, frames = recording
     camera = rig[3]
@@ -63,6 +64,7 @@ def test_the_camera_that_moved_is_named_with_its_size(recording):
     assert low < 0.0707 < high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("views", [(2,), (0, 1, 2, 3, 4)])
 def test_inverted_extrinsics_are_named_for_one_camera_and_for_all(recording, views):
     rig, frames = recording
@@ -113,6 +115,7 @@ def test_cameras_that_look_at_different_people_cannot_be_compared():
     assert (diagnosis.verdict, found) == ("cannot tell", [])
 
 
+@pytest.mark.slow
 def test_one_camera_that_sees_somebody_else_and_one_without_detections_are_named():
     rig = uneven(5)
     only = [{0, 1}, {0, 1}, {0, 1}, {2}, set()]
@@ -159,6 +162,7 @@ def test_distortion_that_no_camera_of_the_calibration_has_is_one_finding():
     assert alarms(right, frames)[1] == []
 
 
+@pytest.mark.slow
 def test_a_view_of_another_time_sees_other_people(recording):
     rig, frames = recording
     late = [*frames[_FRAMES // 2 :], *frames[: _FRAMES // 2]][::-1]

@@ -137,6 +137,7 @@ def test_a_damaged_video_gives_the_pictures_before_the_damage(dot_finder):
         next(found)
 
 
+@pytest.mark.slow
 def test_a_real_man_is_where_another_program_puts_him(shared_data, tmp_path):
     """Four pictures of Pose2Sim's recording, and its own markers; the definitions of hips differ by 5 cm."""
     folder = shared_data / "pose2sim"

@@ -141,6 +141,7 @@ def test_there_is_no_state_before_the_first_frame():
         _tracker().state()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag", [0.0, 0.1])
 def test_a_thousand_frames_of_people_who_come_and_go_leave_the_state_small(lag):
     """Two of eight people at a time, each for half a second, and false detections all over the place."""

@@ -65,6 +65,7 @@ def confusion(names):
     return table
 
 
+@pytest.mark.slow
 def test_rays_and_pictures_agree_on_97_of_100_labels():
     table = confusion(SCENES)
     assert np.trace(table) / table.sum() >= 0.97, f"\n{table}"

@@ -154,6 +154,7 @@ class TestRareEvents:
         lost = [20, 0, 0, 0, 7, 0, 0, 0, 0, 12, 0, 0]
         assert not compare(self.counted([0] * 12), self.counted(lost), GATE).with_verdict("worse")
 
+    @pytest.mark.slow
     def test_neutral_changes_of_clusters_fail_no_more_often_than_the_level(self):
         """Another draw of the same rare, clustered events: 0.05 x 60 = 3 expected, more than 8 one time in 200."""
 

@@ -42,6 +42,7 @@ def scenario(tmp_path):
     return write
 
 
+@pytest.mark.slow
 def test_descriptors_are_read_from_the_pictures_and_stored(scenario, tmp_path):
     mean_color(tmp_path / "colors.onnx")
     path = scenario('[appearance]\nsource = "pictures"\nnetwork = "colors.onnx"\n')
@@ -123,6 +124,7 @@ def test_a_trial_is_that_of_its_network(scenario, tmp_path):
     assert len(identities) == 2
 
 
+@pytest.mark.slow
 def test_drawn_descriptors_stay_where_keypoints_are_read(scenario, tmp_path):
     dots(tmp_path / "head.onnx")
     path, head = scenario('[appearance]\nsource = "drawn"\n'), f"detector.onnx={tmp_path / 'head.onnx'}"

@@ -13,6 +13,7 @@ WALK = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_repair_wins_back_what_a_wrong_calibration_costs():
     scenario = load("quickstart", overrides=[*WALK, 'variants=["fast", "fast+repair"]'])
     results = measured(scenario, ["fast", "fast+repair"], blame=False)

@@ -178,6 +178,7 @@ def test_a_scene_without_people(clutter):
     assert empty.bodies == empty.motions == empty.figures == ()
 
 
+@pytest.mark.slow
 def test_what_does_not_fit_is_refused():
     with pytest.raises(ValueError, match=r"people.count = 20 people do not fit.*people.area.*people.spacing"):
         build(scenario(people={"count": 20, "area": 1.2}))

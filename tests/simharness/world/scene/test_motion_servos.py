@@ -189,6 +189,7 @@ def one_person(**push):
     return build_trial(load("pushed", overrides=[*overrides, *(f"people.push.{k}={v}" for k, v in keys.items())])).scene
 
 
+@pytest.mark.slow
 def test_a_pushed_person_recovers_or_falls_within_the_limits_of_joints():
     calm, stumbling, falling = (one_person(impulse=impulse) for impulse in (0.0, 60.0, 150.0))
     limits = np.array([calm.model.joint(f"person0/{name}").range for name in DOFS])
