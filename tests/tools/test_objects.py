@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+import pytest
 
 from simharness.world.scene.objects.object_files import ASSETS
 from simharness.world.scene.rooms.textures import FINISHES

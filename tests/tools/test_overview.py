@@ -296,7 +296,7 @@ class TestScore:
 class TestFile:
     """The command, and the picture that it made for the README."""
 
-        def test_the_command_writes_what_is_drawn(self, folder, record, tmp_path):
+    def test_the_command_writes_what_is_drawn(self, folder, record, tmp_path):
         out = tmp_path / "overview.svg"
         digest = RESULTS / "crowd" / "digest.json"
         assert main([str(folder), str(digest), str(out), "--frame", str(FRAME), "--views", "4,3,2"]) == 0
