@@ -111,7 +111,7 @@ def standing_in_line(*distances):
     return rig, state
 
 
-def gathered(rig, state, owners, *, steps=1, step=0.2, memory=1e9):
+def gathered(rig, state, owners, *, steps=1, step=0.2, memory=1e9, fresh=False):
     """Hits and misses (n,) by pictures of the first camera, a step apart, which show the tracks ``owners``."""
     n, model = len(state), Existence()
     origin, found = np.zeros((n, 2), np.bool_), np.full((n, 2), -np.inf)
@@ -120,7 +120,7 @@ def gathered(rig, state, owners, *, steps=1, step=0.2, memory=1e9):
     for k in range(steps):
         taken = rig.packed, sizes, np.array([True, False]), np.array([step, 0.0])
         gather_evidence(
-            (origin, hits, misses, absent, found), taken, np.zeros(n, np.bool_), state, np.array(owners, np.int64),
+            (origin, hits, misses, absent, found), taken, np.full(n, fresh), state, np.array(owners, np.int64),
             np.zeros(len(owners), np.int64), k * step, model.independent, memory,
         )  # fmt: skip
     return hits[:, 0], misses[:, 0]
@@ -167,3 +167,11 @@ def test_a_joint_that_all_cameras_see_is_known_to_between_the_shared_and_the_who
     variances = np.linalg.eigvalsh(estimate.covariance[0])
     assert (variances.min(axis=1) > (SHARED * sigmas) ** 2).all()
     assert (variances.max(axis=1) < sigmas**2).all()
+
+
+def test_pictures_that_miss_who_has_just_come_count_in_full_and_later_ones_by_their_time():
+    rig, state = standing_in_line(2.0)
+    quarter = 0.25 * Existence().independent
+    assert gathered(rig, state, [], step=quarter, fresh=True)[1] == pytest.approx([1.0])
+    assert gathered(rig, state, [], step=quarter)[1] == pytest.approx([0.25])
+    assert gathered(rig, state, [0], step=quarter, fresh=True)[0] == pytest.approx([0.0])  # born from it
