@@ -90,10 +90,10 @@ class _Finder(ast.NodeVisitor):
         self._functions.pop()
 
     def visit_Raise(self, node: ast.Raise) -> None:
-        """Leave out what is only said."""
+        """Leave out messages of errors."""
 
     def visit_Assert(self, node: ast.Assert) -> None:
-        """Leave out what is only said."""
+        """Leave out messages of errors."""
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> None:
         """Leave out text."""

@@ -141,7 +141,6 @@ def new_people():
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=False, reason="rank-1 84.9, mAP 83.2 over all rooms and sensors; forty people may pass")
 def test_scores_on_newly_rendered_people_are_those_required(new_people):
     result = scores.score_sites(Session(DEFAULT), [new_people])
     assert result["network"]["rank1"] >= 90.0  # about 130 queries: 95 minus two standard errors
@@ -156,10 +155,20 @@ def test_scores_on_newly_rendered_people(new_people):
     assert result["network"]["rank1"] >= 78.0  # of forty people, about 120 queries: 85 minus two standard errors
     assert result["network"]["mAP"] >= 75.0
     assert result["network"]["mAP"] > result["histogram"]["mAP"] + 40
-    pairs = scores.pairs_of_crops(euclidean_distances(scores.network_descriptors(session, crops)), crops)
-    midpoint = session.card.midpoint
-    assert (pairs.distance[pairs.same] < midpoint).mean() > 0.73  # 133 pairs: 0.8 minus two standard errors
-    assert (pairs.distance[~pairs.same] > midpoint).mean() > 0.95
+    pairs = _pairs(session, crops)
+    assert (pairs.distance[~pairs.same] > session.card.midpoint).mean() > 0.95
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="missed in the present rooms: 78.9 % of 133 pairs")
+def test_four_of_five_pairs_of_one_person_are_nearer_than_the_midpoint(new_people):
+    session = Session(DEFAULT)
+    pairs = _pairs(session, new_people)
+    assert (pairs.distance[pairs.same] < session.card.midpoint).mean() > 0.8
+
+
+def _pairs(session, crops):
+    return scores.pairs_of_crops(euclidean_distances(scores.network_descriptors(session, crops)), crops)
 
 
 @pytest.mark.slow

@@ -7,22 +7,11 @@ from itertools import pairwise
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.world.scene.objects.laboratory import BOX_COLORS
+from simharness.world.scene.objects.laboratory import BOOK_COLORS, BOX_COLORS, WOOD
 from tools.objects.builder import ObjectBuilder
 
 _POST, _SHEET, _TAPE = 0.03, 0.015, 0.06  # metres
 _RACK_COLORS = np.array([[0.72, 0.73, 0.75], [0.25, 0.26, 0.28], [0.88, 0.88, 0.86]])
-WOOD = np.array([[0.62, 0.47, 0.33], [0.80, 0.72, 0.60], [0.40, 0.30, 0.24], [0.86, 0.85, 0.82]])
-BOOK_COLORS = np.array(
-    [
-        [0.55, 0.22, 0.20],
-        [0.20, 0.32, 0.46],
-        [0.25, 0.42, 0.32],
-        [0.78, 0.62, 0.30],
-        [0.82, 0.79, 0.72],
-        [0.36, 0.26, 0.40],
-    ]
-)
 _STONE = np.array([[0.80, 0.79, 0.76], [0.70, 0.69, 0.67], [0.86, 0.84, 0.79], [0.62, 0.63, 0.66]])
 _PANELS = np.array([[0.36, 0.52, 0.55], [0.55, 0.57, 0.60], [0.72, 0.55, 0.32], [0.44, 0.40, 0.52], [0.48, 0.56, 0.42]])
 _FRAME = np.array([0.82, 0.83, 0.84])

@@ -236,7 +236,7 @@ def _clock_after(*times):
 
 @pytest.mark.parametrize(("unit", "factor"), [("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9)])
 def test_times_from_zero_in_other_units_are_said_to_be(unit, factor):
-    """They are no times that cannot be: 40 s from frame to frame are a time lapse. It is said once."""
+    """A warning, not an error: 40 s between frames may be a time lapse. It comes once."""
     times = 0.04 * factor * np.arange(9)
     clock = _clock_after(*times[:3])
     said = f"came {times[1]:.4g} s after the previous one, .* Are the times {unit}? Divide them by {factor:g}"

@@ -26,8 +26,8 @@ BOX_COLORS = np.array(
 _TAPE = 0.06  # metres: width
 _SHELF_WIDTH, _SHELF_HEIGHT, _SHELF_DEPTH = (0.9, 1.2), (1.7, 1.9), (0.28, 0.36)
 _BOARD = 0.025
-_WOOD = np.array([[0.62, 0.47, 0.33], [0.80, 0.72, 0.60], [0.40, 0.30, 0.24], [0.86, 0.85, 0.82]])
-_BOOK_COLORS = np.array(
+WOOD = np.array([[0.62, 0.47, 0.33], [0.80, 0.72, 0.60], [0.40, 0.30, 0.24], [0.86, 0.85, 0.82]])
+BOOK_COLORS = np.array(
     [
         [0.55, 0.22, 0.20],
         [0.20, 0.32, 0.46],
@@ -73,7 +73,7 @@ def draw_shelf(rng: np.random.Generator) -> ObjectModel:
     """Draw an open bookshelf about 1.8 m tall: two sides, boards, books and cartons."""
     width, height, depth = rng.uniform(*_SHELF_WIDTH), rng.uniform(*_SHELF_HEIGHT), rng.uniform(*_SHELF_DEPTH)
     boards = int(rng.integers(5, 7))
-    wood = _WOOD[rng.integers(len(_WOOD))]
+    wood = WOOD[rng.integers(len(WOOD))]
     inner = width - 2 * _BOARD
     parts: list[tuple[Box, Floats]] = []
     for side in (-1.0, 1.0):
@@ -99,7 +99,7 @@ def _contents(
     while at < filled:
         thick, tall, deep = rng.uniform(0.02, 0.05), room * rng.uniform(0.55, 0.9), depth * rng.uniform(0.55, 0.85)
         y = end * (inner / 2 - at - thick / 2)
-        color = _BOOK_COLORS[rng.integers(len(_BOOK_COLORS))] * rng.uniform(0.85, 1.1)
+        color = BOOK_COLORS[rng.integers(len(BOOK_COLORS))] * rng.uniform(0.85, 1.1)
         parts.append((Box((0.0, float(y), float(floor + tall / 2)), (deep / 2, thick / 2, tall / 2)), color))
         at += thick
     free = inner - at

@@ -27,7 +27,7 @@ def make_prop(prop: Prop, name: str) -> Solid:
 
 
 def _model(prop: Prop, tint: int) -> ObjectModel:
-    """Return the shipped object of the kind of a prop, of its size; a box is taped, whatever its size."""
+    """Return the shipped object for a kind of prop, scaled to its size; the tape of a box keeps its width."""
     if prop.kind == "box":
         return box_model(*taped(np.array(prop.size), BOX_COLORS[tint % len(BOX_COLORS)], base=0.0, yaw=0.0))
     files = variants(prop.kind)
