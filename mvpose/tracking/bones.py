@@ -127,6 +127,7 @@ def _constrain(joints, covariance, state, state_covariance, ends, length, varian
             joints[j, r] = state[j, r]
             for c in range(3):
                 covariance[j, r, c] = state_covariance[j, r, c] if not np.isnan(state[j, 0]) else np.nan
+    for j in range(count):
         if np.isnan(state[j, 0]):
             continue
         if not solve(state_covariance[j, :3, :3], zero, inverses[j], target):
