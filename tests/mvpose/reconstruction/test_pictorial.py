@@ -26,7 +26,7 @@ from mvpose.reconstruction.limb_direction_prior import (
     direction_log_likelihood,
     trunk_segments,
 )
-from mvpose.reconstruction.pictorial import propose_all
+from mvpose.reconstruction.pictorial import propose_all, propose_single_views
 from mvpose.reconstruction.refinement import _add_ambiguity, climb, refine
 from mvpose.reconstruction.triangulation import consensus
 
@@ -142,6 +142,23 @@ def test_a_single_view_joint_lies_on_its_ray_at_the_depth_nearer_to_the_trunk_di
         assert np.linalg.norm(joints[joint] - body[joint]) < 0.3
         assert 0 < scores[joint] < 0.3 * scores[0]
         assert sight @ covariance[joint] @ sight > 4 * sight @ covariance[0] @ sight
+
+
+@pytest.mark.parametrize(("precision", "proposed"), [(1.0, 2), (1e4, 2), (0.0, 0)])
+def test_a_bone_of_any_known_length_proposes_two_depths_and_one_of_unknown_length_none(precision, proposed):
+    graph, wrist, elbow = bone_graph(COCO17), 9, 7
+    states, unary, count = np.zeros((17, 4, 3)), np.zeros((17, 4)), np.zeros(17, np.int64)
+    states[elbow, 0], count[elbow] = (3.0, 0.1, 0.0), 1
+    weights = np.zeros((17, 1, 1))
+    weights[wrist] = 0.9
+    views = np.zeros((1, 3)), np.tile([1.0, 0.0, 0.0], (17, 1, 1, 1)), weights, np.zeros(1)
+    length, bones = np.full(len(graph.share), 0.26), np.full(len(graph.share), 1e4)
+    bones[wrist] = precision
+    propose_single_views(states, unary, count, views, 0.01, graph, length, bones, np.zeros(len(bones)), np.zeros(3))
+    assert count[wrist] == proposed
+    depths = 3.0 + np.array([-1.0, 1.0]) * np.sqrt(0.26**2 - 0.1**2)
+    np.testing.assert_allclose(states[wrist, :proposed, 0], depths[:proposed])
+    assert count.sum() == 1 + proposed
 
 
 def test_without_trunk_direction_the_nearer_depth_is_taken():
