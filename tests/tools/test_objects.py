@@ -1,13 +1,15 @@
-"""What ships as an object or as a picture of a finish can be made again."""
+"""What ships as an object or as a picture of a finish, material or print can be made again."""
 
 import cv2
 import numpy as np
 import pytest
 
+from simharness.world.scene.objects.materials import MATERIALS
 from simharness.world.scene.objects.object_files import ASSETS
 from simharness.world.scene.rooms.textures import FINISHES
 from tools.objects.__main__ import write_objects
 from tools.objects.finishes import write_finishes
+from tools.objects.prints import write_pictures
 
 
 @pytest.mark.slow
@@ -20,10 +22,11 @@ def test_the_shipped_objects_are_those_that_the_tool_writes(tmp_path):
     assert pictures[0] == pictures[1]
 
 
-def test_the_shipped_finishes_are_those_that_the_tool_draws(tmp_path):
-    write_finishes(tmp_path)
-    names = [sorted(file.name for file in folder.iterdir()) for folder in (tmp_path, FINISHES)]
+@pytest.mark.parametrize(("write", "folder"), [(write_finishes, FINISHES), (write_pictures, MATERIALS)])
+def test_the_shipped_pictures_are_those_that_the_tool_draws(tmp_path, write, folder):
+    write(tmp_path)
+    names = [sorted(file.name for file in each.iterdir()) for each in (tmp_path, folder)]
     assert names[0] == names[1]
     for name in names[0]:
-        made, shipped = (cv2.imread(str(folder / name)).astype(float) for folder in (tmp_path, FINISHES))
+        made, shipped = (cv2.imread(str(each / name)).astype(float) for each in (tmp_path, folder))
         assert np.abs(made - shipped).mean() < 2.0  # versions of the codec may differ

@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 
 from simharness.types.random_streams import stream
-from simharness.world.scene.objects.materials import draw_sheet
 from tools.objects import clutter, decoys, gym, home, office, park, plants, shop, stage, ward
 from tools.objects.builder import ObjectBuilder
 from tools.objects.finishes import write_finishes
+from tools.objects.prints import PICTURES, write_pictures
 
 Draw = Callable[[ObjectBuilder, np.random.Generator], None]
 
@@ -105,7 +105,6 @@ def write_objects(folder: Path) -> None:
             (folder / f"{stem}.xml").write_text(builder.mjcf(name, stem), encoding="utf-8")
             if builder.picture is not None:
                 _write_picture(folder / "textures" / f"{stem}.png", builder.picture)
-    sheet = draw_sheet(0)
     used = {
         line.split('"')[1]
         for file in folder.glob("*.xml")
@@ -113,8 +112,8 @@ def write_objects(folder: Path) -> None:
         if "<texture" in line
     }
     for name in used - {"picture"}:
-        patch = sheet.patches[name]
-        picture = sheet.texture[patch.top : patch.top + patch.height, patch.left : patch.left + patch.width]
+        draw_picture, _ = PICTURES[name.rstrip("0123456789")]
+        picture = np.round(255 * np.clip(draw_picture(stream(0, "room", "sheet", name)), 0, 1)).astype(np.uint8)
         if name in ("wood", "fabric", "metal", "leaves"):  # a texture of a cube is a square
             side = min(picture.shape[:2])
             picture = picture[:side, :side]
@@ -131,3 +130,4 @@ if __name__ == "__main__":
     given = parser.parse_args().folder
     write_objects(given)
     write_finishes(given.parent / "finishes")
+    write_pictures(given.parent / "materials")

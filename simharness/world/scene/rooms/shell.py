@@ -4,10 +4,9 @@ The faces of the floor look up and those of the walls look into the room: counte
 room, which is the outside of a wall as a solid. The ceiling is in :mod:`~simharness.world.scene.rooms.lamps`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import TypeVar
 
 import numpy as np
 
@@ -27,9 +26,8 @@ from simharness.world.scene.rooms.lamps import make_ceiling, shown_lamps
 from simharness.world.scene.rooms.landscape import AROUND, make_surroundings
 from simharness.world.scene.rooms.openings import Opening, Wall, room_walls
 from simharness.world.scene.rooms.room_lighting import room_lighting
-from simharness.world.scene.rooms.textures import FLOORS, WALLS, TiledTexture
+from simharness.world.scene.rooms.textures import FLOORS, WALLS, TiledTexture, finish
 
-Choice = TypeVar("Choice")
 _ANY = 4  # finishes from which "any" is drawn: the first of each list
 _CELL = 1.0  # metres: approximate cell size of the grids of floor and walls
 _THICK = 0.1  # metres: thickness of floor and walls as solids, outside the room
@@ -98,19 +96,19 @@ def wall_color(room: RoomSection, seed: int) -> Color:
 @lru_cache(maxsize=_KEPT)
 def _floor_finish(name: str, seed: int) -> TiledTexture:
     rng = stream(seed, "room", "floor")
-    return _chosen(FLOORS, name, rng)(rng)
+    return finish(_chosen(FLOORS, name, rng), rng)
 
 
 @lru_cache(maxsize=_KEPT)
 def _wall_finish(name: str, seed: int, height: float) -> TiledTexture:
     rng = stream(seed, "room", "wall")
-    return _chosen(WALLS, name, rng)(rng, height)
+    return finish(_chosen(WALLS, name, rng), rng, height)
 
 
-def _chosen(finishes: Mapping[str, Choice], name: str, rng: np.random.Generator) -> Choice:
-    """Return a texture by name, or a drawn one for "any". It is always drawn, so that later draws do not shift."""
-    drawn = list(finishes)[rng.integers(_ANY)]
-    return finishes[drawn if name == "any" else name]
+def _chosen(finishes: Sequence[str], name: str, rng: np.random.Generator) -> str:
+    """Return the name of a finish, a drawn one for "any". It is always drawn, so that later draws do not shift."""
+    drawn = finishes[int(rng.integers(_ANY))]
+    return drawn if name == "any" else name
 
 
 def _floor(x: float, y: float, texture: TiledTexture) -> Mesh:

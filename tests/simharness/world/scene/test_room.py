@@ -10,7 +10,7 @@ from simharness.world.scene.rooms.lamps import area_lights, has_ceiling, make_ce
 from simharness.world.scene.rooms.openings import draw_openings
 from simharness.world.scene.rooms.room_lighting import LIGHTS, MOODS, room_lighting
 from simharness.world.scene.rooms.shell import make_room
-from simharness.world.scene.rooms.textures import FLOORS, WALLS
+from simharness.world.scene.rooms.textures import FLOORS, WALLS, finish
 
 SIZE = (6.0, 8.0, 3.0)
 ROOM = RoomSection(size=SIZE)
@@ -86,7 +86,7 @@ def test_textures_have_their_given_size(room):
 def test_textures_repeat_without_a_seam(look):
     """Across the seam, neighbouring pixels differ no more than elsewhere."""
     rng = np.random.default_rng(3)
-    texture = (FLOORS[look](rng) if look in FLOORS else WALLS[look](rng, 3.0)).texture.astype(float)
+    texture = finish(look, rng, None if look in FLOORS else 3.0).texture.astype(float)
     for axis in (0, 1) if look in FLOORS else (1,):
         steps = np.abs(np.diff(texture, axis=axis)).mean(axis=(1 - axis, 2))
         seam = np.abs(np.take(texture, 0, axis) - np.take(texture, -1, axis)).mean()
