@@ -57,7 +57,7 @@ def show(scenario: ScenarioFile, overrides: Overrides = None, seed: Seed = None)
         except StudyTooLarge:
             note = (
                 "simharness study needs --yes to run so many trials."
-                if plan.trials <= MOST_TRIALS
+                if plan.most_trials <= MOST_TRIALS
                 else f"simharness study runs at most {MOST_TRIALS:,} trials."
             )
         needs = _needs(plan)

@@ -77,7 +77,7 @@ def study(
 
         limits = None if yes else LIMIT
         loaded = load_study(file, overrides=overrides or (), seeds=seeds, variants=variant or None, limit=limits)
-        if yes and loaded.trials <= LIMIT:
+        if yes and loaded.plan.most_trials <= LIMIT:
             note(f"--yes has no effect: the study has no more than {LIMIT:,} trials")
         part = _part(running.shard)
         if part is not None and blame:

@@ -37,7 +37,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -102,9 +102,9 @@ class Study:
     """The file, or the name of a shipped scenario, as it was given."""
     base: Scenario
     """The scenario without sweep and cases, at the first seed."""
-    data: Mapping[str, Any] = field(default_factory=dict)
+    data: Mapping[str, Any]
     """Keys of the file, of its bases and of the command line, before presets and sweep are resolved."""
-    plan: "ScenarioPlan | None" = None
+    plan: "ScenarioPlan"
     """The file from which it was loaded."""
 
     @property
@@ -122,7 +122,7 @@ class Study:
         Raises:
             ScenarioError: a setting is not valid.
         """
-        if not added or self.plan is None:
+        if not added:
             return self
         plan = replace(self.plan, sweep=self.plan.sweep.with_values(added))
         data = merge(dict(self.data), {"sweep": {"refine": 0}})
@@ -177,6 +177,11 @@ class ScenarioPlan:
     def trials(self) -> int:
         """Number of trials: settings times seeds."""
         return self.settings * len(self.seeds)
+
+    @property
+    def most_trials(self) -> int:
+        """Number of trials with as many values as a run may add where scores break."""
+        return sum(self.sweep.count(case.values, refined=True) for case in self.cases) * len(self.seeds)
 
     @property
     def is_study(self) -> bool:
@@ -237,16 +242,16 @@ def load_study(
     """
     plan = read_plan(path, overrides=overrides, seeds=seeds, variants=variants, folder=folder)
     _check_variants(plan)
-    if plan.trials > MOST_TRIALS:
+    size = f"{path}: makes {plan.trials:,} trials ({plan.settings:,} x {len(plan.seeds):,}, settings x seeds)"
+    if plan.most_trials > plan.trials:
+        size += f", up to {plan.most_trials:,} with the values that sweep.refine = {plan.sweep.refine} may add"
+    if plan.most_trials > MOST_TRIALS:
         raise StudyTooLarge(
-            f"{path}: makes {plan.trials:,} trials ({plan.settings:,} x {len(plan.seeds):,}, settings x seeds), more "
-            f"than the {MOST_TRIALS:,} that a study may have: sweep over fewer values, or split it into several files"
+            f"{size}, more than the {MOST_TRIALS:,} that a study may have: sweep over fewer values, or split it into "
+            "several files"
         )
-    if limit is not None and plan.trials > limit:
-        raise StudyTooLarge(
-            f"{path}: makes {plan.trials:,} trials ({plan.settings:,} x {len(plan.seeds):,}, settings x seeds), more "
-            f"than {limit:,}: sweep over fewer values, or add --yes to run it"
-        )
+    if limit is not None and plan.most_trials > limit:
+        raise StudyTooLarge(f"{size}, more than {limit:,}: sweep over fewer values, or add --yes to run it")
     return Study(
         name=plan.base.name,
         description=plan.base.description,

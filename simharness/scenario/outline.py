@@ -42,9 +42,10 @@ def _unused(plan: ScenarioPlan) -> list[str]:
 
 def _lines(plan: ScenarioPlan, note: str) -> list[str]:
     variants = plan.base.method.variants
+    most = f" (up to {plan.most_trials:,} where scores break)" if plan.most_trials > plan.trials else ""
     lines = [
         f"{plan.base.name}: {_count(plan.settings, 'setting')} x {_count(len(plan.seeds), 'seed')} = "
-        f"{_count(plan.trials, 'trial')}, each by {_count(len(variants), 'variant')}",
+        f"{_count(plan.trials, 'trial')}{most}, each by {_count(len(variants), 'variant')}",
         *([note] if note else []),
         "",
     ]

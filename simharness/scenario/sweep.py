@@ -49,6 +49,11 @@ class Axis:
     values: tuple[tuple[Value, ...], ...]
     """Values of the keys, (steps, k)."""
 
+    @property
+    def is_numeric(self) -> bool:
+        """Whether it has numbers of a single key."""
+        return all(len(each) == 1 and type(each[0]) in (int, float) for each in self.values)
+
     def others(self, base: Mapping[str, Value]) -> list[tuple[Value, ...]]:
         """Return the values that differ from those of the base."""
         base_values = tuple(base[key] for key in self.keys)
@@ -85,11 +90,17 @@ class Sweep:
         """All dotted keys."""
         return tuple(key for axis in self.axes for key in axis.keys)
 
-    def count(self, base: Mapping[str, Value]) -> int:
-        """Return the number of settings of :meth:`settings`, without making them."""
+    def count(self, base: Mapping[str, Value], *, refined: bool = False) -> int:
+        """Return the number of settings of :meth:`settings`, without making them.
+
+        Args:
+            base: values of all swept keys where they are not varied.
+            refined: whether with as many more values as a run may add, to each axis with numbers of a single key.
+        """
+        added = [self.refine if refined and axis.is_numeric else 0 for axis in self.axes]
         if self.one_at_a_time:
-            return 1 + sum(len(axis.others(base)) for axis in self.axes)
-        return math.prod(len(axis.values) for axis in self.axes)
+            return 1 + sum(len(axis.others(base)) for axis in self.axes) + sum(added)
+        return math.prod(len(axis.values) + more for axis, more in zip(self.axes, added, strict=True))
 
     def settings(self, base: Mapping[str, Value]) -> Iterator[tuple[str, dict[str, Value]]]:
         """Yield the varied key, "" for the base and for combinations, and the values of all keys that change.

@@ -151,7 +151,7 @@ def _next_values(
     study: Study, rows: Sequence[tuple[PlannedTrial, Entry]], added: Mapping[str, Sequence[float]], folder: Path
 ) -> dict[str, tuple[float, ...]]:
     """Return the values to add to a study that has these results and was refined by some values already."""
-    most = study.plan.sweep.refine if study.plan else 0
+    most = study.plan.sweep.refine
     if not most or not rows:
         return {}
     found = tables(rows, study.factors)

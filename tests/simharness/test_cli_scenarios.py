@@ -102,6 +102,8 @@ class TestShow:
         assert result.exit_code == 0
         assert "40,000 settings x 20 seeds = 800,000 trials" in result.stdout
         assert "--yes" in result.stdout.splitlines()[1]
+        refined = simharness("show", str(study), "--set", steps, "--set", "sweep.refine=1").stdout
+        assert "= 800,000 trials (up to 1," in refined
         assert max(len(line) for line in result.stdout.splitlines() if line.startswith("#")) <= 100
         assert tomllib.loads(result.stdout)["name"] == "trying"
 

@@ -429,6 +429,25 @@ class TestLargeStudies:
         with pytest.raises(StudyTooLarge):
             load_study(path, limit=11)
 
+    @pytest.mark.parametrize(
+        ("sweep", "most"),
+        [
+            ("refine = 5\npeople.count = [1, 2]\ncameras.fov = [60, 70.0]", 4 * 7 * 7),
+            ("refine = 5\none_at_a_time = true\npeople.count = [1, 2]\ncameras.fov = [60, 70.0]", 4 * (1 + 4 + 10)),
+            ('refine = 5\npeople.count = [1, 2]\ndetector.profile = ["typical", "perfect"]', 4 * 7 * 2),
+            ("refine = 5\n[[sweep.paired]]\npeople.count = [1, 2]\ncameras.count = [2, 3]", 4 * 2),
+        ],
+    )
+    def test_values_that_a_run_may_add_count(self, study_file, sweep, most):
+        """They are numbers between those of a single key."""
+        path = study_file(f"seeds = 4\n[sweep]\n{sweep}")
+        assert load_study(path, limit=most).plan.most_trials == most
+        with pytest.raises(StudyTooLarge, match=rf"makes .* more than {most - 1}: .* --yes") as caught:
+            load_study(path, limit=most - 1)
+        assert (f"up to {most} with the values that sweep.refine = 5 may add" in str(caught.value)) == (
+            "paired" not in sweep
+        )
+
     def test_settings_share_the_sections_that_are_equal(self, study_file):
         study = load_study(study_file("[sweep]\npeople.count = [1, 2]\ncameras.count = [3, 4]"))
         first, second, *_ = (setting.scenario for setting in study.settings)

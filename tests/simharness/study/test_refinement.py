@@ -61,8 +61,9 @@ def points(results):
 def test_values_are_added_where_the_score_breaks(tmp_path, study_at, one):
     swept, point = points(run_study(study_at(0, one=one), out=tmp_path / "plain", measure=Knee()))
     assert (swept, point.low, point.high) == ((0, 2, 4, 8), 4.0, 8.0)
-    knee = Knee()
-    results = run_study(study_at(4, one=one), out=tmp_path / "fine", measure=knee)
+    knee, study = Knee(), study_at(4, one=one)
+    assert (study.trials, study.plan.most_trials) == (6 * 4, 6 * (4 + 4))
+    results = run_study(study, out=tmp_path / "fine", measure=knee)
     swept, point = points(results)
     assert len(swept) == 4 + 4
     assert set(swept) >= {0, 2, 4, 8, 6.0}
