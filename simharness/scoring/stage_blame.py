@@ -10,13 +10,13 @@ A frame with failures is estimated again, and the first substitution that remove
 
 A user-defined estimator takes no labels, but may return them: matching has the blame where the labels of the perfect
 detections are wrong for the person of the failure, or for anybody if it is a ghost, and reconstruction where they are
-right.
+right. A tracker gets perfect detections in all frames, because the cause may lie in an earlier one, and is otherwise
+such an estimator.
 
 Perfect detections remove most failures, so matching rarely gets the blame. One more substitution stands beside that
 order: the real detections with the true labels, which shows what a perfect matching alone would remove.
 """
 
-import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -30,7 +30,7 @@ from mvpose import COCO17, Detections, Estimate, Pipeline, Rig, Skeleton
 from mvpose.arrays import Integers
 from mvpose.commands.errors import naming_frame
 from mvpose.estimate import Matching
-from mvpose.estimators import Estimator
+from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.pipeline import UnmatchedPipeline
 from mvpose.rays import Rays, viewing_rays
 from mvpose.reconstruction import Poses
@@ -76,53 +76,38 @@ FAILURE_SCHEMA: dict[str, Any] = {
 """Columns and types of :func:`failure_table`."""
 
 
-def blame(
-    recording: Recording, estimator: Estimator, estimates: Sequence[Estimate], failures: Sequence[Failure]
-) -> list[Blamed]:
-    """Find the stage to blame for every failure; each frame with failures is estimated three more times at most.
-
-    A missed, merged or split person is no longer a failure of that class as soon as the person is none of the three,
-    even with a displaced joint, because displaced joints are frequent. A swapped limb or a displaced joint is removed
-    when the person has no failure at all. If a frame has k ghosts fewer than before, k ghosts are removed: those
-    furthest from the remaining ones.
-
-    Args:
-        recording: T frames, as they were estimated. Heat maps are used if the detections have them.
-        estimator: the method. Only pipelines of mvpose take true labels; of others the labels that they return are
-            compared with the true ones. Without labels, failures that perfect detections do not remove are blamed on
-            the method.
-        estimates: estimates of the method, T.
-        failures: :func:`simharness.scoring.failure_classes.find_failures` of these estimates.
-
-    Returns:
-        Failures with stages, in the same order.
-    """
-    blamed: list[Blamed] = []
-    for frame, group in itertools.groupby(failures, key=lambda failure: failure.frame):
-        inputs = _FrameInput(recording.rig, recording.detections[frame], recording.truth[frame])
-        blamed += _blame_frame(inputs, estimator, estimates[frame], list(group))
-    return blamed
-
-
 def blame_frames(
     recording: Recording, estimator: Estimator, estimates: Sequence[Estimate], input_of: Callable[[int], Detections]
 ) -> Iterator[Blamed]:
     """Find failures and the stage to blame frame by frame, because heat maps of all frames are large.
 
+    Each frame with failures is estimated three more times at most; with a tracker all frames are, once. A missed,
+    merged or split person is no longer a failure of that class as soon as the person is none of the three, even with a
+    displaced joint, because displaced joints are frequent. A swapped limb or a displaced joint is removed when the
+    person has no failure at all. If a frame has k ghosts fewer than before, k ghosts are removed: those furthest from
+    the remaining ones.
+
     Args:
         recording: T frames.
-        estimator: the method.
+        estimator: the method. Only pipelines of mvpose take true labels; of others the labels that they return are
+            compared with the true ones. Without labels, failures that perfect detections do not remove are blamed on
+            the method.
         estimates: its estimates, T.
         input_of: detections of a frame as the method got them, with heat maps if it reads them.
 
     Raises:
         RunError: the method failed; the message names the frame.
     """
+    rig = recording.rig
+    after: Iterator[Estimate] = iter(())
+    if isinstance(estimator, SequenceEstimator):
+        pairs = zip(recording.detections, recording.truth, strict=True)
+        after = estimator.track(rig, (perfect_detections(*pair)[0] for pair in pairs))
     for frame, (truth, estimate) in enumerate(zip(recording.truth, estimates, strict=True)):
-        if failures := failures_of_frame(recording.rig, recording.detections[frame], truth, estimate):
-            moment = Recording(recording.time[[frame]], recording.rig, (input_of(frame),), (truth,))
+        tracked = next(after, None)
+        if failures := failures_of_frame(rig, recording.detections[frame], truth, estimate):
             with naming_frame(frame):
-                blamed = blame(moment, estimator, [estimate], failures)
+                blamed = _blame_frame(_FrameInput(rig, input_of(frame), truth), estimator, estimate, failures, tracked)
             for each in blamed:
                 yield replace(each, failure=replace(each.failure, frame=frame))
 
@@ -156,6 +141,7 @@ def perfect_detections(detections: Detections, truth: Truth) -> tuple[Detections
         np.ones(len(view)),
         detections.skeleton,
         descriptors,
+        time=detections.time,
     )
     error = np.where(reported, KeypointError.GOOD, KeypointError.ABSENT)
     return perfect, replace(truth, person=person, error=error)
@@ -268,10 +254,15 @@ def _removed(before: FailureKind, after: FailureKind | None) -> bool:
 
 
 def _blame_frame(
-    real: _FrameInput, estimator: Estimator, estimate: Estimate, failures: Sequence[Failure]
+    real: _FrameInput,
+    estimator: Estimator,
+    estimate: Estimate,
+    failures: Sequence[Failure],
+    tracked: Estimate | None,
 ) -> Iterable[Blamed]:
+    """Yield the stages to blame; ``tracked`` is the estimate of a tracker from perfect detections."""
     perfect = _FrameInput(real.rig, *perfect_detections(real.detections, real.truth))
-    after = estimator.estimate(perfect.rig, perfect.detections)
+    after = estimator.estimate(perfect.rig, perfect.detections) if tracked is None else tracked
     by_detection = perfect.removes(after, estimate, failures)
     by_matching = [False] * len(failures)
     last = Stage.RECONSTRUCTION

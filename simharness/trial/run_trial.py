@@ -16,7 +16,7 @@ import threadpoolctl
 
 from mvpose import Estimate
 from mvpose.commands.progress import Reporter, Silence, Stages
-from mvpose.estimators import Estimator, SequenceEstimator
+from mvpose.estimators import Estimator
 from mvpose.presets import PRESETS
 from mvpose.wholebody import complete
 from simharness.scenario.sections.scenario import Scenario
@@ -36,10 +36,7 @@ from simharness.trial.variant_result import VariantResult
 from simharness.types.recording import Recording
 
 Goal = Literal["detect", "estimate", "score", "classify", "blame"]
-"""Last requested stage of a trial. ``classify`` finds failures, ``blame`` the stage of the method to blame.
-
-Failures of variants with memory are classified and not blamed: their cause may lie in an earlier frame, which no
-substitution in the frame of the failure removes."""
+"""Last requested stage of a trial. ``classify`` finds failures, ``blame`` the stage of the method to blame."""
 
 _GOALS: tuple[str, ...] = get_args(Goal)
 
@@ -257,7 +254,7 @@ def _find_failures(
         for variant, estimates in result.estimates.items():
             if variant in known:
                 tables[variant] = known[variant]
-            elif blamed and not isinstance(pipelines[variant], SequenceEstimator):
+            elif blamed:
                 inputs = EstimateFrames(result.detected.rig, result.detected.frames, pipelines)
                 blamed_failures = blame_frames(
                     result.recording, pipelines[variant], estimates, partial(inputs.input_of, variant=variant)

@@ -21,7 +21,7 @@ from simharness.scoring.failure_classes import FailureKind, find_failures
 from simharness.scoring.stage_blame import (
     FAILURE_SCHEMA,
     Stage,
-    blame,
+    blame_frames,
     failure_scores,
     failure_table,
     perfect_detections,
@@ -61,11 +61,16 @@ def joined(one, other, *, person):
     return both, replace(truth, person=np.append(truth.person, of), error=np.zeros((len(both), 17), np.int8))
 
 
+def blame(recording, estimator, estimates):
+    """Return the failures of estimates with their stages."""
+    return list(blame_frames(recording, estimator, estimates, recording.detections.__getitem__))
+
+
 def blamed(estimator, *moments, rig=RIG):
     """Return (person, kind, stage, matching alone) of each failure."""
     recording = recorded(rig, *moments)
     estimates = [estimator.estimate(rig, detections) for detections in recording.detections]
-    result = blame(recording, estimator, estimates, find_failures(recording, estimates))
+    result = blame(recording, estimator, estimates)
     return [(each.failure.person, str(each.failure.kind), str(each.stage), each.matching_alone) for each in result]
 
 
@@ -175,6 +180,47 @@ class Fixed:
         return estimate_of(joints, np.full(len(detections), -1))
 
 
+class Slow:
+    """Tracker that reports the people of the frame before; its labels are as wrong as its pipeline's."""
+
+    def __init__(self, pipeline, *, labelled=True):
+        self.pipeline, self.labelled = pipeline, labelled
+
+    def track(self, rig, frames):
+        before = None
+        for detections in frames:
+            found = self.pipeline.estimate(rig, detections)
+            joints, before = found.joints if before is None else before, found.joints
+            labels = np.where(found.matching.labels < len(joints), found.matching.labels, -1)
+            yield Estimate.of_joints(joints, labels=labels if self.labelled else None)
+
+    def blamed(self, *moments):
+        """Return (frame, person, stage, matching alone) of each failure."""
+        recording = recorded(RIG, *moments)
+        estimates = list(self.track(RIG, recording.detections))
+        result = blame(recording, self, estimates)
+        return [(each.failure.frame, each.failure.person, str(each.stage), each.matching_alone) for each in result]
+
+    def estimate(self, rig, detections):
+        raise AssertionError("a tracker is not estimated frame by frame")
+
+
+class TestTrackers:
+    def test_a_miss_of_an_earlier_frame_is_blamed_on_detection(self):
+        assert Slow(FAST).blamed(MOMENT, only(MOMENT[1].person != 1), MOMENT, MOMENT) == [(2, 1, "detection", None)]
+
+    @pytest.mark.parametrize(("labelled", "stage"), [(True, "reconstruction"), (False, "method")])
+    def test_people_who_have_moved_on_since_are_blamed_on_what_is_left(self, labelled, stage):
+        moved = moment(RIG, PEOPLE + [0.3, 0.0, 0.0])
+        result = Slow(FAST, labelled=labelled).blamed(MOMENT, MOMENT, moved)
+        assert set(result) == {(2, person, stage, None) for person in range(3)}
+
+    def test_wrong_labels_are_blamed_on_matching(self):
+        result = Slow(replace(FAST, matching=exchanging)).blamed(MOMENT, MOMENT)
+        assert {stage for *_, stage, _ in result} == {"matching"}
+        assert {frame for frame, *_ in result} == {0, 1}
+
+
 class TestRemoval:
     def test_a_user_defined_estimator_takes_no_labels(self):
         assert blamed(Fixed(PEOPLE[1:], PEOPLE), MOMENT) == [(0, "missed", "detection", None)]
@@ -185,7 +231,7 @@ class TestRemoval:
         for exact, stages in ((PEOPLE, (100, 0, 0, 0)), (PEOPLE[1:], (0, None, None, 100))):
             method = Fixed(PEOPLE[1:], exact)
             estimates = [method.estimate(RIG, detections) for detections in recording.detections]
-            table = failure_table(blame(recording, method, estimates, find_failures(recording, estimates)))
+            table = failure_table(blame(recording, method, estimates))
             scores = failure_scores(table, 2)
             assert tuple(scores[f"blame_{stage}"] for stage in Stage) == stages
 
@@ -217,12 +263,12 @@ class TestRemoval:
 
         for matching, least in ((Matcher(method="clustering"), 2), (exchanging, 3)):
             pipeline = replace(FAST, matching=matching, reconstruction=counting)
-            recording = recorded(RIG, *3 * [only(MOMENT[1].person != 1)])
+            recording = recorded(RIG, MOMENT, only(MOMENT[1].person != 1))
             estimates = [pipeline.estimate(RIG, detections) for detections in recording.detections]
-            failures = [each for each in find_failures(recording, estimates) if each.frame == 1]
+            failures = find_failures(recording, estimates)
             counted.clear()
-            assert len(blame(recording, pipeline, estimates, failures)) == len(failures) > 0
-            assert len(counted) == least
+            assert [each.failure for each in blame(recording, pipeline, estimates)] == failures
+            assert len(counted) == least * len({each.frame for each in failures}) > 0
 
 
 class TestSubstitution:
@@ -258,6 +304,8 @@ class TestSubstitution:
             expected = {0: [place, place + 100], 1: [np.nan, np.nan], 2: [place, place]}[person]
             np.testing.assert_array_equal(descriptor, expected)
         assert perfect_detections(detections, truth)[0].descriptors is None
+        taken = np.array([0.0, np.nan, 0.02, 0.01])
+        np.testing.assert_array_equal(perfect_detections(replace(detections, time=taken), truth)[0].time, taken)
 
     @given(st.integers(0, 2**32 - 1))
     def test_true_labels_are_of_the_highest_scored_detections_of_people_in_two_views(self, seed):
@@ -301,7 +349,7 @@ class TestTable:
         pipeline = replace(FAST, matching=exchanging)
         estimates = [pipeline.estimate(RIG, detections) for detections, _ in moments]
         failures = find_failures(recording, estimates)
-        result = blame(recording, pipeline, estimates, failures)
+        result = blame(recording, pipeline, estimates)
         assert [each.failure for each in result] == failures
         table = failure_table(result)
         assert table.schema == pl.Schema(FAILURE_SCHEMA)

@@ -9,6 +9,7 @@ from moments import crowd, moment, ring
 from mvpose import SHELF14, Detections, Estimate, preset
 from mvpose.commands.errors import RunError
 from simharness.scenario.load import load
+from simharness.scoring.stage_blame import Stage
 from simharness.trial.archive import pack_detected, pack_estimates, unpack_detected, unpack_estimates
 from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.estimation import track_frames
@@ -251,10 +252,10 @@ class TestArchives:
 
 
 class TestFailures:
-    def test_they_are_classified_and_not_blamed(self, tracked):
+    def test_each_has_a_stage_to_blame(self, tracked):
         for name in ("track", "fast"):
             result = tracked.results[name]
             assert len(result.failures)
-            blamed = result.failures["stage"].is_not_null().all()
-            assert blamed == (name == "fast")
-            assert (result.scores["blame_detection"] is None) == (name == "track")
+            assert result.failures["stage"].is_not_null().all()
+            assert result.failures["matching_alone"].is_null().all() == (name == "track")
+            assert sum(result.scores[f"blame_{stage}"] or 0.0 for stage in Stage) == pytest.approx(100.0)
