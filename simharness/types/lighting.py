@@ -56,16 +56,6 @@ class Panorama:
         return np.stack([column, row], axis=-1)
 
 
-def directions(shape: tuple[int, int], lowest: float) -> NDArray[np.float64]:
-    """Return the unit vectors to the centres of the pixels of a panorama of a shape (h, w), (h, w, 3)."""
-    rows, columns = shape
-    azimuth = ((np.arange(columns) + 0.5) / columns - 0.5) * 2 * np.pi
-    elevation = np.pi / 2 - (np.arange(rows) + 0.5) / rows * (np.pi / 2 - lowest)
-    across = np.cos(elevation)[:, None]
-    up = np.broadcast_to(np.sin(elevation)[:, None], shape)
-    return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), up], axis=-1)
-
-
 Vector = tuple[float, float, float]
 
 

@@ -1,4 +1,4 @@
-"""What ships as an object or as a picture of a finish, material or print can be made again."""
+"""What ships as an object or as a picture of a finish, material, print or panorama can be made again."""
 
 import cv2
 import numpy as np
@@ -6,9 +6,11 @@ import pytest
 
 from simharness.world.scene.objects.materials import MATERIALS
 from simharness.world.scene.objects.object_files import ASSETS
+from simharness.world.scene.rooms.landscape import PANORAMAS
 from simharness.world.scene.rooms.textures import FINISHES
 from tools.objects.__main__ import write_objects
 from tools.objects.finishes import write_finishes
+from tools.objects.landscape import write_panoramas
 from tools.objects.prints import write_pictures
 
 
@@ -22,7 +24,9 @@ def test_the_shipped_objects_are_those_that_the_tool_writes(tmp_path):
     assert pictures[0] == pictures[1]
 
 
-@pytest.mark.parametrize(("write", "folder"), [(write_finishes, FINISHES), (write_pictures, MATERIALS)])
+@pytest.mark.parametrize(
+    ("write", "folder"), [(write_finishes, FINISHES), (write_pictures, MATERIALS), (write_panoramas, PANORAMAS)]
+)
 def test_the_shipped_pictures_are_those_that_the_tool_draws(tmp_path, write, folder):
     write(tmp_path)
     names = [sorted(file.name for file in each.iterdir()) for each in (tmp_path, folder)]

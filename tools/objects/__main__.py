@@ -15,6 +15,7 @@ from simharness.types.random_streams import stream
 from tools.objects import clutter, decoys, gym, home, office, park, plants, shop, stage, ward
 from tools.objects.builder import ObjectBuilder
 from tools.objects.finishes import write_finishes
+from tools.objects.landscape import write_panoramas
 from tools.objects.prints import PICTURES, write_pictures
 
 Draw = Callable[[ObjectBuilder, np.random.Generator], None]
@@ -131,3 +132,4 @@ if __name__ == "__main__":
     write_objects(given)
     write_finishes(given.parent / "finishes")
     write_pictures(given.parent / "materials")
+    write_panoramas(given.parent / "panoramas")

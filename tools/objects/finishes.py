@@ -17,11 +17,12 @@ from simharness.world.scene.rooms.textures import (
     WALL_RESOLUTION,
     WALLS,
     TiledTexture,
-    smooth_noise,
     tiled_texture,
 )
 
 TALL = 6.0  # metres
+MEADOW = (0.34, 0.41, 0.20)
+"""Mean albedo of the meadow, sRGB."""
 SKIRTING = 0.1  # metres: height of the skirting board
 _FLOOR, _WALL = (3, 85), (6, 95)  # pictures of each, and quality: few colours show blocks
 
@@ -337,15 +338,44 @@ def _checkerboard(side: int, half: int) -> NDArray[np.bool_]:
     return np.asarray((i + j) % 2 == 0)
 
 
+def smooth_noise(rng: np.random.Generator, shape: tuple[int, int], cell: int, *, across: int | None = None) -> Floats:
+    """Return smooth periodic noise of about unit amplitude, with blobs ``cell`` pixels wide and ``across`` high."""
+    down = cell if across is None else across
+    rows, columns = max(shape[0] // down, 1), max(shape[1] // cell, 1)
+    coarse = np.pad(rng.uniform(-1, 1, (rows, columns)), 2, mode="wrap")
+    scale = np.array([shape[1] / columns, shape[0] / rows])
+    size = (round(scale[0] * (columns + 4)), round(scale[1] * (rows + 4)))
+    fine = cv2.resize(coarse, size, interpolation=cv2.INTER_CUBIC)
+    top, left = round(2 * scale[1]), round(2 * scale[0])
+    return np.asarray(fine[top : top + shape[0], left : left + shape[1]], float)
+
+
+def meadow(rng: np.random.Generator) -> TiledTexture:
+    """Draw a meadow from afar, 30 m of it: patches of several greens with the mean ``MEADOW``."""
+    shape = (512, 512)
+    patches = sum(smooth_noise(rng, shape, 128 >> k) / (k + 1.0) for k in range(5)) + 0.4 * rng.uniform(-1, 1, shape)
+    shade = 1 + 0.09 * np.asarray(patches)[..., None]
+    dry = 0.03 * smooth_noise(rng, shape, 96)[..., None] * np.array([1.0, 0.35, 0.2])
+    picture = shade * MEADOW + dry
+    picture *= np.array(MEADOW) / picture.mean(axis=(0, 1))
+    return tiled_texture(picture, FLOOR_RESOLUTION)
+
+
 FINISHES: dict[str, Callable[..., TiledTexture]] = {
     draw.__name__: draw
     for draw in (
         *(tiles, wood, carpet, concrete, plain, panels, brick, stripes),
-        *(carpet_tiles, linoleum, parquet, sports_floor, stage_boards, paving, asphalt, grass),
+        *(carpet_tiles, linoleum, parquet, sports_floor, stage_boards, paving, asphalt, grass, meadow),
         *(tinted, wallpaper, tiled, curtain),
     )
 }
 """Functions that draw floors, and walls of a height in metres, by name."""
+
+
+_SHARP = {
+    "stripes": 101,
+    "meadow": 96,
+}  # quality of others; above 100 lossless: the edge at the seam is one as any other
 
 
 def write_finishes(folder: Path) -> None:
@@ -357,5 +387,5 @@ def write_finishes(folder: Path) -> None:
         for k in range(variants):
             texture = draw(stream(0, "finishes", name, k), *height).texture
             path = str(folder / f"{name}.{k}.webp")
-            sharp = 101 if name == "stripes" else quality  # lossless: the edge at the seam is one as any other
+            sharp = _SHARP.get(name, quality)
             cv2.imwrite(path, texture[..., ::-1], [cv2.IMWRITE_WEBP_QUALITY, sharp])

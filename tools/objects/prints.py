@@ -11,7 +11,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.types.random_streams import stream
-from simharness.world.scene.rooms.textures import smooth_noise
+from tools.objects.finishes import smooth_noise
 
 Draw = Callable[[np.random.Generator], Floats]
 

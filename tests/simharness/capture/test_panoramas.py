@@ -12,9 +12,10 @@ from test_renderers import axis_rays, camera_at
 from simharness.capture.picture import with_mirrors
 from simharness.capture.rendering import tone
 from simharness.capture.rendering.raster import RasterRenderer
-from simharness.types.lighting import Lighting, LightSources, Panorama, directions
+from simharness.types.lighting import Lighting, LightSources, Panorama
 from simharness.types.mirror import Mirror
 from simharness.types.srgb import from_linear, to_linear
+from tools.objects.landscape import directions
 
 LOWEST = -0.5
 CAMERAS = [

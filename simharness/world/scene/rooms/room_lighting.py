@@ -11,7 +11,7 @@ from mvpose.files.input_files import parse_toml
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.lighting import AreaLight, Lighting, LightSources, Panorama, Sun, Vector
 from simharness.types.random_streams import stream
-from simharness.world.scene.rooms.landscape import MEADOW, panorama
+from simharness.world.scene.rooms.landscape import panorama
 from simharness.world.scene.rooms.weather import WEATHERS
 
 _EXPOSED = 0.30  # radiance of the view as a share of that of the light of a window
@@ -88,7 +88,7 @@ def open_air(name: str, light: Lighting, seed: int) -> Lighting:
         light,
         direction=weather.towards,
         sources=LightSources((), weather.sun, weather.sky, brightness=weather.brightness, balance=weather.balance),
-        panorama=panorama(seed, weather, MEADOW),
+        panorama=panorama(seed, name, bearing),
     )
 
 
@@ -103,7 +103,7 @@ def view_outside(name: str, light: Lighting, seed: int, window: Vector) -> Panor
     """
     bearing = float(np.arctan2(light.direction[1], light.direction[0]))
     shown = (_EXPOSED * window[0], _EXPOSED * window[1], _EXPOSED * window[2])
-    return panorama(seed, replace(WEATHERS[name], bearing=bearing), MEADOW, shown)
+    return panorama(seed, name, bearing, shown)
 
 
 def _towards(direction: Vector, sun: Sun) -> Vector:

@@ -1,4 +1,4 @@
-"""Weather and time of day outdoors: the sun, the radiance of the sky and its clouds.
+"""Weather and time of day outdoors: the sun and the radiance of the sky.
 
 The clear sky is that of Preetham, Shirley and Smits, "A practical analytic model for daylight" (SIGGRAPH 1999), the
 overcast one is the standard sky of the CIE (ISO 15469), three times as bright at the zenith as at the horizon.
@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
 from simharness.types.lighting import Sun, Vector
 from simharness.types.srgb import LUMINANCE
-from simharness.world.scene.rooms.textures import smooth_noise
 
 _LUMINANCE = np.array(LUMINANCE)
 _ROWS, _COLUMNS = 60, 120  # directions over which the light of the sky is summed
@@ -40,8 +38,6 @@ _TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.05
 _LEAST = 0.02  # least sine of the elevation: the models hold above the horizon
 # Under a high sun the model is pink at the horizon, which real haze is not: there it fades to the colour of haze.
 _HAZE, _HAZY = 0.20, np.array([0.78, 1.0, 1.30])  # sine of the elevation; linear RGB
-_CEILING = 0.10  # added to the sine of the elevation: clouds near the horizon do not shrink to nothing
-_CLOUD_PIXELS = 512  # side of the picture of the clouds, which repeats
 
 
 @dataclass(frozen=True)
@@ -161,34 +157,3 @@ def overcast_sky(directions: ArrayLike) -> Floats:
     """Return the radiance of an overcast sky, a bluish grey, relative to that at the zenith."""
     up = np.maximum(np.asarray(directions, float)[..., 2], 0.0)
     return ((1 + 2 * up) / 3)[..., None] * np.array([0.94, 1.0, 1.07])
-
-
-def clouds(rng: np.random.Generator, directions: Floats, sun: ArrayLike, cover: float) -> tuple[Floats, Floats]:
-    """Return how dense clouds are, 0 to 1, and how bright, about 0.5 to 1, in directions (h, w, 3); (h, w) each.
-
-    The clouds float on a plane, so that they get smaller towards the horizon; those between the sun and a place shade
-    it.
-
-    Args:
-        rng: random generator.
-        directions: unit vectors.
-        sun: unit vector to the sun, (3,).
-        cover: share of the sky that they cover, about.
-    """
-    shape, sun = (_CLOUD_PIXELS, _CLOUD_PIXELS), np.asarray(sun, float)
-    heap = np.sum([smooth_noise(rng, shape, 128 >> k) / 1.7**k for k in range(7)], axis=0)
-    heap = np.asarray(cv2.GaussianBlur(heap, (0, 0), 0.8), float)
-    edge = float(np.quantile(heap, 1.0 - cover))
-    density = np.clip((heap - edge) / (0.9 * float(heap.std())), 0.0, 1.0)
-    towards = np.round(14 * sun[:2] / max(float(np.hypot(*sun[:2])), 1e-6)).astype(int)
-    shaded = cv2.GaussianBlur(np.roll(density, (-towards[1], -towards[0]), axis=(0, 1)), (0, 0), 5.0)
-    bright = 1.06 - 0.42 * (0.4 * shaded + 0.6 * cv2.GaussianBlur(density, (0, 0), 9.0)) * density
-    up = np.maximum(directions[..., 2], 0.0) + _CEILING
-    place = (directions[..., :2] / up[..., None] * 130 + rng.uniform(0, _CLOUD_PIXELS, 2)) % _CLOUD_PIXELS
-    place = place.astype(np.float32)
-    found = [
-        cv2.remap(each.astype(np.float32), place[..., 0], place[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-        for each in (density, bright)
-    ]
-    haze = np.clip(directions[..., 2] / 0.10, 0.0, 1.0)
-    return found[0].astype(float) * haze, found[1].astype(float)

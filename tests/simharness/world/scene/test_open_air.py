@@ -10,10 +10,11 @@ import pytest
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.world.rigs.layouts import build_rig
-from simharness.world.scene.rooms.landscape import AROUND, MEADOW, WHITE, draw_panorama, make_surroundings
+from simharness.world.scene.rooms.landscape import AROUND, WHITE, make_surroundings, read_panorama
 from simharness.world.scene.rooms.room_lighting import room_lighting
 from simharness.world.scene.rooms.shell import make_room
 from simharness.world.scene.rooms.weather import WEATHERS, clear_sky, overcast_sky
+from tools.objects.finishes import MEADOW
 
 ROOM = RoomSection(kind="outdoors", floor="paving", size=(8.0, 6.0, 3.0))
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -116,8 +117,8 @@ def test_ground_goes_on_without_a_gap_to_the_meadow(far_rig):
 
 def test_the_panorama_repeats_by_its_seed_and_shows_ground_below_the_horizon_and_sky_above():
     weather = replace(WEATHERS["side"], bearing=0.4)
-    one = draw_panorama(4, weather, MEADOW)
-    np.testing.assert_array_equal(one, draw_panorama(4, weather, MEADOW))
+    one = read_panorama(4, "side", 0.4)
+    np.testing.assert_array_equal(one, read_panorama(4, "side", 0.4))
     shown = one[-4:].reshape(-1, 3).mean(axis=0) / 255
     albedo = np.array(MEADOW) ** 2.2 * weather.level / WHITE
     np.testing.assert_allclose(shown, albedo ** (1 / 2.2), atol=0.03)
