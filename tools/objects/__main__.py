@@ -15,6 +15,7 @@ from simharness.types.random_streams import stream
 from tools.objects import clutter, decoys, gym, home, office, park, plants, shop, stage, ward
 from tools.objects.builder import ObjectBuilder
 from tools.objects.finishes import write_finishes
+from tools.objects.fittings import FITTINGS
 from tools.objects.landscape import write_panoramas
 from tools.objects.prints import PICTURES, write_pictures
 
@@ -99,10 +100,13 @@ def write_objects(folder: Path) -> None:
     for old in folder.glob("*.xml"):
         old.unlink()
     draws: dict[str, tuple[Callable[[ObjectBuilder, Any], None], int]] = {**OBJECTS, **PROPS}
+    draws |= {f"fitting_{name}": drawn for name, drawn in FITTINGS.items()}
     for name, (draw, variants) in draws.items():
         for k in range(variants):
             builder, stem = ObjectBuilder(), f"{name}.{k + 1}" if k else name
-            draw(builder, k if name in PROPS else stream(0, "objects", name, k))
+            if name.startswith("fitting_"):
+                builder.origin = (0.0, 0.0, 0.0)
+            draw(builder, stream(0, "objects", name, k) if name in OBJECTS else k)
             (folder / f"{stem}.xml").write_text(builder.mjcf(name, stem), encoding="utf-8")
             if builder.picture is not None:
                 _write_picture(folder / "textures" / f"{stem}.png", builder.picture)

@@ -7,8 +7,8 @@ bring their colours with them.
 Prints are pictures on screens, posters, papers, boards and packages. Both are shipped as pictures, some of each.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
@@ -21,6 +21,7 @@ from mvpose.arrays import Floats
 from mvpose.checks import seal
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
+from simharness.world.scene.objects.shapes import joined
 from simharness.world.scene.rooms.textures import drawn_pictures, read_picture
 
 Material = Literal["plain", "wood", "fabric", "metal", "leaves"]
@@ -91,6 +92,11 @@ class Sheet:
         spare = 1.0 - place.reshape(-1, 2).max(axis=0)
         start = spare * [(number * _GOLDEN) % 1.0, (number * _GOLDEN**2) % 1.0]
         return self.uv(material, place + start)
+
+    def joined(self, meshes: Sequence[Mesh]) -> Mesh:
+        """Return one mesh of several that show this sheet."""
+        uv = np.concatenate([mesh.uv for mesh in meshes if mesh.uv is not None])
+        return replace(joined(*meshes), texture=self.texture, uv=uv)
 
     @classmethod
     def pack(cls, pictures: Mapping[str, Floats]) -> "Sheet":

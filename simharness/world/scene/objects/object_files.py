@@ -120,6 +120,18 @@ class ObjectFile:
         mesh = joined(*meshes)
         return mesh if sheet is None else replace(mesh, texture=sheet.texture, uv=np.concatenate(uv))
 
+    def fitting(self, sheet: Sheet, corners: tuple[ArrayLike, ArrayLike], text: str = "") -> Mesh:
+        """Return the mesh stretched from its own size to a box between two corners (3,), metres.
+
+        Args:
+            sheet: materials and prints of the scene.
+            corners: lowest and highest corner; its own depth fills 1 metre.
+            text: print that replaces its own.
+        """
+        parts = (replace(each, texture=text) if text and each.uv is not None else each for each in self.parts)
+        mesh, low = replace(self, parts=tuple(parts)).mesh(sheet), np.asarray(corners[0], float)
+        return mesh.moved(mesh.vertices * ((np.asarray(corners[1], float) - low) / self.size) + low)
+
     def model(self, sheet: Sheet | None = None, *, scale: ArrayLike = (1.0, 1.0, 1.0)) -> ObjectModel:
         """Return the model to be placed, stretched along x, y and z by ``scale`` (3,); see :meth:`mesh`."""
         stretch: Floats = np.asarray(scale, float)

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from mvpose.camera import Rig
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.lighting import AreaLight, Vector
-from simharness.world.scene.objects.furnishing import Furnishing
-from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.geoms import Box, carried
 from simharness.world.scene.objects.materials import draw_sheet
+from simharness.world.scene.objects.object_files import load_shipped, variants
 from simharness.world.scene.objects.shapes import quad_mesh
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.kinds import LampKind, room_kinds
@@ -33,7 +33,6 @@ _LAMPS: dict[LampKind, tuple[tuple[float, float], float, float, float, float]] =
 }
 """Half sides, pitch, distance from the ceiling (metres), strength relative to a panel, and focus of a lamp, by kind."""
 _MOST = 4  # lamps along a side of the room
-_DARK, _SHADE = np.array([0.14, 0.14, 0.15]), np.array([0.92, 0.90, 0.84])
 
 
 def has_ceiling(room: RoomSection, rig: Rig) -> bool:
@@ -100,34 +99,17 @@ def shown_lamps(room: RoomSection, seed: int, areas: Sequence[AreaLight]) -> tup
     """Return what pictures show of the lamps: glowing fronts, and their bodies."""
     lamps = [area for area in areas if area.kind == "lamp"]
     shown = [fixture(lamp, f"lamp{k}") for k, lamp in enumerate(lamps)]
-    bodies = Furnishing(draw_sheet(seed))
-    for lamp in lamps:
-        _lamp_body(bodies, room_kinds()[room.kind].lamps, lamp, room.size[2])
-    if bodies.parts:
-        mesh = bodies.mesh()
+    if lamps:
+        sheet, (file,) = draw_sheet(seed), variants(f"fitting_{room_kinds()[room.kind].lamps}")
+        model, turn = load_shipped(file), np.pi / 2 * (room.size[0] < room.size[1])
+        bodies = []
+        for lamp in lamps:
+            up = (1.0, 1.0, max(room.size[2] - lamp.center[2], 0.01))
+            body = model.fitting(sheet, ((0.0, 0.0, 0.0), up))
+            bodies.append(body.moved(carried(body.vertices, lamp.center[:2], turn) + [0.0, 0.0, lamp.center[2]]))
+        mesh = sheet.joined(bodies)
         shown.append(Solid("room", "lamp bodies", mesh, (), Box.around(mesh.vertices)))
     return tuple(shown)
-
-
-def _lamp_body(f: Furnishing, kind: LampKind, lamp: AreaLight, ceiling: float) -> None:
-    """Add the housing of a lamp above its glowing front."""
-    x, y, z = lamp.center
-    dx, dy, up = abs(lamp.up[0]), abs(lamp.right[1]), max(ceiling - z, 0.01)
-    if kind == "panels":
-        f.block((x - dx - 0.02, y - dy - 0.02, z), (x + dx + 0.02, y + dy + 0.02, ceiling), 0.95 * _SHADE)
-    elif kind == "tubes":
-        f.block((x - dx - 0.02, y - dy - 0.02, z), (x + dx + 0.02, y + dy + 0.02, z + 0.06), 0.95 * _SHADE)
-        for side in (-0.6, 0.6):
-            end = (x + side * dx, y + (side * dy if dy > dx else 0.0), 0.0)
-            f.bar((end[0], end[1], z + 0.06), (end[0], end[1], ceiling), 0.006, _DARK, sides=5)
-    elif kind == "downlights":
-        f.turned([(0.0, 0.0), (0.15, 0.0), (0.15, up), (0.0, up)], _SHADE, at=(x, y, z), sides=20)
-    elif kind == "pendants":
-        f.turned([(0.33, 0.0), (0.30, 0.12), (0.06, 0.24), (0.0, 0.25)], _SHADE, "fabric", at=(x, y, z), sides=22)
-        f.bar((x, y, z + 0.24), (x, y, ceiling), 0.006, _DARK, sides=5)
-    else:
-        f.turned([(0.15, -0.04), (0.15, 0.16), (0.08, 0.22), (0.0, 0.22)], _DARK, at=(x, y, z), sides=14)
-        f.bar((x, y, z + 0.2), (x, y, ceiling), 0.015, _DARK, sides=6)
 
 
 def _vector(values: NDArray[np.float64]) -> Vector:

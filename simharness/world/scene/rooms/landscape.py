@@ -24,7 +24,7 @@ from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box, carried
 from simharness.world.scene.objects.materials import draw_sheet
 from simharness.world.scene.objects.object_files import load_shipped, variants
-from simharness.world.scene.objects.shapes import joined, outline, ring_mesh
+from simharness.world.scene.objects.shapes import outline, ring_mesh
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.textures import FINISHES, drawn_pictures, read_picture
 
@@ -111,5 +111,4 @@ def _plants(seed: int, clear: float) -> Mesh:
         away = clear + scale * crown + far
         place = (away * np.cos(turn), away * np.sin(turn))
         meshes.append(mesh.moved(carried(scale * mesh.vertices, place, yaw)))
-    uv = np.concatenate([mesh.uv for mesh in meshes if mesh.uv is not None])
-    return replace(joined(*meshes), texture=sheet.texture, uv=uv)
+    return sheet.joined(meshes)

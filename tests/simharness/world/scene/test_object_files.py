@@ -22,8 +22,9 @@ from simharness.world.scene.objects.object_files import (
     variants,
 )
 from simharness.world.scene.placement.clutter import CLUTTER_KINDS, place_clutter
+from simharness.world.scene.placement.free_space import WALL_MARGIN
 from simharness.world.scene.placement.sight_lines import intersects
-from simharness.world.scene.rooms.kinds import room_kinds
+from simharness.world.scene.rooms.kinds import LampKind, room_kinds
 
 STOOL = """
 <mujoco>
@@ -277,7 +278,21 @@ def test_a_box_that_reflects_is_a_mirror(write):
     assert load_object(write("dull.xml", MIRROR.replace('0.8"/>', '0.3"/>', 1))).model().mirror is None
 
 
-@pytest.mark.parametrize("file", sorted(ASSETS.glob("*.xml")), ids=lambda file: file.stem)
+FITTINGS = sorted(ASSETS.glob("fitting_*.xml"))
+
+
+@pytest.mark.parametrize("file", FITTINGS, ids=lambda file: file.stem)
+def test_a_fitting_fills_its_place_and_stands_out_less_than_a_camera(file):
+    fitting, sheet = load_shipped(file), draw_sheet(0)
+    low, high = np.array([0.0, 1.0, 0.2]), np.array([1.0, 1.5, 0.5])
+    placed, own = fitting.fitting(sheet, (low, high)).vertices, fitting.mesh(sheet).vertices / fitting.size
+    np.testing.assert_allclose((placed - low) / (high - low), own, atol=1e-5)
+    if file.stem.split("_")[1].split(".")[0] not in get_args(LampKind):
+        assert own[:, 0].max() < WALL_MARGIN
+        np.testing.assert_allclose([own[:, 1:].min(), own[:, 1:].max()], [0.0, 1.0], atol=0.25)
+
+
+@pytest.mark.parametrize("file", sorted({*ASSETS.glob("*.xml")} - {*FITTINGS}), ids=lambda file: file.stem)
 def test_a_shipped_object_opens_in_mujoco_and_stands_on_the_floor(file):
     model = mujoco.MjModel.from_xml_path(str(file))
     object_, sheet = load_shipped(file), None if file.stem.split(".")[0] in ("poster", "wall_poster") else draw_sheet(0)
