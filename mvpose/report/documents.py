@@ -1,4 +1,4 @@
-"""HTML pages from templates."""
+"""HTML pages and Markdown from templates."""
 
 import importlib.metadata
 from functools import cache
@@ -12,7 +12,7 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 
 def fill_template(template: str, /, *, folder: Path = TEMPLATES, **values: Any) -> str:
-    """Return the text of a template filled with values. Every value is escaped except ``Markup``.
+    """Return the text of a template filled with values. In pages every value is escaped except ``Markup``.
 
     Args:
         template: file name in ``folder``.
@@ -27,7 +27,7 @@ def _templates(folder: Path) -> jinja2.Environment:
     """Return the templates of a folder, of which each is compiled once."""
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader([folder, TEMPLATES]),
-        autoescape=True,
+        autoescape=lambda name: not (name or "").endswith(".md"),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

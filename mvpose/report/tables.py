@@ -1,8 +1,8 @@
-"""Tables of numbers: for pages, cells with text and a shade; for Markdown, lines."""
+"""Tables of numbers for pages: cells with text and a shade."""
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,10 +130,3 @@ def bone_table(bones: Sequence[Bone], people: People, rows: Sequence[int]) -> Ta
 
 def _heads(people: People, rows: Sequence[int]) -> tuple[Cell, ...]:
     return tuple(Cell(str(people.ids[row]), small="person", color=identity_color(row)) for row in rows)
-
-
-def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """Return the lines of a Markdown table: a left-aligned column of names, then right-aligned columns of numbers."""
-    yield f"| {' | '.join(heads)} |"
-    yield f"|{'|'.join([':--', *['--:'] * (len(heads) - 1)])}|"
-    yield from (f"| {' | '.join(row)} |" for row in rows)

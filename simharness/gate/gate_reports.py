@@ -6,9 +6,11 @@ text in both and in the terminal.
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from pathlib import Path
 from xml.etree import ElementTree
 
+from mvpose.report.documents import fill_template
 from simharness.gate.baseline import TIME
 from simharness.gate.compare import Change, GateResult, Verdict
 from simharness.runtime.number_text import fixed, signed
@@ -23,51 +25,14 @@ _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 def markdown(check: GateResult) -> str:
     """Return the summary: verdict, regressions, gains, headline scores, and the command that runs the worst trial."""
-    return "\n".join(_lines(check)) + "\n"
-
-
-def _lines(check: GateResult) -> Iterator[str]:
-    yield f"## {check.suite}: {check.verdict}"
-    yield ""
-    yield f"{check.trials} trials in {check.seconds:.0f} s, compared with the baseline seed by seed."
-    yield from _list("Could not be run", [f"{each.case}, seed {each.seed}: {each.error}" for each in check.failed])
+    lists = [("Could not be run", [f"{each.case}, seed {each.seed}: {each.error}" for each in check.failed], "")]
     for heading, verdict in _HEADINGS.items():
-        yield from _list(heading, [sentence(change) for change in check.comparison.with_verdict(verdict)])
-        if verdict == "unexpected" and check.advice:
-            yield ""
-            yield check.advice
-    undecided = [sentence(change) for change in check.comparison.undecided]
-    yield from _list("Worse, but too few seeds to judge", undecided)
-    for variant in check.variants:
-        yield from _table(check, variant)
-    yield ""
-    yield f"{check.worst_description[0].upper()}{check.worst_description[1:]}"
-    yield ""
-    yield "```sh"
-    yield check.command
-    yield "```"
-
-
-def _list(heading: str, lines: list[str]) -> Iterator[str]:
-    if not lines:
-        return
-    yield ""
-    yield f"### {heading}"
-    yield ""
-    for line in lines[:_LISTED]:
-        yield f"- {_escaped(line)}"
-    if len(lines) > _LISTED:
-        yield f"- and {len(lines) - _LISTED} more"
-
-
-def _table(check: GateResult, variant: str) -> Iterator[str]:
-    yield ""
-    yield f"### {_escaped(variant)}"
-    yield ""
-    yield "| score | now | baseline | difference (95 %) | allowed | |"
-    yield "|:--|--:|--:|--:|--:|:--|"
-    for change in check.comparison.changes_of(variant):
-        yield f"| {' | '.join(_escaped(cell) for cell in _cells(change))} |"
+        lines = [sentence(change) for change in check.comparison.with_verdict(verdict)]
+        lists.append((heading, lines, check.advice if verdict == "unexpected" else ""))
+    lists.append(("Worse, but too few seeds to judge", [sentence(change) for change in check.comparison.undecided], ""))
+    templates = Path(__file__).parent / "templates"
+    given = {"check": check, "lists": lists, "listed": _LISTED, "plain": _escaped, "cells": _cells}
+    return fill_template("summary.md", folder=templates, **given) + "\n"
 
 
 def _cells(change: Change) -> tuple[str, ...]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from mvpose.commands.progress import duration
-from mvpose.report.tables import markdown_table
 from simharness.runtime.number_text import fixed, signed
 from simharness.trial.identity import provenance_sentence
 
@@ -221,3 +220,10 @@ def _difference(ends: Sequence[float | None] | None) -> str:
         return ""
     points, low, high = (None if end is None else signed(end, 1) for end in ends)
     return f"{points}" if low is None else f"{points} ({low} to {high})"
+
+
+def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    """Return the lines of a Markdown table: a left-aligned column of names, then right-aligned columns of numbers."""
+    yield f"| {' | '.join(heads)} |"
+    yield f"|{'|'.join([':--', *['--:'] * (len(heads) - 1)])}|"
+    yield from (f"| {' | '.join(row)} |" for row in rows)
