@@ -18,6 +18,7 @@ from simharness.cli.program import PROGRAM, AllWorkers, JsonFile, RecordingFile,
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from simharness.reality.validation.validation import Validation
     from simharness.reality.validation.verdicts import BoundVerdict
 
 _TWINS, _QUICK_TWINS = 10, 4
@@ -35,6 +36,12 @@ def validate(
         None, "Fit the detector to another recording, and predict this one.", metavar="RECORDING"
     ),
     split_half: bool = option(False, "Also fit to each half of the recording, and predict the other.", "--split-half"),
+    rival: Path | None = option(
+        None,
+        "validation.json of another recording, whose measured figures are a rival forecast.",
+        metavar="FILE",
+        dir_okay=False,
+    ),
     out: Path | None = option(
         None,
         "Folder of validation.html and validation.json. [dim]\\[default: results/validation/NAME][/]",
@@ -48,7 +55,9 @@ def validate(
 
     Fits a detector to the recording, simulates copies of the recording (twins),
     and scores the method on both: all cameras and all subsets of them, with and
-    without added errors, by both rules for the head.
+    without added errors, by both rules for the head. Prints the error of the
+    forecasts and their skill against rivals that need no twins, then tests of
+    equivalence of every figure.
     """
     with PROGRAM.exit_on_error():
         start = perf_counter()
@@ -63,17 +72,21 @@ def validate(
         place = out or Path("results/validation") / recorded.name
         _check(place)
         from simharness.outputs.validation.page import render_validation
+        from simharness.reality.validation.skill import read_other_figures
         from simharness.reality.validation.validation import QUICK, ValidationPlan, predict_halves, simulate_predictions
         from simharness.reality.validation.validation import validate as compare
         from simharness.reality.validation.validation_summary import summarize_halves, summarize_validation
         from simharness.trial.identity import provenance
 
+        others = None if rival is None else read_other_figures(rival)
         plan = replace(QUICK if quick else ValidationPlan(), workers=workers or os.cpu_count() or 1)
         count = twins or (_QUICK_TWINS if quick else _TWINS)
         with reporter() as bars:
             simulated = simulate_predictions(recorded, count=count, fitted_on=other, reporter=bars)
             with failing():
-                validation = compare(recorded, simulated, plan=plan, reporter=bars)
+                validation = compare(
+                    recorded, simulated.fitted, profile=simulated.profile, other=others, plan=plan, reporter=bars
+                )
             halves = predict_halves(recorded, count=count, plan=plan, reporter=bars) if split_half else []
         validation = replace(
             validation, verdicts=[*validation.verdicts, *(verdict for half in halves for verdict in half.verdicts)]
@@ -93,6 +106,7 @@ def validate(
         for path in filter(None, (place / "validation.json", json_file)):
             write_json(summary, path)
     console = Console()
+    _print_skill(validation, console)
     _print_verdicts(validation.verdicts, recorded.name, console)
     console.print(f"report: {place / 'validation.html'}", soft_wrap=True, highlight=False, markup=False)
     if validation.failed:
@@ -104,26 +118,53 @@ def _check(folder: Path) -> None:
     check_place(folder / "validation.json", option="--out", mark=PROVENANCE)
 
 
+def _print_skill(validation: "Validation", console: Console) -> None:
+    """Print the error of the forecasts, their skill, and whether the recording can be told from its twins."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    from simharness.outputs.validation.tables import cancelling_parts, distance_sentence, skill_rows
+
+    rivals, rows = skill_rows(validation)
+    table = Table(
+        title=f"{validation.recording.name}: mean error of the forecasts, points of PCP, and skill against rivals",
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+    )
+    table.add_column("forecasts")
+    for column in ("error", *rivals):
+        table.add_column(column, justify="right")
+    for row in rows:
+        skills = [f"{skill}\n[dim]{ends}[/]" for _, (skill, ends) in row.rivals]
+        table.add_row(row.title, f"{row.error[0]}\n[dim]{row.error[1]}[/]", *skills)
+    if rows:
+        console.print(table, highlight=False)
+    for sentence in (distance_sentence(validation.distance), *cancelling_parts(validation)):
+        console.print(sentence, soft_wrap=True, highlight=False, markup=False)
+
+
 def _print_verdicts(verdicts: "Sequence[BoundVerdict]", name: str, console: Console) -> None:
     """Print a row for each group of verdicts, with the figure that is worst."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    from simharness.outputs.validation.tables import group_rows
+    from simharness.outputs.validation.tables import NOTHING, group_rows
 
-    heading = f"{name}: simulated against measured; the worst figure of each group"
+    heading = f"{name}: simulated less measured; the worst figure of each group with its interval"
     table = Table(
         title=heading, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False, pad_edge=False
     )
-    table.add_column("figures", min_width=24)
-    for column in ("hold", "real", "simulated", "bound"):
-        table.add_column(column, justify="right", no_wrap=column != "bound")
-    table.add_column("verdict", no_wrap=True)
-    styles = {"holds": "green", "unclear": "yellow", "fails": "bold red"}
+    table.add_column("figures", min_width=20)
+    for column in ("hold", "cannot\ntell", "fail", "difference", "bound"):
+        table.add_column(column, justify="right", no_wrap=True)
+    styles = {"holds": "green", "cannot tell": "yellow", "fails": "bold red"}
     for row in group_rows(verdicts):
-        title = f"{row.title}\n[dim]{row.note}[/]" if row.note else row.title
-        held, _, _, real, simulated, _, bound = row.cells
-        table.add_row(title, f"{held}/{row.count}", real, simulated, bound, f"[{styles[row.state]}]{row.state}[/]")
+        (held, _), (unknown, _), (failed, _), _, simulated, difference, (bound, _) = row.cells
+        shown, ends = simulated if difference[0] == NOTHING else difference
+        title = f"{row.title}\n[{styles[row.state]}]{row.state}[/][dim]{row.note and ', '}{row.note}[/]"
+        table.add_row(title, held, unknown, failed, f"{shown}\n[dim]{ends}[/]", bound)
     console.print(table, highlight=False)
 
 

@@ -12,12 +12,14 @@ from simharness.outputs import TEMPLATES
 from simharness.outputs.validation import plots, tables
 from simharness.reality.validation.detection_figures import AFFINITY_EDGES, AMBIGUOUS
 from simharness.reality.validation.evidence import Compared
+from simharness.reality.validation.skill import ALL
 from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.validation import Validation
 from simharness.reality.validation.verdicts import BOUNDS, VerdictState
 from simharness.runtime.number_text import fixed
 from simharness.trial.identity import provenance_sentence
 
+_APART = 6  # groups of figures that are named as those in which twins differ most
 _HEADS = {"voxelpose": "VoxelPose", "2019": "2019"}
 _RATIOS = (
     *("bones.shank", "bones.thigh", "bones.forearm", "bones.upper arm", "behind", "affinity.different"),
@@ -38,7 +40,7 @@ def render_validation(validation: Validation, *, provenance: Mapping[str, Any], 
         A self-contained HTML document.
     """
     recording = validation.recording
-    states = [verdict.state for verdict in validation.verdicts]
+    rivals, skill = tables.skill_rows(validation)
     return fill_template(
         "validation.html",
         folder=TEMPLATES,
@@ -48,7 +50,14 @@ def render_validation(validation: Validation, *, provenance: Mapping[str, Any], 
         fitted_on=fitted_on,
         facts=_facts(validation),
         cards=_cards(validation),
-        passed=VerdictState.FAILS not in states,
+        distance=tables.distance_sentence(validation.distance),
+        apart=[
+            (key.replace("_", " "), fixed(each, 1)) for key, each in list(validation.distance.groups.items())[:_APART]
+        ],
+        cancelling=tables.cancelling_parts(validation),
+        rivals=rivals,
+        skill=skill,
+        agreements=tables.agreement_rows(validation),
         group_columns=tables.GROUP_COLUMNS,
         groups=tables.group_rows(validation.verdicts),
         verdicts=list(tables.verdict_rows(validation.verdicts)),
@@ -86,32 +95,41 @@ def _facts(validation: Validation) -> list[tuple[str, str]]:
 
 
 def _cards(validation: Validation) -> list[dict[str, str]]:
-    """Return the headline numbers: verdicts by state, and the largest and the mean difference of PCP."""
+    """Return the headline numbers: errors of the forecasts and their skill, all cameras, and verdicts by state."""
     states = [verdict.state for verdict in validation.verdicts]
     of_variants = [
         abs(scores["pcp"][rule].difference) for scores in validation.variants.values() for rule in tables.PUBLISHED
     ]
-    pairs = np.array([pair for of in _points(validation).values() for each in of.values() for pair in each])
+    cards = [
+        {
+            "title": "All cameras",
+            "text": f"{fixed(max(of_variants), 1)} points",
+            "about": "largest difference of PCP between simulation and reality, all variants, both head rules",
+        }
+    ]
+    for each in validation.skills:
+        if each.variant == ALL:
+            against = ", ".join(
+                f"{fixed(skill.mean, 2)} against {rival}"
+                for rival, (_, skill) in each.rivals.items()
+                if np.isfinite(skill.mean)
+            )
+            ends = f"{fixed(each.error.low, 1)} to {fixed(each.error.high, 1)}"
+            cards.append(
+                {
+                    "title": tables.SKILL_GROUPS[each.what].replace("losses", "Losses"),
+                    "text": f"{fixed(each.error.mean, 1)} points",
+                    "about": f"mean error ({ends}) of {each.conditions} forecasts; skill {against or '–'}",
+                }
+            )
+    counts = {state: states.count(state) for state in VerdictState}
+    failed, unknown = counts[VerdictState.FAILS], counts[VerdictState.CANNOT_TELL]
     return [
+        *cards,
         {
             "title": "Verdicts",
-            "text": f"{states.count(VerdictState.HOLDS)} of {len(states)} hold",
-            "about": f"{states.count(VerdictState.UNCLEAR)} unclear, {states.count(VerdictState.FAILS)} fail",
-        },
-        {
-            "title": "Variants, all cameras",
-            "text": f"{fixed(max(of_variants), 1)} points",
-            "about": "largest difference of PCP between simulation and reality, both head rules",
-        },
-        {
-            "title": "All settings",
-            "text": f"{fixed(float(np.mean(np.abs(pairs[:, 1] - pairs[:, 0]))), 1)} points",
-            "about": f"mean difference of PCP over {len(pairs)} settings: subsets of cameras, treatments, variants",
-        },
-        {
-            "title": "Joint difficulty",
-            "text": f"ρ {validation.joints.rank_correlation:.2f}",
-            "about": "rank correlation of the mean errors of the 14 joints",
+            "text": f"{counts[VerdictState.HOLDS]} of {len(states)} hold",
+            "about": f"{failed} fail, of {unknown} nobody can tell from this recording",
         },
     ]
 
@@ -129,17 +147,16 @@ def _points(validation: Validation) -> dict[str, dict[str, list[tuple[float, flo
     for count in validation.subsets.curves:
         if count < most:
             result[f"{count} cameras"] = {
-                name: [pair for views, pair in validation.subsets.single[name].items() if len(views) == count]
+                name: [
+                    (each.real.mean, each.twin.mean)
+                    for views, each in validation.subsets.single[name].items()
+                    if len(views) == count
+                ]
                 for name in names
             }
     if validation.responses:
-        bases = {name: validation.bases[name] for name in names}
         result["treated"] = {
-            name: [
-                (bases[name][0] - each.loss.real.mean, bases[name][1] - each.loss.twin.mean)
-                for each in validation.responses
-                if each.variant == name
-            ]
+            name: [(each.pcp.real.mean, each.pcp.twin.mean) for each in validation.responses if each.variant == name]
             for name in names
         }
     return result
@@ -155,7 +172,9 @@ def _plots(validation: Validation) -> dict[str, str]:
     if validation.responses:
         drawn["losses"] = plots.losses(validation.responses, shades, name="losses")
     pairs = {
-        name: np.array([pair for views, pair in of.items() if len(views) == 2]).reshape(-1, 2).T
+        name: np.array([(each.real.mean, each.twin.mean) for views, each in of.items() if len(views) == 2])
+        .reshape(-1, 2)
+        .T
         for name, of in validation.subsets.single.items()
     }
     drawn["pairs"] = plots.scatter(pairs, shades, name="pairs", what="PCP, %")

@@ -44,7 +44,7 @@ def agreement(
     with svg_plot(name, size=_SQUARE) as (axes, written):
         low = max(0.0, 5 * np.floor(np.nanmin(everything, initial=95.0) / 5 - 0.2))
         ends = np.array([low, 101.0])
-        axes.fill_between(ends, ends - BOUNDS.subsets, ends + BOUNDS.subsets, color=FAINT, alpha=_BAND, lw=0, zorder=1)
+        axes.fill_between(ends, ends - BOUNDS.subset, ends + BOUNDS.subset, color=FAINT, alpha=_BAND, lw=0, zorder=1)
         axes.plot(ends, ends, color=FAINT, lw=0.9, zorder=2)
         for marker, of in zip(markers, points.values(), strict=False):
             for variant, pairs in of.items():

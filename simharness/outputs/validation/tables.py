@@ -11,8 +11,9 @@ import numpy as np
 from mvpose.files.input_files import parse_toml
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.treatments import KINDS
+from simharness.reality.validation.twin_distance import TwinDistance
 from simharness.reality.validation.validation import Validation
-from simharness.reality.validation.verdicts import GROUPS, BoundVerdict, VerdictState
+from simharness.reality.validation.verdicts import BOUNDS, GROUPS, BoundVerdict, VerdictState
 from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.frame_scores import RULES
 from simharness.statistics.intervals import Interval
@@ -21,15 +22,14 @@ NOTHING = "–"
 PUBLISHED = tuple(rule for rule in RULES if not rule.filled)
 """Rules for the head as published."""
 
+_SHARES = ("recall", "detected", "missing", "gross")
 # Digits and factor by group of verdicts: shares are shown in percent.
 _FORMATS: Mapping[str, tuple[int, float, str]] = {
-    "mpjpe": (1, 1.0, "mm"),
-    "bones": (1, 1.0, "mm"),
-    "subset_rank": (2, 1.0, ""),
-    "draw_rank": (2, 1.0, ""),
-    **{group: (1, 100.0, "%") for group in ("tree", "ears", "behind", "ambiguous")},
+    **dict.fromkeys(("mpjpe", "bones", "epipolar", "offset", "annotation"), (1, 1.0, "mm")),
+    **dict.fromkeys(("subset_rank", "draw_rank", "ghosts", "memory", "residual"), (2, 1.0, "")),
+    **dict.fromkeys(("tree", "ears", "behind", "ambiguous", *_SHARES), (1, 100.0, "%")),
 }
-_PERCENT_BOUND = {"tree", "ears", "behind"}  # groups whose bounds are shares
+_PERCENT_BOUND = {"tree", "ears", "behind", *_SHARES}  # groups whose bounds are shares
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Row:
 
     title: str
     """First cell."""
-    cells: tuple[str, ...]
-    """Further cells."""
+    cells: tuple[tuple[str, str], ...]
+    """Further cells, each with its small print."""
     state: str
     """State of the verdict."""
     note: str = ""
@@ -48,7 +48,7 @@ class Row:
     """Number of figures that the row stands for."""
 
 
-GROUP_COLUMNS = ("hold", "unclear", "fail", "real", "simulated", "difference", "bound")
+GROUP_COLUMNS = ("hold", "cannot tell", "fail", "real", "simulated", "difference", "bound")
 """Titles of the cells of :func:`group_rows`."""
 
 
@@ -61,7 +61,7 @@ def group_rows(verdicts: Sequence[BoundVerdict]) -> list[Row]:
             continue
         worst = max(of, key=_badness)
         counts = [sum(each.state == state for each in of) for state in VerdictState]
-        cells = (*(str(count) for count in counts), *_numbers(worst))
+        cells = (*((str(count), "") for count in counts), *_numbers(worst))
         note = "" if len(of) == 1 else f"worst: {_label(worst)}"
         rows.append(Row(title, cells, worst.state.value, note, len(of)))
     return rows
@@ -76,7 +76,8 @@ def verdict_rows(verdicts: Sequence[BoundVerdict]) -> Iterator[tuple[str, list[R
 
 
 def _badness(verdict: BoundVerdict) -> tuple[int, float]:
-    apart = abs(verdict.difference) if np.isfinite(verdict.difference) else -verdict.twin
+    unsigned = verdict.twin if verdict.group == "subset_mean" else -verdict.twin
+    apart = abs(verdict.difference) if np.isfinite(verdict.difference) else unsigned
     return list(VerdictState).index(verdict.state), apart
 
 
@@ -87,17 +88,18 @@ def _label(verdict: BoundVerdict) -> str:
     return text.replace("tree.", "") or verdict.name
 
 
-def _numbers(verdict: BoundVerdict) -> tuple[str, str, str, str]:
-    """Return the cells real, simulated, difference and bound."""
+def _numbers(verdict: BoundVerdict) -> tuple[tuple[str, str], ...]:
+    """Return the cells real, simulated, difference and bound; the small print is the interval that is tested."""
     digits, factor, unit = _FORMATS.get(verdict.group, (1, 1.0, ""))
     after = f" {unit}" if unit else ""
+    ends = _span(factor * verdict.low, factor * verdict.high, digits)
     if not np.isfinite(verdict.real):
-        return NOTHING, fixed(verdict.twin, digits), NOTHING, verdict.bound
+        return (NOTHING, ""), (fixed(verdict.twin, digits), ends), (NOTHING, ""), (verdict.bound, "")
     real, twin = (fixed(factor * value, digits) + after for value in (verdict.real, verdict.twin))
     bound = verdict.bound
     if verdict.group in _PERCENT_BOUND:
         bound = f"± {100 * float(bound.removeprefix('± ')):g} %"
-    return real, twin, signed(factor * verdict.difference, digits), bound
+    return (real, ""), (twin, ""), (signed(factor * verdict.difference, digits), ends), (bound, "")
 
 
 @dataclass(frozen=True)
@@ -183,6 +185,84 @@ def response_rows(validation: Validation) -> Iterator[tuple[str, list[tuple[str,
     yield from groups.items()
 
 
+SKILL_GROUPS: Mapping[str, str] = {"losses": "losses by added errors", "subsets": "PCP with fewer cameras"}
+"""Titles of the groups of conditions of :func:`~simharness.reality.validation.skill.forecast_groups`."""
+
+
+@dataclass(frozen=True)
+class SkillRow:
+    """Row of a table of skill."""
+
+    title: str
+    """Conditions and variant."""
+    conditions: int
+    """Number of conditions."""
+    error: tuple[str, str]
+    """Mean absolute difference of the twins, points, and its interval."""
+    rivals: tuple[tuple[tuple[str, str], tuple[str, str]], ...]
+    """Error of each rival, and skill against it, with intervals."""
+
+
+def skill_rows(validation: Validation) -> tuple[list[str], list[SkillRow]]:
+    """Return the names of the rivals, and a row for each group of conditions and variant."""
+    names = list(dict.fromkeys(rival for each in validation.skills for rival in each.rivals))
+    nothing = (NOTHING, "")
+    rows = []
+    for each in validation.skills:
+        rivals = [
+            (_with_interval(each.rivals[name][0], 1, 1.0), _with_interval(each.rivals[name][1], 2, 1.0))
+            if name in each.rivals
+            else (nothing, nothing)
+            for name in names
+        ]
+        title = f"{SKILL_GROUPS[each.what]}, {each.variant}"
+        rows.append(SkillRow(title, each.conditions, _with_interval(each.error, 1, 1.0), tuple(rivals)))
+    return names, rows
+
+
+def agreement_rows(validation: Validation) -> list[tuple[str, int, list[tuple[str, str]]]]:
+    """Return variant, number of conditions, and the correlations and the rank violation with intervals."""
+    return [
+        (
+            each.variant,
+            each.conditions,
+            [
+                *(_with_interval(value, 3, 1.0) for value in (each.pearson, each.spearman)),
+                _with_interval(each.rank_violation, 1, 1.0),
+            ],
+        )
+        for each in validation.agreements
+    ]
+
+
+def cancelling_parts(validation: Validation) -> list[str]:
+    """Return sentences on parts of the body whose errors cancel in the PCP of a variant.
+
+    Parts cancel where one is too high by more than the bound and another too low by more than half of it.
+    """
+    sentences = []
+    for name, groups in validation.parts.items():
+        apart = {key.replace("_", " "): each.difference for key, each in groups.items() if np.isfinite(each.difference)}
+        high, low = max(apart, key=apart.__getitem__, default=""), min(apart, key=apart.__getitem__, default="")
+        if high and max(apart[high], -apart[low]) > BOUNDS.parts and min(apart[high], -apart[low]) > BOUNDS.parts / 2:
+            total = signed(validation.variants[name]["pcp"][PUBLISHED[0]].difference, 1)
+            sentences.append(
+                f"{name}: {high} {signed(apart[high], 1)}, {low} {signed(apart[low], 1)}, which the PCP of the whole "
+                f"body ({total}) does not show"
+            )
+    return sentences
+
+
+def distance_sentence(distance: TwinDistance) -> str:
+    """Return whether the recording can be told from its twins."""
+    if not np.isfinite(distance.p_value):
+        return "too few twins to say whether the recording can be told from them"
+    chance = "p < 0.001" if distance.p_value < 0.001 else f"p = {distance.p_value:.3f}"
+    times = f"{distance.value / distance.usual:.1f} times as far from the twins as they are from each other"
+    verb = "can be told" if distance.noticed else "cannot be told"
+    return f"the recording {verb} from its twins: {times} over {distance.figures} figures ({chance})"
+
+
 def level_text(kind: str, level: float) -> str:
     """Return a level of a treatment with its unit."""
     unit = KINDS[kind].unit
@@ -196,7 +276,7 @@ def measurement_rows(validation: Validation) -> list[tuple[str, ComparedCells]]:
         if np.isfinite(figure.real.mean):
             title = measurement_title(key)
             percent = title.endswith(", %")
-            digits = 2 if key.startswith(("score", "phantoms", "others")) else 1
+            digits = 2 if key.startswith(("score", "phantoms", "others", "residual", "memory")) else 1
             rows.append((title, cells(figure, digits, factor=100.0 if percent else 1.0)))
     return rows
 
@@ -213,6 +293,8 @@ def measurement_title(key: str) -> str:
     if key in titles:
         return titles[key]
     group, _, name = key.partition(".")
+    if f"{group}.*" in titles:
+        return titles[f"{group}.*"].replace("*", name)
     if group == "tree":
         child, _, parent = name.partition("|")
         return f"{child} missing where the {parent} is, %"

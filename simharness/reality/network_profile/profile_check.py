@@ -1,7 +1,7 @@
 """A network beside simulated detectors on scenes that no profile has seen: the same pictures, people and cameras.
 
 Where the whole 95 % interval of a difference is inside its bound, the prediction holds; where it is outside, it fails;
-else it is unclear.
+else nobody can tell.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +20,7 @@ from simharness.reality.detector_fit.detector_sums import Trials
 from simharness.reality.network_profile.error_curves import part_counts
 from simharness.reality.network_profile.exact_labels import label_scenes
 from simharness.reality.network_profile.profiled_scenes import ProfiledScene
-from simharness.reality.validation.verdicts import VerdictState
+from simharness.reality.validation.verdicts import VerdictState, equivalence
 from simharness.runtime.frame_pool import map_jobs
 from simharness.scenario.sections.detector_section import KINDS, DetectorSection
 from simharness.scoring.assessment import assess
@@ -71,11 +71,7 @@ class CheckedFigure(NamedTuple):
         """Whether the difference is within the bound, by its interval."""
         if self.bound is None or not np.isfinite(self.difference.mean):
             return None
-        low, high = self.difference.low, self.difference.high
-        if -self.bound <= low and high <= self.bound:
-            return VerdictState.HOLDS
-        outside = low > self.bound or high < -self.bound
-        return VerdictState.FAILS if outside else VerdictState.UNCLEAR
+        return equivalence(self.difference.low, self.difference.high, -self.bound, self.bound)
 
 
 @dataclass(frozen=True)

@@ -6,23 +6,22 @@ or the variation of bone lengths.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast
+from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mvpose import COCO17, SHELF14, Detections
 from mvpose.affinity import FusedAffinity
 from mvpose.arrays import Bools, Floats
 from mvpose.rays import viewing_rays
-from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE
+from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE, oks_units
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.association import Association, associate
 from simharness.reality.detector_fit.occlusion import complete_face, in_picture, occlusion_classes, person_boxes
 from simharness.reality.detector_fit.sample import LIMB_JOINTS, Sample
-from simharness.reality.validation.evidence import Compared, compared
+from simharness.reality.validation.evidence import Compared, Ratio, by_frame, compared
+from simharness.reality.validation.view_disagreement import view_disagreement
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS
-from simharness.statistics.resampling import resampled
 
 TREE = {
     "wrist|elbow": ((9, 7), (10, 8)),
@@ -53,24 +52,6 @@ _IN_PICTURE = 0.5  # share of a person's limb joints on the picture, from which 
 _SCORE_QUANTILES = (0.1, 0.5, 0.9)
 
 
-class Ratio(NamedTuple):
-    """Ratio of two sums over frames, from the contribution of each frame, both (F,)."""
-
-    numerator: Floats
-    denominator: Floats
-
-    @property
-    def value(self) -> float:
-        """The ratio; NaN where the denominator is 0."""
-        total = self.denominator.sum()
-        return float(self.numerator.sum() / total) if total else float("nan")
-
-    def resampled(self, weights: Floats) -> Floats:
-        """Return the ratio in R resamples of the frames, (R,), from their weights (R, F)."""
-        numerator, denominator = resampled(self.numerator, weights), resampled(self.denominator, weights)
-        return np.where(denominator > 0, numerator / np.where(denominator > 0, denominator, 1.0), np.nan)
-
-
 @dataclass(frozen=True)
 class DetectionFigures:
     """Figures of the detections of a recording of F frames."""
@@ -80,9 +61,10 @@ class DetectionFigures:
     an affinity above 0.5), ``affinity.same`` (share of pairs of one person below 0.5), ``behind`` (share of limb joints
     of annotated people in the pictures that another person hides), ``ears`` (share of ears that fewer than two views
     report), ``tree.CHILD|PARENT`` (share of missing children where the parent is missing), ``missing.KIND`` (share of
-    joints in the picture that detections of annotated people do not report), ``detected`` (share of people in a picture
-    who are detected), ``phantoms`` (detections of nobody, per view and frame), ``others`` (people who are not
-    annotated, per frame)."""
+    joints in the picture that detections of annotated people do not report), ``detected`` and ``detected.VIEW`` (share
+    of people in a picture who are detected, in all views and in one, numbered from 1), ``phantoms`` (detections of
+    nobody, per view and frame), ``others`` (people who are not annotated, per frame), and those of
+    :func:`.view_disagreement`."""
     bones: Floats
     """Length of every bone of every actor, (F, A, 2 sides, 4), mm, from joints triangulated from all detections; NaN
     where unknown. In the order of :data:`BONES`."""
@@ -133,8 +115,13 @@ def measure_detections(recording: AnnotatedRecording) -> DetectionFigures:
     counts = {key: np.histogram(np.concatenate(each), AFFINITY_EDGES)[0] for key, each in affinities.items()}
     reported = shown.association.scores[..., LIMB_JOINTS]
     reported = reported[reported > 0]
+    unit = oks_units(person_boxes(shown.reference, recording.rig))
+    step = np.diff(recording.frames, prepend=-(10**9))
+    apart = view_disagreement(
+        recording.rig, shown.association.keypoints, unit, shown.reference, step == step.min(initial=10**9)
+    )
     return DetectionFigures(
-        ratios={**_ambiguity(affinities), **_hidden(shown), **_missing(shown), **_people(shown)},
+        ratios={**_ambiguity(affinities), **_hidden(shown), **_missing(shown), **_people(shown), **apart},
         bones=_bone_lengths(np.where(shown.annotated[..., None, None], shown.triangulated, np.nan)),
         true_bones=_bone_lengths(shown.reference),
         affinities={key: each / max(1, each.sum()) for key, each in counts.items()},
@@ -233,8 +220,8 @@ def _hidden(shown: ShownPeople) -> dict[str, Ratio]:
     limbs = shown.inside[..., LIMB_JOINTS], shown.behind[..., LIMB_JOINTS]
     views = (shown.association.scores[..., _EARS] > 0).sum(axis=1)  # (F, A, 2)
     return {
-        "behind": Ratio(_by_frame(limbs[1]), _by_frame(limbs[0])),
-        "ears": Ratio(_by_frame((views < 2) & shown.annotated[..., None]), 2 * _by_frame(shown.annotated)),
+        "behind": Ratio(by_frame(limbs[1]), by_frame(limbs[0])),
+        "ears": Ratio(by_frame((views < 2) & shown.annotated[..., None]), 2 * by_frame(shown.annotated)),
     }
 
 
@@ -245,11 +232,11 @@ def _missing(shown: ShownPeople) -> dict[str, Ratio]:
     for name, pairs in TREE.items():
         children, parents = (list(each) for each in zip(*pairs, strict=True))
         parent = missing[..., parents]
-        result[f"tree.{name}"] = Ratio(_by_frame(parent & missing[..., children]), _by_frame(parent))
+        result[f"tree.{name}"] = Ratio(by_frame(parent & missing[..., children]), by_frame(parent))
     kinds = np.array(KIND_OF_JOINT)
     for index, kind in enumerate(KINDS):
         expected = (shown.inside & detected)[..., kinds == index]
-        result[f"missing.{kind}"] = Ratio(_by_frame(expected & missing[..., kinds == index]), _by_frame(expected))
+        result[f"missing.{kind}"] = Ratio(by_frame(expected & missing[..., kinds == index]), by_frame(expected))
     return result
 
 
@@ -257,16 +244,16 @@ def _people(shown: ShownPeople) -> dict[str, Ratio]:
     expected = shown.inside[..., LIMB_JOINTS].mean(axis=-1) > _IN_PICTURE
     frames, views = expected.shape[:2]
     others = np.any(np.isfinite(shown.association.unannotated), axis=(2, 3))
-    return {
-        "detected": Ratio(_by_frame(expected & shown.association.detected), _by_frame(expected)),
-        "phantoms": Ratio(_by_frame(shown.association.false), np.full(frames, float(views))),
-        "others": Ratio(_by_frame(others), np.ones(frames)),
+    found = expected & shown.association.detected
+    by_view = {
+        f"detected.{view + 1}": Ratio(by_frame(found[:, view]), by_frame(expected[:, view])) for view in range(views)
     }
-
-
-def _by_frame(counted: NDArray[Any]) -> Floats:
-    """Return the sums over all axes but the first, (F,)."""
-    return counted.reshape(len(counted), -1).sum(axis=1, dtype=float)
+    return {
+        "detected": Ratio(by_frame(found), by_frame(expected)),
+        **by_view,
+        "phantoms": Ratio(by_frame(shown.association.false), np.full(frames, float(views))),
+        "others": Ratio(by_frame(others), np.ones(frames)),
+    }
 
 
 def _bone_lengths(joints: Floats) -> Floats:

@@ -79,40 +79,40 @@ class ScoreSums:
     def pcp(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
         """Return PCP, percent (...), mean over the scored actors who are annotated in some frame."""
         at = RULES.index(rule)
-        return _mean(100.0 * _ratio(self.correct[..., at, :], self.defined[..., at, :]))
+        return mean_known(100.0 * safe_ratio(self.correct[..., at, :], self.defined[..., at, :]))
 
     def pcp_actors(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
         """Return PCP of each scored actor, percent (..., S)."""
         at = RULES.index(rule)
-        return 100.0 * _ratio(self.correct[..., at, :], self.defined[..., at, :])
+        return 100.0 * safe_ratio(self.correct[..., at, :], self.defined[..., at, :])
 
     def mpjpe(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
         """Return the mean over pairs of the mean joint error, mm (...)."""
         at = RULES.index(rule)
-        return _ratio(self.error[..., at], self.found[..., at])
+        return safe_ratio(self.error[..., at], self.found[..., at])
 
     def recall(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
         """Return the share of annotated people with a pair, 0 to 1 (...)."""
-        return _ratio(self.found[..., RULES.index(rule)], self.people)
+        return safe_ratio(self.found[..., RULES.index(rule)], self.people)
 
     def precision(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
         """Return the share of estimates with a pair, 0 to 1 (...)."""
-        return _ratio(self.found[..., RULES.index(rule)], self.estimates)
+        return safe_ratio(self.found[..., RULES.index(rule)], self.estimates)
 
     def ghosts(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
         """Return the number of estimates without a pair, per frame (...)."""
-        return _ratio(self.estimates - self.found[..., RULES.index(rule)], self.frames)
+        return safe_ratio(self.estimates - self.found[..., RULES.index(rule)], self.frames)
 
 
-def _ratio(numerator: Floats, denominator: Floats) -> Floats:
+def safe_ratio(numerator: Floats, denominator: Floats) -> Floats:
     """Return the ratio; NaN where the denominator is 0."""
     return np.where(denominator > 0, numerator / np.where(denominator > 0, denominator, 1.0), np.nan)
 
 
-def _mean(values: Floats) -> Floats:
+def mean_known(values: Floats) -> Floats:
     """Return the mean over the last axis without NaN; NaN where all are NaN."""
     known = np.isfinite(values)
-    return _ratio(np.where(known, values, 0.0).sum(axis=-1), known.sum(axis=-1).astype(float))
+    return safe_ratio(np.where(known, values, 0.0).sum(axis=-1), known.sum(axis=-1).astype(float))
 
 
 VARIANTS = ("full", "fast", "no-3dps", "no-matching")

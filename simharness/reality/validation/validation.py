@@ -5,16 +5,19 @@ Also predictions of frames and recordings that a fit has not seen.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from mvpose.commands.errors import RunError
 from mvpose.commands.progress import Reporter, Silence
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.fit import fit
-from simharness.reality.twin import TwinModel, simulate_twins
+from simharness.reality.twin import TwinModel, detected_twin, simulate_twins
 from simharness.reality.validation import variant_comparison
 from simharness.reality.validation.detection_figures import DetectionFigures, compare_detections, measure_detections
 from simharness.reality.validation.evidence import Compared, Evidence, compared, frame_weights
+from simharness.reality.validation.input_checks import check_recording
 from simharness.reality.validation.passes import (
     VARIANTS,
     CameraSubset,
@@ -26,7 +29,9 @@ from simharness.reality.validation.passes import (
     run_passes,
     score_recordings,
 )
+from simharness.reality.validation.skill import Agreement, Forecasts, Skill, agreements, forecast_groups, skills
 from simharness.reality.validation.treatments import treatments
+from simharness.reality.validation.twin_distance import TwinDistance, measure_distance
 from simharness.reality.validation.verdicts import (
     BOUNDS,
     PREDICTION_BOUNDS,
@@ -38,7 +43,8 @@ from simharness.reality.validation.verdicts import (
     judge_scores,
     judge_subsets,
 )
-from simharness.scoring.frame_scores import RULES, ByRule, FrameScores, HeadRule
+from simharness.scenario.presets import read_profile
+from simharness.scoring.frame_scores import RULES, ByRule, HeadRule
 
 
 @dataclass(frozen=True)
@@ -50,7 +56,7 @@ class ValidationPlan:
     twin_every: int = 3
     """The same for subsets and treatments of twins, of which there are several; all else takes every frame that
     ``every`` leaves."""
-    draws: int = 10
+    draws: int = 8
     """Number of draws of calibration errors."""
     detection_draws: int = 3
     """Number of draws of the errors of detections."""
@@ -92,8 +98,14 @@ class Validation:
     """The same as the method left them."""
     responses: Sequence[variant_comparison.DoseResponse]
     """Losses by treatment, level and variant."""
-    bases: Mapping[str, tuple[float, float]]
-    """PCP without a treatment in the frames that are treated, real and simulated, by variant, percent."""
+    forecasts: Mapping[str, Mapping[str, Forecasts]]
+    """Conditions by group, ``losses`` and ``subsets``, and variant."""
+    skills: Sequence[Skill]
+    """Error over these conditions, and skill against rivals."""
+    agreements: Sequence[Agreement]
+    """Correlations and rank violations over all conditions, by variant."""
+    distance: TwinDistance
+    """Distance of the recording from the twins over all figures at once."""
     joints: variant_comparison.JointDifficulty
     """Errors by joint, of the first variant."""
     measured: Mapping[str, Compared]
@@ -113,6 +125,8 @@ def validate(
     recording: AnnotatedRecording,
     twins: Sequence[AnnotatedRecording],
     *,
+    profile: AnnotatedRecording | None = None,
+    other: Mapping[str, float] | None = None,
     plan: ValidationPlan | None = None,
     bounds: Bounds = BOUNDS,
     reporter: Reporter | None = None,
@@ -122,12 +136,15 @@ def validate(
     Args:
         recording: the recording.
         twins: its twins, each of another seed, with the same cameras.
+        profile: a twin whose detector is a shipped profile: a rival of the others. None: no such rival.
+        other: figures of another recording, another rival (:func:`.read_other_figures`).
         plan: extent; by default the whole.
         bounds: bounds of the verdicts.
         reporter: receiver of progress.
 
     Raises:
-        ValueError: no twins, a twin with another number of cameras, or nobody annotated.
+        ValueError: no twins, a twin with another number of cameras, or what :func:`.check_recording` refuses.
+        RunError: a twin in which nobody is found.
     """
     plan, reporter = plan or ValidationPlan(), reporter or Silence()
     _check(recording, twins)
@@ -137,6 +154,12 @@ def validate(
 
     with reporter.stage("scores", 1 + len(whole)) as advance:
         scores = score_recordings([real, *whole], variants=plan.variants, workers=plan.workers, progress=advance)
+    for twin, of_twin in zip(twins, scores[1:], strict=True):
+        if not any(by_rule[RULES[0]].found.any() for by_rule in of_twin.values()):
+            raise RunError(
+                f"{twin.name}: expected a twin in which the method finds people, got nobody in {len(twin)} frames: "
+                "nothing can be compared; look at the fit with simharness fit-detector"
+            )
     with reporter.stage("measurements", 1 + len(whole)) as advance:
         measurements = []
         for each in (real, *whole):
@@ -144,9 +167,12 @@ def validate(
             advance(1)
     changes: list[RecordingChange] = [Unchanged(), *map(CameraSubset, variant_comparison.camera_subsets(len(real.rig)))]
     changes += treatments(draws=plan.draws, detection_draws=plan.detection_draws) if plan.treated else ()
-    with reporter.stage("subsets and treatments", len(changes) * (1 + len(thinned))) as advance:
-        passes = run_passes([real, *thinned], changes, variants=plan.variants, workers=plan.workers, progress=advance)
-    return _compare(real, whole, plan, bounds, scores, measurements, Evidence.of_tallies(real, passes[0], passes[1:]))
+    rivals = [] if profile is None else [annotated(profile, every=plan.twin_every)]
+    given = [real, *rivals, *thinned]
+    with reporter.stage("subsets and treatments", len(changes) * len(given)) as advance:
+        passes = run_passes(given, changes, variants=plan.variants, workers=plan.workers, progress=advance)
+    evidence = Evidence.of_tallies(real, passes[0], passes[1 + len(rivals) :], passes[1] if rivals else None)
+    return _compare(real, whole, plan, bounds, scores, measurements, evidence, other)
 
 
 def _check(recording: AnnotatedRecording, twins: Sequence[AnnotatedRecording]) -> None:
@@ -158,8 +184,7 @@ def _check(recording: AnnotatedRecording, twins: Sequence[AnnotatedRecording]) -
                 f"{each.name}: expected a twin with the {len(recording.rig)} cameras of {recording.name}, "
                 f"got {len(each.rig)}"
             )
-        if not np.isfinite(each.truth).any():
-            raise ValueError(f"{each.name}: expected frames with annotated people, got none in {len(each)} frames")
+        check_recording(each)
 
 
 def _compare(
@@ -170,6 +195,7 @@ def _compare(
     scores: Sequence[Mapping[str, ByRule]],
     measurements: Sequence[DetectionFigures],
     evidence: Evidence,
+    other: Mapping[str, float] | None,
 ) -> Validation:
     """Return the comparison, from the scores, the measurements and the passes of all recordings."""
     everyone = (real, *twins)
@@ -183,9 +209,20 @@ def _compare(
     cameras = len(real.rig)
     subsets = variant_comparison.compare_subsets(evidence, cameras, plan.variants)
     responses = variant_comparison.compare_responses(evidence, plan.variants)
-    measured = compare_detections(measurements[0], measurements[1:], frame_weights(real))
+    weights = frame_weights(real)
+    measured = compare_detections(measurements[0], measurements[1:], weights)
+    parts = {
+        name: variant_comparison.compare_parts(
+            scores[0][name][RULES[0]], [each[name][RULES[0]] for each in scores[1:]], real.scored, weights
+        )
+        for name in plan.variants
+    }
+    forecasts = forecast_groups(subsets, responses, plan.variants, other=other)
+    every = {f"pcp.{name}": of["pcp"][RULES[0]] for name, of in variants.items()} | {
+        f"parts.{name}.{group}": figure for name, of in parts.items() for group, figure in of.items()
+    }
     verdicts = [
-        *judge_scores(variants, contrasts, bounds),
+        *judge_scores(variants, parts, contrasts, bounds),
         *judge_subsets(subsets, bounds),
         *judge_responses(responses, bounds),
         *judge_measurements(measured, real.kind, bounds),
@@ -201,12 +238,15 @@ def _compare(
             name: _plain([variant_comparison.median_error(each[name][RULES[0]]) for each in scores])
             for name in plan.variants
         },
-        parts={name: _parts(everyone, [each[name][RULES[0]] for each in scores]) for name in plan.variants},
+        parts=parts,
         contrasts=contrasts,
         subsets=subsets,
         subsets_as_is=variant_comparison.compare_subsets(evidence, cameras, plan.variants, rule=RULES[0]),
         responses=responses,
-        bases={name: _base(evidence, name) for name in plan.variants},
+        forecasts=forecasts,
+        skills=skills(forecasts),
+        agreements=agreements(subsets, responses, plan.variants),
+        distance=measure_distance(measured | every),
         joints=variant_comparison.compare_joints(
             scores[0][first][RULES[0]], [each[first][RULES[0]] for each in scores[1:]]
         ),
@@ -219,27 +259,13 @@ def _compare(
     )
 
 
-def _base(evidence: Evidence, variant: str) -> tuple[float, float]:
-    figure = evidence.compare(lambda sums: sums[Unchanged()][variant].pcp())
-    return figure.real.mean, figure.twin.mean
-
-
-def _parts(recordings: Sequence[AnnotatedRecording], scores: Sequence[FrameScores]) -> dict[str, Compared]:
-    """Return the PCP of each group of parts."""
-    each = [
-        variant_comparison.pcp_of_parts(one, recording.scored)
-        for recording, one in zip(recordings, scores, strict=True)
-    ]
-    return {group: _plain([values[group] for values in each]) for group in each[0]}
-
-
 def _plain(values: Sequence[float]) -> Compared:
     """Return a figure of the recording (first) and its twins, without an interval of the recording."""
     return compared(values[0], np.nan, values[1:])
 
 
 _HALVES = ("first half", "second half")
-_PREDICTED = ("pcp", "subsets")  # groups of verdicts that hold for other frames than those of the fit
+_PREDICTED = ("pcp", "subset_mean")  # groups of verdicts that hold for other frames than those of the fit
 
 
 @dataclass(frozen=True)
@@ -261,14 +287,42 @@ class HalfPrediction:
         ]
 
 
+class SimulatedTwins(NamedTuple):
+    """Twins of a recording, and one of a detector that was not fitted."""
+
+    fitted: list[AnnotatedRecording]
+    """Twins with the fitted detector."""
+    profile: AnnotatedRecording
+    """Twin of the first film with the shipped profile of the kind of the detector."""
+
+
+SHIPPED = {"top-down": "topdown", "bottom-up": "typical"}
+"""Shipped profile by kind of detector."""
+
+
+def twin_model(recording: AnnotatedRecording, *, fitted_on: AnnotatedRecording | None = None) -> TwinModel:
+    """Fit a detector and return what the twins of a recording are made from.
+
+    Args:
+        recording: the recording: its rig, its people, and how they are annotated.
+        fitted_on: recording to which the detector is fitted; None: the same.
+
+    Raises:
+        ValueError: a recording to which nothing can be fitted, or that cannot be compared.
+    """
+    check_recording(recording)
+    model = TwinModel.of_fit(recording, fit(recording))
+    return model if fitted_on is None else replace(model, detector=fit(fitted_on).profile)
+
+
 def simulate_predictions(
     recording: AnnotatedRecording,
     *,
     count: int,
     fitted_on: AnnotatedRecording | None = None,
     reporter: Reporter | None = None,
-) -> list[AnnotatedRecording]:
-    """Fit a detector and return the twins of a recording.
+) -> SimulatedTwins:
+    """Fit a detector and return the twins of a recording, and that of the shipped profile.
 
     Args:
         recording: the recording: its rig, its people, and how they are annotated.
@@ -279,10 +333,10 @@ def simulate_predictions(
     Raises:
         ValueError: a recording to which nothing can be fitted, or of which no twin can be built.
     """
-    model = TwinModel.of_fit(recording, fit(recording))
-    if fitted_on is not None:
-        model = replace(model, detector=fit(fitted_on).profile)
-    return simulate_twins(model, count=count, reporter=reporter)
+    model = twin_model(recording, fitted_on=fitted_on)
+    twins = simulate_twins(model, count=count, reporter=reporter)
+    unfitted = replace(model, detector=read_profile(SHIPPED[recording.kind]))
+    return SimulatedTwins(twins, detected_twin(unfitted, model.films[0], seed=0))
 
 
 def halves(recording: AnnotatedRecording) -> tuple[AnnotatedRecording, AnnotatedRecording]:

@@ -21,7 +21,7 @@ def summarize_validation(validation: Validation) -> dict[str, Any]:
     ``variants.NAME.real.pcp`` and the other scores are numbers by rule for the head: "voxelpose", "2019", and both
     "filled" (missing joints of the face completed from the others). ``subsets.COUNT.NAME.real`` and
     ``dose.TREATMENT.LEVEL.NAME.real`` are single numbers; the latter is the loss of PCP. All of them have the same
-    under ``twin``, and their 95 % intervals beside them.
+    under ``twin``, and their 95 % intervals beside them. Intervals of verdicts are those that are tested.
     """
     recording = validation.recording
     states = [verdict.state for verdict in validation.verdicts]
@@ -40,6 +40,9 @@ def summarize_validation(validation: Validation) -> dict[str, Any]:
         "passed": VerdictState.FAILS not in states,
         "counts": {state.value: states.count(state) for state in VerdictState},
         "verdicts": [_verdict(each) for each in validation.verdicts],
+        "skill": [each.summary() for each in validation.skills],
+        "agreement": {each.variant: each.summary() for each in validation.agreements},
+        "distance": validation.distance.summary(),
         "variants": {name: _variant(validation, name) for name in validation.variants},
         "contrasts": {
             f"{one} - {other}": {str(rule): figure.summary() for rule, figure in figures.items()}
@@ -49,10 +52,7 @@ def summarize_validation(validation: Validation) -> dict[str, Any]:
         "subset_rank": {name: _rank(rank) for name, rank in validation.subsets.ranks.items()},
         "subset_samples": list(validation.subsets.sampled),
         "single_subsets": {
-            name: [
-                {"cameras": list(views), "real": number(real), "twin": number(twin)}
-                for views, (real, twin) in of.items()
-            ]
+            name: [{"cameras": list(views), **figure.summary()} for views, figure in of.items()]
             for name, of in validation.subsets.single.items()
         },
         "dose": _dose(validation),
@@ -91,6 +91,7 @@ def _verdict(verdict: BoundVerdict) -> dict[str, Any]:
         "real": number(verdict.real),
         "twin": number(verdict.twin),
         "difference": number(verdict.difference),
+        "interval": [number(verdict.low), number(verdict.high)],
         "bound": verdict.bound,
         "state": verdict.state.value,
     }

@@ -12,13 +12,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.reality.validation.evidence import Compared, Evidence, Figure, Sums, rank_correlation
-from simharness.reality.validation.passes import DEFAULT_RULE, CameraSubset, ScoreSums, Unchanged
+from simharness.reality.validation.evidence import Compared, Evidence, Figure, Sums, compared, rank_correlation, ranked
+from simharness.reality.validation.passes import (
+    DEFAULT_RULE,
+    CameraSubset,
+    ScoreSums,
+    Unchanged,
+    mean_known,
+    safe_ratio,
+)
 from simharness.reality.validation.treatments import KINDS, Treatment
 from simharness.scoring.frame_scores import RULES, FrameScores, HeadRule
 from simharness.scoring.joint_errors import pck
 from simharness.scoring.pcp import GROUPS, Part
 from simharness.statistics.intervals import Interval
+from simharness.statistics.resampling import resampled
 from simharness.types.random_streams import stream
 
 SCORES: Mapping[str, Callable[[ScoreSums, HeadRule], Floats]] = {
@@ -110,17 +118,38 @@ def median_error(scores: FrameScores) -> float:
     return float(1000.0 * np.median(means)) if len(means) else float("nan")
 
 
-def pcp_of_parts(scores: FrameScores, actors: Sequence[int]) -> dict[str, float]:
-    """Return the PCP of each group of parts, percent, mean over the actors; NaN where undefined."""
-    parts = scores.parts[:, list(actors)]
-    result = {}
-    for group, index in GROUPS.items():
-        chosen = parts[..., list(index)]
-        defined = (chosen != Part.UNDEFINED).sum(axis=(0, 2))
-        correct = (chosen == Part.CORRECT).sum(axis=(0, 2))
-        share = correct[defined > 0] / defined[defined > 0]
-        result[group] = float(100.0 * share.mean()) if len(share) else float("nan")
-    return result
+def compare_parts(
+    real: FrameScores, twins: Sequence[FrameScores], actors: Sequence[int], weights: Floats
+) -> dict[str, Compared]:
+    """Compare the PCP of each group of parts, percent, mean over the actors; NaN where undefined.
+
+    Args:
+        real: scores of the recording of F frames.
+        twins: scores of the twins.
+        actors: indices of the S actors whose PCP is averaged.
+        weights: bootstrap weights of the recording's frames, (R, F).
+    """
+    counts, *of_twins = (_part_counts(each, actors) for each in (real, *twins))
+    values, drawn = _pcp_of_parts(counts.sum(axis=0)), _pcp_of_parts(resampled(counts, weights))
+    simulated = np.array([_pcp_of_parts(each.sum(axis=0)) for each in of_twins])
+    return {group: compared(float(values[k]), drawn[:, k], simulated[:, k].tolist()) for k, group in enumerate(GROUPS)}
+
+
+def _part_counts(scores: FrameScores, actors: Sequence[int]) -> Floats:
+    """Return the numbers of correct and of defined parts of each group, (F, 2, G, S)."""
+    groups = [scores.parts[:, list(actors)][..., list(index)] for index in GROUPS.values()]
+    return np.stack(
+        [
+            np.stack([counted.sum(axis=-1, dtype=float) for counted in of], axis=1)
+            for of in ([each == Part.CORRECT for each in groups], [each != Part.UNDEFINED for each in groups])
+        ],
+        axis=1,
+    )
+
+
+def _pcp_of_parts(counts: Floats) -> Floats:
+    """Return the PCP of each group, percent (..., G), from the numbers of parts, (..., 2, G, S)."""
+    return mean_known(100.0 * safe_ratio(counts[..., 0, :, :], counts[..., 1, :, :]))
 
 
 _FILLED = RULES[2]
@@ -136,6 +165,8 @@ class DoseResponse:
     """Its level."""
     variant: str
     """The variant."""
+    pcp: Compared
+    """PCP with the treatment, percent."""
     loss: Compared
     """PCP without the treatment minus PCP with it, points."""
     loss_filled: Compared
@@ -146,15 +177,18 @@ class DoseResponse:
     """Recall without the treatment minus with it, 0 to 1."""
     mpjpe: Compared
     """MPJPE with the treatment minus without, mm."""
-    draws: Floats
-    """Loss of each of n draws, in reality and, mean over twins, in simulation, (2, n), points."""
-    resamples: Floats
-    """Loss of each draw in R bootstrap resamples of reality, (R, n), points."""
+    losses: tuple[Compared, ...]
+    """Loss of each of n draws."""
+
+    @property
+    def draws(self) -> Floats:
+        """Loss of each draw, in reality and, mean over twins, in simulation, (2, n), points."""
+        return np.array([[each.real.mean, each.twin.mean] for each in self.losses]).T
 
     @property
     def rank(self) -> Interval:
         """Spearman's correlation of the losses of reality and of twins over the draws; NaN for fewer than three."""
-        return rank_correlation(*self.draws, resamples=self.resamples)
+        return ranked(self.losses)
 
 
 def compare_responses(evidence: Evidence, variants: Sequence[str]) -> list[DoseResponse]:
@@ -177,20 +211,24 @@ def _response(evidence: Evidence, treatments: Sequence[Treatment], variant: str)
     def change(score: Callable[[ScoreSums, HeadRule], Floats], sign: float, rule: HeadRule = DEFAULT_RULE) -> Compared:
         return evidence.compare(_mean([_change(each, variant, score, sign, rule) for each in treatments]))
 
-    losses = [_change(each, variant, ScoreSums.pcp, -1.0, DEFAULT_RULE) for each in treatments]
-    twins = [[float(loss(twin)) for twin in evidence.twins] for loss in losses]
     return DoseResponse(
         kind=first.kind,
         level=first.level,
         variant=variant,
+        pcp=evidence.compare(_mean([_treated(each, variant) for each in treatments])),
         loss=change(ScoreSums.pcp, -1.0),
         loss_filled=change(ScoreSums.pcp, -1.0, _FILLED),
         ghosts=change(ScoreSums.ghosts, 1.0),
         recall=change(ScoreSums.recall, -1.0),
         mpjpe=change(ScoreSums.mpjpe, 1.0),
-        draws=np.array([[float(loss(evidence.real)) for loss in losses], np.mean(twins, axis=1)]),
-        resamples=np.stack([np.asarray(loss(evidence.resamples)) for loss in losses], axis=-1),
+        losses=tuple(
+            evidence.compare(_change(each, variant, ScoreSums.pcp, -1.0, DEFAULT_RULE)) for each in treatments
+        ),
     )
+
+
+def _treated(treatment: Treatment, variant: str) -> Figure:
+    return lambda sums: sums[treatment][variant].pcp(DEFAULT_RULE)
 
 
 def _change(
@@ -257,8 +295,8 @@ class SubsetComparison:
     """PCP of ``full`` minus that of ``fast``, points, by number of cameras."""
     sampled: tuple[int, ...]
     """Camera counts of which only a sample of the subsets was tried."""
-    single: Mapping[str, Mapping[tuple[int, ...], tuple[float, float]]]
-    """PCP of each subset by variant: the recording's and the mean of the twins'."""
+    single: Mapping[str, Mapping[tuple[int, ...], Compared]]
+    """PCP of each subset by variant, percent."""
     ranks: Mapping[str, Interval]
     """Spearman's correlation of reality and twins over the pairs of cameras, by variant."""
 
@@ -282,22 +320,21 @@ def compare_subsets(
         count: evidence.compare(_difference(_point("full", count, rule), _point("fast", count, rule)))
         for count in (sorted(tried) if {"full", "fast"} <= set(variants) else ())
     }
-    single: dict[str, dict[tuple[int, ...], tuple[float, float]]] = {}
-    ranks: dict[str, Interval] = {}
-    for name in variants:
-        real, resamples, *twins = (
-            subset_scores(each, name, rule=rule) for each in (evidence.real, evidence.resamples, *evidence.twins)
-        )
-        single[name] = {
-            views: (float(pcp), float(np.mean([twin[views] for twin in twins]))) for views, pcp in real.items()
+    single = {
+        name: {
+            change.views: evidence.compare(_of_subset(change, name, rule))
+            for change in evidence.real
+            if isinstance(change, CameraSubset)
         }
-        pairs = [views for views in real if len(views) == 2]
-        ranks[name] = rank_correlation(
-            *zip(*(single[name][views] for views in pairs), strict=True),
-            resamples=np.stack([resamples[views] for views in pairs], axis=-1),
-        )
+        for name in variants
+    }
+    ranks = {name: ranked([each for views, each in of.items() if len(views) == 2]) for name, of in single.items()}
     sampled = tuple(count for count, number in sorted(tried.items()) if number < math.comb(cameras, count))
     return SubsetComparison(curves, gains, sampled, single, ranks)
+
+
+def _of_subset(change: CameraSubset, variant: str, rule: HeadRule) -> Figure:
+    return lambda sums: sums[change][variant].pcp(rule)
 
 
 def _point(variant: str, count: int, rule: HeadRule) -> Figure:

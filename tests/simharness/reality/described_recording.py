@@ -25,7 +25,7 @@ def describe(recording, folder, *, name):
     detections = {"format": "coco", "path": f"{name}_detections", "skeleton": COCO17.name, "kind": "bottom-up"}
     keys = {
         "name": name,
-        "rate": 25.0,
+        "rate": recording.rate,
         "frames": [[0, len(recording) - 1]],
         "calibration": {"file": f"{name}_cameras.json", "size": [1032, 776]},
         "detections": detections,

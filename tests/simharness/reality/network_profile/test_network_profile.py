@@ -217,10 +217,10 @@ def test_the_same_detector_holds_and_another_fails(filmed):
     ("low", "high", "verdict"),
     [
         (-1.9, 1.9, "holds"),
-        (-1.0, 2.1, "unclear"),
+        (-1.0, 2.1, "cannot tell"),
         (2.1, 3.0, "fails"),
         (-5.0, -2.1, "fails"),
-        (-3.0, 3.0, "unclear"),
+        (-3.0, 3.0, "cannot tell"),
     ],
 )
 def test_a_verdict_is_about_the_whole_interval(low, high, verdict):
