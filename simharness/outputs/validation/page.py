@@ -6,11 +6,9 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from mvpose import SHELF14
 from mvpose.report.documents import fill_template
 from simharness.outputs import TEMPLATES
 from simharness.outputs.validation import plots, tables
-from simharness.reality.validation.detection_figures import AFFINITY_EDGES, AMBIGUOUS
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.skill import ALL
 from simharness.reality.validation.treatments import KINDS
@@ -73,9 +71,7 @@ def render_validation(validation: Validation, *, provenance: Mapping[str, Any], 
         plots={key: Markup(svg) for key, svg in _plots(validation).items()},
         curves=[(name, Markup(svg)) for name, svg in _subset_plots(validation)],
         responses=[(title, Markup(svg)) for title, svg in _response_plots(validation)],
-        draws=[(title, ranks, Markup(svg)) for title, ranks, svg in _draw_plots(validation)],
         subset_ranks=_ranks({name: rank.mean for name, rank in validation.subsets.ranks.items()}),
-        joints=validation.joints,
         bounds=BOUNDS,
         command=provenance.get("command") or "",
         provenance=provenance_sentence(provenance),
@@ -97,9 +93,8 @@ def _facts(validation: Validation) -> list[tuple[str, str]]:
 def _cards(validation: Validation) -> list[dict[str, str]]:
     """Return the headline numbers: errors of the forecasts and their skill, all cameras, and verdicts by state."""
     states = [verdict.state for verdict in validation.verdicts]
-    of_variants = [
-        abs(scores["pcp"][rule].difference) for scores in validation.variants.values() for rule in tables.PUBLISHED
-    ]
+    scores = [of["pcp"] for of in validation.whole.variants.values()]
+    of_variants = [abs(pcp[rule].difference) for pcp in scores for rule in tables.PUBLISHED]
     cards = [
         {
             "title": "All cameras",
@@ -140,7 +135,7 @@ def _points(validation: Validation) -> dict[str, dict[str, list[tuple[float, flo
     result: dict[str, dict[str, list[tuple[float, float]]]] = {
         "all cameras": {
             name: [(pcp[rule].real.mean, pcp[rule].twin.mean) for rule in tables.PUBLISHED]
-            for name, pcp in ((name, validation.variants[name]["pcp"]) for name in names)
+            for name, pcp in ((name, validation.whole.variants[name]["pcp"]) for name in names)
         }
     }
     most = max(validation.subsets.curves)
@@ -166,22 +161,13 @@ def _plots(validation: Validation) -> dict[str, str]:
     shades = plots.colors(validation.plan.variants)
     drawn = {
         "agreement": plots.agreement(_points(validation), shades, name="agreement"),
-        "joints": plots.joint_errors(validation.joints, SHELF14.joints, name="joints"),
+        "parts": plots.part_differences(validation.whole.parts, shades, name="parts"),
         "ratios": plots.ratios(_ratios(validation), name="ratios"),
     }
     if validation.responses:
         drawn["losses"] = plots.losses(validation.responses, shades, name="losses")
-    pairs = {
-        name: np.array([(each.real.mean, each.twin.mean) for views, each in of.items() if len(views) == 2])
-        .reshape(-1, 2)
-        .T
-        for name, of in validation.subsets.single.items()
-    }
-    drawn["pairs"] = plots.scatter(pairs, shades, name="pairs", what="PCP, %")
     if validation.subsets.gains:
         drawn["gains"] = plots.gains(validation.subsets, name="gains")
-    for key, (real, twin) in validation.affinities.items():
-        drawn[f"affinity_{key}"] = plots.histogram(AFFINITY_EDGES, real, twin, name=f"affinity-{key}", limit=AMBIGUOUS)
     return drawn
 
 
@@ -189,7 +175,7 @@ def _ratios(validation: Validation) -> dict[str, tuple[Compared, tuple[float, fl
     """Return the measurements whose ratio says something, with the accepted range."""
     shown: dict[str, tuple[Compared, tuple[float, float] | None]] = {}
     for key in _RATIOS:
-        figure = validation.measured[key]
+        figure = validation.whole.measured[key]
         if not (np.isfinite(figure.real.mean) and figure.real.mean > 0 and np.isfinite(figure.twin.mean)):
             continue
         accepted = None
@@ -226,20 +212,6 @@ def _response_plots(validation: Validation) -> list[tuple[str, str]]:
         for kind in dict.fromkeys(each.kind for each in validation.responses)
     }
     return [(KINDS[kind].title, plots.response(of, shades, name=f"dose-{kind}")) for kind, of in by_kind.items()]
-
-
-def _draw_plots(validation: Validation) -> list[tuple[str, str, str]]:
-    """Return title, rank correlations and plot of each kind of calibration errors, at its highest level."""
-    shades = plots.colors(validation.plan.variants)
-    drawn = []
-    for kind in dict.fromkeys(each.kind for each in validation.responses if KINDS[each.kind].calibration):
-        highest = max(each.level for each in validation.responses if each.kind == kind)
-        of = [each for each in validation.responses if each.kind == kind and each.level == highest]
-        title = f"{KINDS[kind].title}, {tables.level_text(kind, highest)}"
-        pairs = {each.variant: each.draws for each in of}
-        svg = plots.scatter(pairs, shades, name=f"draws-{kind}", what="loss, points", wide=True)
-        drawn.append((title, _ranks({each.variant: each.rank.mean for each in of}), svg))
-    return drawn
 
 
 def _ranks(ranks: Mapping[str, float]) -> str:

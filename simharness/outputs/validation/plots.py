@@ -7,11 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from mvpose.arrays import Floats
-from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
+from mvpose.report.svg_plots import FAINT, INK, VARIANT_COLORS, Color, legend_above, svg_plot
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.treatments import KINDS
-from simharness.reality.validation.variant_comparison import DoseResponse, JointDifficulty, SubsetComparison
+from simharness.reality.validation.variant_comparison import DoseResponse, SubsetComparison
 from simharness.reality.validation.verdicts import BOUNDS
 
 REAL_COLOR: Color = "#8b93a1"
@@ -19,7 +18,6 @@ TWIN_COLOR: Color = "#3b82c4"
 
 _SQUARE = (4.9, 4.6)
 _SMALL = (3.6, 2.6)
-_WIDE = (4.9, 2.7)
 _BAND = 0.10  # opacity of accepted ranges
 _DASHED = (0, (4, 2))
 
@@ -136,77 +134,23 @@ def response(responses: Sequence[DoseResponse], variants: Mapping[str, Color], *
     return written[0]
 
 
-def scatter(
-    pairs: Mapping[str, Floats], variants: Mapping[str, Color], *, name: str, what: str, wide: bool = False
-) -> str:
-    """Plot predicted against measured numbers with the identity.
-
-    Args:
-        pairs: numbers of reality and of twins by variant, (2, n).
-        variants: colour of each variant.
-        name: different from the name of every other plot on the page.
-        what: name and unit of the numbers.
-        wide: whether the plot has half of the page, else a third.
-    """
-    with svg_plot(name, size=_WIDE if wide else _SMALL) as (axes, written):
-        for variant, values in pairs.items():
-            axes.plot(*values, "o", color=variants[variant], ms=4.4, alpha=0.75, mew=0, ls="", zorder=3)
-        both = np.concatenate([values.ravel() for values in pairs.values()])
-        ends = [np.nanmin(both), np.nanmax(both)]
-        axes.plot(ends, ends, color=FAINT, lw=0.9, zorder=2)
-        axes.set(xlabel=f"measured {what}", ylabel="simulated")
-        axes.grid()
-    return written[0]
-
-
-def joint_errors(joints: JointDifficulty, names: Sequence[str], *, name: str) -> str:
-    """Plot the mean error of every joint, in reality and in twins."""
-    with svg_plot(name, size=(4.9, 0.9 + 0.24 * len(names))) as (axes, written):
-        rows = np.arange(len(names))
-        axes.hlines(rows, joints.real_mm, joints.twin_mm, color=LINE, lw=2.2, zorder=2)
-        axes.plot(joints.real_mm, rows, "o", color=REAL_COLOR, ms=5, label="measured", zorder=3)
-        axes.plot(joints.twin_mm, rows, "o", color=TWIN_COLOR, ms=5, label="simulated", zorder=3)
-        axes.set_yticks(rows, [each.replace("_", " ") for each in names])
+def part_differences(parts: Mapping[str, Mapping[str, Compared]], variants: Mapping[str, Color], *, name: str) -> str:
+    """Plot simulated less measured PCP of each part of the body and variant, with intervals and the accepted range."""
+    groups = list(next(iter(parts.values())))
+    with svg_plot(name, size=(4.9, 0.9 + 0.5 * len(groups))) as (axes, written):
+        axes.axvspan(-BOUNDS.parts, BOUNDS.parts, color=FAINT, alpha=_BAND, lw=0, zorder=1)
+        for index, (variant, color) in enumerate(variants.items()):
+            figures = [parts[variant][group] for group in groups]
+            rows = np.arange(len(groups)) + 0.7 * ((index + 0.5) / len(variants) - 0.5)
+            ends = np.array([each.difference + np.array([-1, 1]) * each.uncertainty for each in figures])
+            axes.hlines(rows, *ends.T, color=color, lw=1.4, alpha=0.5, zorder=2)
+            axes.plot([each.difference for each in figures], rows, "o", color=color, ms=4.4, label=variant, zorder=3)
+        axes.set_yticks(np.arange(len(groups)), [group.replace("_", " ") for group in groups])
         axes.tick_params(axis="y", length=0, labelcolor=INK)
-        axes.set(xlabel="mean error, mm")
-        axes.set_xlim(0, None)
+        axes.set(xlabel="PCP, simulated − measured, points")
         axes.invert_yaxis()
         axes.grid(axis="x")
-        legend_above(axes, columns=2)
-    return written[0]
-
-
-def histogram(edges: Floats, real: Floats, twin: Floats, *, name: str, limit: float) -> str:
-    """Plot two distributions over the same bins; shares of the pairs on a logarithmic axis.
-
-    Args:
-        edges: edges of the bins, (n + 1,).
-        real: share of each bin in reality, (n,).
-        twin: the same in twins, (n,).
-        name: different from the name of every other plot on the page.
-        limit: value that is marked by a line.
-    """
-    floor = 3e-4  # smaller shares are a few pairs
-    with svg_plot(name, size=_WIDE) as (axes, written):
-        axes.stairs(
-            np.maximum(real, floor),
-            edges,
-            baseline=floor,
-            fill=True,
-            color=REAL_COLOR,
-            alpha=0.45,
-            lw=0,
-            label="measured",
-        )
-        axes.stairs(np.maximum(twin, floor), edges, baseline=floor, color=TWIN_COLOR, lw=1.8, label="simulated")
-        axes.axvline(limit, color=FAINT, lw=0.9, ls=(0, (4, 3)))
-        axes.set_yscale("log")
-        axes.set(xlabel="affinity", ylabel="share of pairs, %", xlim=(edges[0], edges[-1]), ylim=(floor, 1.3))
-        axes.yaxis.set_major_locator(FixedLocator([0.001, 0.01, 0.1, 1.0]))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{100 * tick:g}"))
-        axes.yaxis.set_minor_locator(NullLocator())
-        axes.grid(axis="y")
-        legend_above(axes, columns=2)
+        legend_above(axes, columns=4)
     return written[0]
 
 

@@ -140,7 +140,7 @@ def variant_rows(validation: Validation) -> list[tuple[str, list[ComparedCells]]
     """Return a row for each variant: PCP by both head rules, and MPJPE."""
     return [
         (name, [*(cells(scores["pcp"][rule], 1) for rule in PUBLISHED), cells(scores["mpjpe_mm"][PUBLISHED[0]], 1)])
-        for name, scores in validation.variants.items()
+        for name, scores in validation.whole.variants.items()
     ]
 
 
@@ -155,7 +155,7 @@ def people_rows(validation: Validation) -> list[tuple[str, list[ComparedCells]]]
                 *(cells(scores[key][first], 1, factor=100.0) for key in ("recall", "precision")),
             ],
         )
-        for name, scores in validation.variants.items()
+        for name, scores in validation.whole.variants.items()
     ]
 
 
@@ -163,7 +163,7 @@ def contrast_rows(validation: Validation) -> list[tuple[str, list[ComparedCells]
     """Return a row for each pair of variants: the difference of PCP by every rule for the head."""
     return [
         (f"{one} − {other}", [cells(figures[rule], 1) for rule in (*PUBLISHED, RULES[2])])
-        for (one, other), figures in validation.contrasts.items()
+        for (one, other), figures in validation.whole.contrasts.items()
     ]
 
 
@@ -241,11 +241,11 @@ def cancelling_parts(validation: Validation) -> list[str]:
     Parts cancel where one is too high by more than the bound and another too low by more than half of it.
     """
     sentences = []
-    for name, groups in validation.parts.items():
+    for name, groups in validation.whole.parts.items():
         apart = {key.replace("_", " "): each.difference for key, each in groups.items() if np.isfinite(each.difference)}
         high, low = max(apart, key=apart.__getitem__, default=""), min(apart, key=apart.__getitem__, default="")
         if high and max(apart[high], -apart[low]) > BOUNDS.parts and min(apart[high], -apart[low]) > BOUNDS.parts / 2:
-            total = signed(validation.variants[name]["pcp"][PUBLISHED[0]].difference, 1)
+            total = signed(validation.whole.variants[name]["pcp"][PUBLISHED[0]].difference, 1)
             sentences.append(
                 f"{name}: {high} {signed(apart[high], 1)}, {low} {signed(apart[low], 1)}, which the PCP of the whole "
                 f"body ({total}) does not show"
@@ -272,7 +272,7 @@ def level_text(kind: str, level: float) -> str:
 def measurement_rows(validation: Validation) -> list[tuple[str, ComparedCells]]:
     """Return a row for each measurement of the detections that the recording has."""
     rows = []
-    for key, figure in validation.measured.items():
+    for key, figure in validation.whole.measured.items():
         if np.isfinite(figure.real.mean):
             title = measurement_title(key)
             percent = title.endswith(", %")

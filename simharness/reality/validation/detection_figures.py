@@ -39,9 +39,6 @@ BONES = {
 }
 """Joints of COCO-17 at the ends of each bone, on both sides."""
 
-AFFINITY_EDGES = np.linspace(0.0, 1.0, 21)
-"""Edges of the histograms of affinities."""
-
 AMBIGUOUS = 0.5
 """Affinity from which the method may match two detections."""
 
@@ -70,8 +67,6 @@ class DetectionFigures:
     where unknown. In the order of :data:`BONES`."""
     true_bones: Floats
     """The same from the truth."""
-    affinities: Mapping[str, Floats]
-    """Histograms over :data:`AFFINITY_EDGES` of pairs of the "same" and of "different" people; each sums to 1."""
     scores: tuple[float, ...]
     """10, 50 and 90 % quantiles of the scores of reported limb joints."""
 
@@ -111,8 +106,6 @@ class ShownPeople:
 def measure_detections(recording: AnnotatedRecording) -> DetectionFigures:
     """Measure the detections of a recording; see :class:`DetectionFigures`."""
     shown = shown_people(recording)
-    affinities = _affinities(shown)
-    counts = {key: np.histogram(np.concatenate(each), AFFINITY_EDGES)[0] for key, each in affinities.items()}
     reported = shown.association.scores[..., LIMB_JOINTS]
     reported = reported[reported > 0]
     unit = oks_units(person_boxes(shown.reference, recording.rig))
@@ -121,10 +114,9 @@ def measure_detections(recording: AnnotatedRecording) -> DetectionFigures:
         recording.rig, shown.association.keypoints, unit, shown.reference, step == step.min(initial=10**9)
     )
     return DetectionFigures(
-        ratios={**_ambiguity(affinities), **_hidden(shown), **_missing(shown), **_people(shown), **apart},
+        ratios={**_ambiguity(_affinities(shown)), **_hidden(shown), **_missing(shown), **_people(shown), **apart},
         bones=_bone_lengths(np.where(shown.annotated[..., None, None], shown.triangulated, np.nan)),
         true_bones=_bone_lengths(shown.reference),
-        affinities={key: each / max(1, each.sum()) for key, each in counts.items()},
         scores=tuple(float(np.quantile(reported, q)) if reported.size else float("nan") for q in _SCORE_QUANTILES),
     )
 

@@ -15,36 +15,31 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.twin import TwinModel, detected_twin, simulate_twins
 from simharness.reality.validation import variant_comparison
-from simharness.reality.validation.detection_figures import DetectionFigures, compare_detections, measure_detections
-from simharness.reality.validation.evidence import Compared, Evidence, compared, frame_weights
+from simharness.reality.validation.evidence import Evidence
 from simharness.reality.validation.input_checks import check_recording
 from simharness.reality.validation.passes import (
     VARIANTS,
     CameraSubset,
     RecordingChange,
-    ScoreSums,
-    Tallies,
     Unchanged,
     annotated,
     run_passes,
-    score_recordings,
 )
 from simharness.reality.validation.skill import Agreement, Forecasts, Skill, agreements, forecast_groups, skills
 from simharness.reality.validation.treatments import treatments
-from simharness.reality.validation.twin_distance import TwinDistance, measure_distance
+from simharness.reality.validation.twin_distance import TwinDistance
 from simharness.reality.validation.verdicts import (
     BOUNDS,
     PREDICTION_BOUNDS,
     Bounds,
     BoundVerdict,
     VerdictState,
-    judge_measurements,
     judge_responses,
-    judge_scores,
     judge_subsets,
 )
+from simharness.reality.validation.whole_comparison import WholeComparison, compare_whole, measure_recordings
 from simharness.scenario.presets import read_profile
-from simharness.scoring.frame_scores import RULES, ByRule, HeadRule
+from simharness.scoring.frame_scores import RULES
 
 
 @dataclass(frozen=True)
@@ -84,18 +79,10 @@ class Validation:
     """Number of frames of a twin, mean."""
     plan: ValidationPlan
     """Extent."""
-    variants: Mapping[str, Mapping[str, Mapping[HeadRule, Compared]]]
-    """Scores by variant, key and rule for the head."""
-    medians: Mapping[str, Compared]
-    """Median MPJPE by variant, mm."""
-    parts: Mapping[str, Mapping[str, Compared]]
-    """PCP of each group of parts by variant."""
-    contrasts: Mapping[tuple[str, str], Mapping[HeadRule, Compared]]
-    """Differences of PCP by pair of variants and rule."""
+    whole: WholeComparison
+    """Comparison with all cameras."""
     subsets: variant_comparison.SubsetComparison
     """PCP with some of the cameras, missing joints of the face filled from the others."""
-    subsets_as_is: variant_comparison.SubsetComparison
-    """The same as the method left them."""
     responses: Sequence[variant_comparison.DoseResponse]
     """Losses by treatment, level and variant."""
     forecasts: Mapping[str, Mapping[str, Forecasts]]
@@ -106,12 +93,6 @@ class Validation:
     """Correlations and rank violations over all conditions, by variant."""
     distance: TwinDistance
     """Distance of the recording from the twins over all figures at once."""
-    joints: variant_comparison.JointDifficulty
-    """Errors by joint, of the first variant."""
-    measured: Mapping[str, Compared]
-    """Measurements of the detections."""
-    affinities: Mapping[str, tuple[np.ndarray, np.ndarray]]
-    """Histograms of affinities, of the recording and mean of the twins."""
     verdicts: Sequence[BoundVerdict] = field(default=())
     """Verdicts."""
 
@@ -152,19 +133,13 @@ def validate(
     whole = [annotated(twin, every=plan.every) for twin in twins]
     thinned = [annotated(twin, every=plan.twin_every) for twin in twins]
 
-    with reporter.stage("scores", 1 + len(whole)) as advance:
-        scores = score_recordings([real, *whole], variants=plan.variants, workers=plan.workers, progress=advance)
-    for twin, of_twin in zip(twins, scores[1:], strict=True):
-        if not any(by_rule[RULES[0]].found.any() for by_rule in of_twin.values()):
+    measured = measure_recordings([real, *whole], variants=plan.variants, workers=plan.workers, reporter=reporter)
+    for twin in measured[1:]:
+        if not any(by_rule[RULES[0]].found.any() for by_rule in twin.scores.values()):
             raise RunError(
-                f"{twin.name}: expected a twin in which the method finds people, got nobody in {len(twin)} frames: "
-                "nothing can be compared; look at the fit with simharness fit-detector"
+                f"{twin.recording.name}: expected a twin in which the method finds people, got nobody in "
+                f"{len(twin.recording)} frames: nothing can be compared; look at the fit with simharness fit-detector"
             )
-    with reporter.stage("measurements", 1 + len(whole)) as advance:
-        measurements = []
-        for each in (real, *whole):
-            measurements.append(measure_detections(each))
-            advance(1)
     changes: list[RecordingChange] = [Unchanged(), *map(CameraSubset, variant_comparison.camera_subsets(len(real.rig)))]
     changes += treatments(draws=plan.draws, detection_draws=plan.detection_draws) if plan.treated else ()
     rivals = [] if profile is None else [annotated(profile, every=plan.twin_every)]
@@ -172,7 +147,28 @@ def validate(
     with reporter.stage("subsets and treatments", len(changes) * len(given)) as advance:
         passes = run_passes(given, changes, variants=plan.variants, workers=plan.workers, progress=advance)
     evidence = Evidence.of_tallies(real, passes[0], passes[1 + len(rivals) :], passes[1] if rivals else None)
-    return _compare(real, whole, plan, bounds, scores, measurements, evidence, other)
+    compared = compare_whole(measured[0], measured[1:])
+    subsets = variant_comparison.compare_subsets(evidence, len(real.rig), plan.variants)
+    responses = variant_comparison.compare_responses(evidence, plan.variants)
+    forecasts = forecast_groups(subsets, responses, plan.variants, other=other)
+    return Validation(
+        recording=real,
+        twins=len(twins),
+        twin_frames=float(np.mean([len(twin) for twin in whole])),
+        plan=plan,
+        whole=compared,
+        subsets=subsets,
+        responses=responses,
+        forecasts=forecasts,
+        skills=skills(forecasts),
+        agreements=agreements(subsets, responses, plan.variants),
+        distance=compared.distance,
+        verdicts=[
+            *compared.verdicts(real.kind, bounds),
+            *judge_subsets(subsets, bounds),
+            *judge_responses(responses, bounds),
+        ],
+    )
 
 
 def _check(recording: AnnotatedRecording, twins: Sequence[AnnotatedRecording]) -> None:
@@ -185,83 +181,6 @@ def _check(recording: AnnotatedRecording, twins: Sequence[AnnotatedRecording]) -
                 f"got {len(each.rig)}"
             )
         check_recording(each)
-
-
-def _compare(
-    real: AnnotatedRecording,
-    twins: Sequence[AnnotatedRecording],
-    plan: ValidationPlan,
-    bounds: Bounds,
-    scores: Sequence[Mapping[str, ByRule]],
-    measurements: Sequence[DetectionFigures],
-    evidence: Evidence,
-    other: Mapping[str, float] | None,
-) -> Validation:
-    """Return the comparison, from the scores, the measurements and the passes of all recordings."""
-    everyone = (real, *twins)
-    tallies: list[dict[RecordingChange, Tallies]] = [
-        {Unchanged(): {name: ScoreSums.of_scores(of, each.scored) for name, of in variants.items()}}
-        for each, variants in zip(everyone, scores, strict=True)
-    ]
-    whole = Evidence.of_tallies(real, tallies[0], tallies[1:])
-    variants = variant_comparison.compare_variants(whole, plan.variants)
-    contrasts = variant_comparison.compare_contrasts(whole, plan.variants)
-    cameras = len(real.rig)
-    subsets = variant_comparison.compare_subsets(evidence, cameras, plan.variants)
-    responses = variant_comparison.compare_responses(evidence, plan.variants)
-    weights = frame_weights(real)
-    measured = compare_detections(measurements[0], measurements[1:], weights)
-    parts = {
-        name: variant_comparison.compare_parts(
-            scores[0][name][RULES[0]], [each[name][RULES[0]] for each in scores[1:]], real.scored, weights
-        )
-        for name in plan.variants
-    }
-    forecasts = forecast_groups(subsets, responses, plan.variants, other=other)
-    every = {f"pcp.{name}": of["pcp"][RULES[0]] for name, of in variants.items()} | {
-        f"parts.{name}.{group}": figure for name, of in parts.items() for group, figure in of.items()
-    }
-    verdicts = [
-        *judge_scores(variants, parts, contrasts, bounds),
-        *judge_subsets(subsets, bounds),
-        *judge_responses(responses, bounds),
-        *judge_measurements(measured, real.kind, bounds),
-    ]
-    first = plan.variants[0]
-    return Validation(
-        recording=real,
-        twins=len(twins),
-        twin_frames=float(np.mean([len(twin) for twin in twins])),
-        plan=plan,
-        variants=variants,
-        medians={
-            name: _plain([variant_comparison.median_error(each[name][RULES[0]]) for each in scores])
-            for name in plan.variants
-        },
-        parts=parts,
-        contrasts=contrasts,
-        subsets=subsets,
-        subsets_as_is=variant_comparison.compare_subsets(evidence, cameras, plan.variants, rule=RULES[0]),
-        responses=responses,
-        forecasts=forecasts,
-        skills=skills(forecasts),
-        agreements=agreements(subsets, responses, plan.variants),
-        distance=measure_distance(measured | every),
-        joints=variant_comparison.compare_joints(
-            scores[0][first][RULES[0]], [each[first][RULES[0]] for each in scores[1:]]
-        ),
-        measured=measured,
-        affinities={
-            key: (real_shares, np.mean([each.affinities[key] for each in measurements[1:]], axis=0))
-            for key, real_shares in measurements[0].affinities.items()
-        },
-        verdicts=verdicts,
-    )
-
-
-def _plain(values: Sequence[float]) -> Compared:
-    """Return a figure of the recording (first) and its twins, without an interval of the recording."""
-    return compared(values[0], np.nan, values[1:])
 
 
 _HALVES = ("first half", "second half")

@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mvpose import SHELF14
-from simharness.reality.validation.detection_figures import AFFINITY_EDGES
 from simharness.reality.validation.evidence import Compared, number
 from simharness.reality.validation.validation import HalfPrediction, Validation
 from simharness.reality.validation.variant_comparison import SCORES, DoseResponse, SubsetComparison
@@ -43,12 +41,12 @@ def summarize_validation(validation: Validation) -> dict[str, Any]:
         "skill": [each.summary() for each in validation.skills],
         "agreement": {each.variant: each.summary() for each in validation.agreements},
         "distance": validation.distance.summary(),
-        "variants": {name: _variant(validation, name) for name in validation.variants},
+        "variants": {name: _variant(validation, name) for name in validation.whole.variants},
         "contrasts": {
             f"{one} - {other}": {str(rule): figure.summary() for rule, figure in figures.items()}
-            for (one, other), figures in validation.contrasts.items()
+            for (one, other), figures in validation.whole.contrasts.items()
         },
-        "subsets": _subsets(validation.subsets, validation.subsets_as_is),
+        "subsets": _subsets(validation.subsets),
         "subset_rank": {name: _rank(rank) for name, rank in validation.subsets.ranks.items()},
         "subset_samples": list(validation.subsets.sampled),
         "single_subsets": {
@@ -56,21 +54,7 @@ def summarize_validation(validation: Validation) -> dict[str, Any]:
             for name, of in validation.subsets.single.items()
         },
         "dose": _dose(validation),
-        "joints": {
-            "names": list(SHELF14.joints),
-            "mpjpe_mm": {side: _numbers(getattr(validation.joints, f"{side}_mm")) for side in _SIDES},
-            "pck": {side: _numbers(getattr(validation.joints, f"{side}_pck")) for side in _SIDES},
-            "rank_correlation": number(validation.joints.rank_correlation),
-            "rank_correlation_pck": number(validation.joints.rank_correlation_pck),
-        },
-        "measurements": {key: figure.summary() for key, figure in validation.measured.items()},
-        "affinities": {
-            "edges": _numbers(AFFINITY_EDGES),
-            **{
-                key: dict(zip(_SIDES, map(_numbers, shares), strict=True))
-                for key, shares in validation.affinities.items()
-            },
-        },
+        "measurements": {key: figure.summary() for key, figure in validation.whole.measured.items()},
     }
 
 
@@ -98,15 +82,14 @@ def _verdict(verdict: BoundVerdict) -> dict[str, Any]:
 
 
 def _variant(validation: Validation, name: str) -> dict[str, Any]:
-    scores = validation.variants[name]
+    scores = validation.whole.variants[name]
     result: dict[str, Any] = {}
     for side in _SIDES:
         result[side] = {
             key: {str(rule): number(getattr(scores[key][rule], side).mean) for rule in RULES} for key in SCORES
         }
-        result[side]["mpjpe_median_mm"] = number(getattr(validation.medians[name], side).mean)
         result[side]["pcp_parts"] = {
-            group: number(getattr(figure, side).mean) for group, figure in validation.parts[name].items()
+            group: number(getattr(figure, side).mean) for group, figure in validation.whole.parts[name].items()
         }
         result[f"{side}_interval"] = {key: _intervals(scores[key], side) for key in SCORES}
     result["difference"] = {key: {str(rule): number(scores[key][rule].difference) for rule in RULES} for key in SCORES}
@@ -118,14 +101,12 @@ def _intervals(figures: Mapping[HeadRule, Compared], side: str) -> dict[str, lis
     return {str(rule): [number(each.low), number(each.high)] for rule, each in ends.items()}
 
 
-def _subsets(filled: SubsetComparison, as_is: SubsetComparison) -> dict[str, Any]:
+def _subsets(subsets: SubsetComparison) -> dict[str, Any]:
     result: dict[str, Any] = {}
-    for count, curve in filled.curves.items():
-        result[str(count)] = {
-            name: {**figure.summary(), "as_is": as_is.curves[count][name].summary()} for name, figure in curve.items()
-        }
-        if count in filled.gains:
-            result[str(count)]["full - fast"] = filled.gains[count].summary()
+    for count, curve in subsets.curves.items():
+        result[str(count)] = {name: figure.summary() for name, figure in curve.items()}
+        if count in subsets.gains:
+            result[str(count)]["full - fast"] = subsets.gains[count].summary()
     return result
 
 
@@ -140,7 +121,6 @@ def _dose(validation: Validation) -> dict[str, Any]:
 def _response(response: DoseResponse) -> dict[str, Any]:
     return {
         **response.loss.summary(),
-        "filled": response.loss_filled.summary(),
         "ghosts_per_frame": response.ghosts.summary(),
         "recall": response.recall.summary(),
         "mpjpe_mm": response.mpjpe.summary(),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.reality.validation.evidence import Compared, Evidence, Figure, Sums, compared, rank_correlation, ranked
+from simharness.reality.validation.evidence import Compared, Evidence, Figure, Sums, compared, ranked
 from simharness.reality.validation.passes import (
     DEFAULT_RULE,
     CameraSubset,
@@ -23,7 +23,6 @@ from simharness.reality.validation.passes import (
 )
 from simharness.reality.validation.treatments import KINDS, Treatment
 from simharness.scoring.frame_scores import RULES, FrameScores, HeadRule
-from simharness.scoring.joint_errors import pck
 from simharness.scoring.pcp import GROUPS, Part
 from simharness.statistics.intervals import Interval
 from simharness.statistics.resampling import resampled
@@ -37,9 +36,6 @@ SCORES: Mapping[str, Callable[[ScoreSums, HeadRule], Floats]] = {
     "ghosts_per_frame": ScoreSums.ghosts,
 }
 """Scores of a variant by key: PCP in percent, recall and precision from 0 to 1."""
-
-PCK_LIMIT = 0.1
-"""Error within which a joint counts as correct in the joint difficulty, metres."""
 
 _UNCHANGED = Unchanged()
 
@@ -68,54 +64,6 @@ def _figure(score: Callable[[ScoreSums, HeadRule], Floats], variant: str, rule: 
 
 def _contrast(one: str, other: str, rule: HeadRule) -> Figure:
     return lambda sums: sums[_UNCHANGED][one].pcp(rule) - sums[_UNCHANGED][other].pcp(rule)
-
-
-@dataclass(frozen=True)
-class JointDifficulty:
-    """Errors of each of the 14 joints of SHELF14, in reality and in twins.
-
-    Attributes:
-        real_mm, twin_mm: mean error of the joint over pairs of people, (14,), mm.
-        real_pck, twin_pck: share of annotated joints with an error of at most 100 mm, (14,), percent.
-    """
-
-    real_mm: Floats
-    twin_mm: Floats
-    real_pck: Floats
-    twin_pck: Floats
-
-    @property
-    def rank_correlation(self) -> float:
-        """Spearman's correlation of the mean errors over joints."""
-        return rank_correlation(self.real_mm, self.twin_mm).mean
-
-    @property
-    def rank_correlation_pck(self) -> float:
-        """Spearman's correlation of the shares over joints."""
-        return rank_correlation(self.real_pck, self.twin_pck).mean
-
-
-def compare_joints(real: FrameScores, twins: Sequence[FrameScores]) -> JointDifficulty:
-    """Compare the errors of joints of one variant."""
-    of_twins = [_joint_errors(each) for each in twins]
-    real_mm, real_pck = _joint_errors(real)
-    twin_mm, twin_pck = (np.mean(each, axis=0) for each in zip(*of_twins, strict=True))
-    return JointDifficulty(real_mm, twin_mm, real_pck, twin_pck)
-
-
-def _joint_errors(scores: FrameScores) -> tuple[Floats, Floats]:
-    """Return the mean error, mm, and the share within :data:`PCK_LIMIT`, percent, of each joint, (14,)."""
-    errors = scores.errors.reshape(-1, scores.errors.shape[-1])
-    missed = (scores.present & ~scores.found).ravel()
-    counted = np.where(missed[:, None], np.inf, errors)
-    mean = [1000.0 * column[np.isfinite(column)].mean() if np.isfinite(column).any() else np.nan for column in errors.T]
-    return np.array(mean), np.array([pck(column, [PCK_LIMIT])[0] for column in counted.T])
-
-
-def median_error(scores: FrameScores) -> float:
-    """Return the median over pairs of the mean joint error, mm; NaN without a pair."""
-    means = scores.error[scores.found]
-    return float(1000.0 * np.median(means)) if len(means) else float("nan")
 
 
 def compare_parts(
@@ -152,9 +100,6 @@ def _pcp_of_parts(counts: Floats) -> Floats:
     return mean_known(100.0 * safe_ratio(counts[..., 0, :, :], counts[..., 1, :, :]))
 
 
-_FILLED = RULES[2]
-
-
 @dataclass(frozen=True)
 class DoseResponse:
     """What one treatment costs one variant; means over draws."""
@@ -169,8 +114,6 @@ class DoseResponse:
     """PCP with the treatment, percent."""
     loss: Compared
     """PCP without the treatment minus PCP with it, points."""
-    loss_filled: Compared
-    """The same with missing joints of the face filled from the others."""
     ghosts: Compared
     """Ghosts per frame with the treatment minus without."""
     recall: Compared
@@ -208,8 +151,8 @@ def compare_responses(evidence: Evidence, variants: Sequence[str]) -> list[DoseR
 def _response(evidence: Evidence, treatments: Sequence[Treatment], variant: str) -> DoseResponse:
     first = treatments[0]
 
-    def change(score: Callable[[ScoreSums, HeadRule], Floats], sign: float, rule: HeadRule = DEFAULT_RULE) -> Compared:
-        return evidence.compare(_mean([_change(each, variant, score, sign, rule) for each in treatments]))
+    def change(score: Callable[[ScoreSums, HeadRule], Floats], sign: float) -> Compared:
+        return evidence.compare(_mean([_change(each, variant, score, sign) for each in treatments]))
 
     return DoseResponse(
         kind=first.kind,
@@ -217,13 +160,10 @@ def _response(evidence: Evidence, treatments: Sequence[Treatment], variant: str)
         variant=variant,
         pcp=evidence.compare(_mean([_treated(each, variant) for each in treatments])),
         loss=change(ScoreSums.pcp, -1.0),
-        loss_filled=change(ScoreSums.pcp, -1.0, _FILLED),
         ghosts=change(ScoreSums.ghosts, 1.0),
         recall=change(ScoreSums.recall, -1.0),
         mpjpe=change(ScoreSums.mpjpe, 1.0),
-        losses=tuple(
-            evidence.compare(_change(each, variant, ScoreSums.pcp, -1.0, DEFAULT_RULE)) for each in treatments
-        ),
+        losses=tuple(evidence.compare(_change(each, variant, ScoreSums.pcp, -1.0)) for each in treatments),
     )
 
 
@@ -231,11 +171,11 @@ def _treated(treatment: Treatment, variant: str) -> Figure:
     return lambda sums: sums[treatment][variant].pcp(DEFAULT_RULE)
 
 
-def _change(
-    treatment: Treatment, variant: str, score: Callable[[ScoreSums, HeadRule], Floats], sign: float, rule: HeadRule
-) -> Figure:
+def _change(treatment: Treatment, variant: str, score: Callable[[ScoreSums, HeadRule], Floats], sign: float) -> Figure:
     """Return the figure of a score with the treatment minus without, times a sign."""
-    return lambda sums: sign * (score(sums[treatment][variant], rule) - score(sums[_UNCHANGED][variant], rule))
+    return lambda sums: (
+        sign * (score(sums[treatment][variant], DEFAULT_RULE) - score(sums[_UNCHANGED][variant], DEFAULT_RULE))
+    )
 
 
 def _mean(figures: Sequence[Figure]) -> Figure:

@@ -1,0 +1,1 @@
+"""Power of a validation: which wrong twins it notices."""
