@@ -50,8 +50,8 @@ def scattered(factor: float) -> WrongTwin:
 
 
 def turned(degrees: float) -> WrongTwin:
-    """Return twins whose calibration is turned by random angles of this deviation about each axis of each camera."""
-    return WrongTwin(recording=lambda twin, seed: Treatment("rotation", degrees, draw=seed)(twin))
+    """Return twins of a wrong rig: each camera is turned about each axis, by random angles of this deviation."""
+    return WrongTwin(recording=lambda twin, seed: Treatment("rotation", degrees)(twin))
 
 
 def _without_memory(detector: DetectorSection) -> DetectorSection:

@@ -106,7 +106,7 @@ def validate(
         for path in filter(None, (place / "validation.json", json_file)):
             write_json(summary, path)
     console = Console()
-    _print_skill(validation, console)
+    _print_skill(validation, recorded.name, console)
     _print_verdicts(validation.verdicts, recorded.name, console)
     console.print(f"report: {place / 'validation.html'}", soft_wrap=True, highlight=False, markup=False)
     if validation.failed:
@@ -118,7 +118,7 @@ def _check(folder: Path) -> None:
     check_place(folder / "validation.json", option="--out", mark=PROVENANCE)
 
 
-def _print_skill(validation: "Validation", console: Console) -> None:
+def _print_skill(validation: "Validation", name: str, console: Console) -> None:
     """Print the error of the forecasts, their skill, and whether the recording can be told from its twins."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
@@ -127,7 +127,7 @@ def _print_skill(validation: "Validation", console: Console) -> None:
 
     rivals, rows = skill_rows(validation)
     table = Table(
-        title=f"{validation.recording.name}: mean error of the forecasts, points of PCP, and skill against rivals",
+        title=f"{name}: mean error of the forecasts, points of PCP, and skill against rivals",
         title_justify="left",
         title_style="bold",
         box=SIMPLE_HEAD,

@@ -56,6 +56,7 @@ SHELF = (
     "simharness evaluate twin shelf FOLDER",
     "simharness fit-detector shelf FOLDER --out fitted.toml",
     "simharness validate shelf FOLDER",
+    "simharness validate shelf FOLDER --rival results/validation/OTHER/validation.json",
 )
 OWN_RECORDING = "simharness evaluate hall.toml"
 FROM_PICTURES = (  # run by tests/benchmarks/pictures and tests/simharness/reality/test_people_evaluation.py
@@ -132,6 +133,7 @@ MODULES = tuple(
 )
 REHEARSED_SHELF = "python -m benchmarks.planning.shelf_rehearsal FOLDER"  # five minutes, and the data of Shelf
 ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tracking/test_shelf_losses.py
+POWER = "python -m benchmarks.validation FOLDER"  # half an hour, and the data of Shelf; test_wrong_twins.py
 GALLERY = "python -m tools.gallery results/gallery"  # tests/tools/test_gallery.py; minutes of rendering
 # Without arguments these begin to bake the body.
 BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")
@@ -155,6 +157,7 @@ KNOWN = {
     *MODULES,
     REHEARSED_SHELF,
     ON_SHELF,
+    POWER,
     *BAKE,
     GALLERY,
     CI,

@@ -31,6 +31,7 @@ from simharness.cli import app
 from simharness.gate.baseline import Measurement
 from simharness.gate.compare import Comparison, GateResult
 from simharness.gate.trial_command import TrialKey
+from simharness.reality.validation.validation import SimulatedTwins
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.statistics.intervals import mean_interval
 from simharness.study.causes.cause_shares import Blame
@@ -144,6 +145,7 @@ ROWS = {
         "twins": Row("--twins 3"),
         "quick": Row("--quick"),
         "fit_on": Row("--fit-on {lab}/other.toml"),
+        "rival": Row("--rival {lab}/validation.json"),
         "split_half": Row("--split-half"),
         "out": RESULT["out"],
     },
@@ -278,7 +280,10 @@ def _stand_ins(study):
         "simharness.reality.twin": {"TwinModel.of_fit": (), "simulate_twins": ((),), "compare": compared},
         "simharness.cli.score_tables": {"print_twin_comparison": ()},
         "simharness.reality.validation.validation": {
-            "simulate_predictions": (), "validate": validated, "predict_halves": []
+            "simulate_predictions": SimulatedTwins([], None), "validate": validated, "predict_halves": []
+        },
+        "simharness.outputs.validation.tables": {
+            "skill_rows": ([], []), "distance_sentence": "", "cancelling_parts": []
         },
         "simharness.reality.validation.validation_summary": {"summarize_validation": {}, "summarize_halves": {}},
         "simharness.outputs.validation.page": {"render_validation": "<!doctype html>"},
@@ -297,6 +302,7 @@ def _stand_ins(study):
 class _Validated:
     """Validation without verdicts."""
 
+    distance: None = None
     verdicts: tuple = ()
     failed: tuple = ()
 
@@ -309,6 +315,7 @@ def lab(tmp_path_factory):
     recording = walkers(frames=3, cameras=3, noise=3.0)
     describe(recording, lab, name="hall")
     describe(recording, lab, name="other")
+    (lab / "validation.json").write_text('{"dose": {}, "subsets": {}}')
     (lab / "three.toml").write_text("layout = 'ring'\ncount = 3\n")
     write_calibration(lab / "unsized.json", recording.rig)
     people = People(np.arange(3) / 25.0, [0, 1], joints_of(3, 2), numbers=np.arange(3))

@@ -166,8 +166,6 @@ def _plots(validation: Validation) -> dict[str, str]:
     }
     if validation.responses:
         drawn["losses"] = plots.losses(validation.responses, shades, name="losses")
-    if validation.subsets.gains:
-        drawn["gains"] = plots.gains(validation.subsets, name="gains")
     return drawn
 
 

@@ -101,20 +101,6 @@ def subset_curve(subsets: SubsetComparison, variant: str, color: Color, *, name:
     return written[0]
 
 
-def gains(subsets: SubsetComparison, *, name: str) -> str:
-    """Plot the PCP of ``full`` minus that of ``fast`` against the number of cameras, with the accepted range."""
-    counts = list(subsets.gains)
-    with svg_plot(name, size=_SMALL) as (axes, written):
-        real = np.array([each.real.mean for each in subsets.gains.values()])
-        bound = np.array([BOUNDS.gain(count) for count in counts])
-        axes.fill_between(counts, real - bound, real + bound, color=FAINT, alpha=_BAND, lw=0, zorder=1)
-        _compared_line(axes, counts, list(subsets.gains.values()), TWIN_COLOR)
-        axes.set(xlabel="cameras", ylabel="full − fast, points", xticks=counts)
-        axes.grid(axis="y")
-        legend_above(axes, columns=2)
-    return written[0]
-
-
 def response(responses: Sequence[DoseResponse], variants: Mapping[str, Color], *, name: str) -> str:
     """Plot the loss of PCP against the level of one kind of treatment, for each variant."""
     kind = KINDS[responses[0].kind]

@@ -81,11 +81,6 @@ class ScoreSums:
         at = RULES.index(rule)
         return mean_known(100.0 * safe_ratio(self.correct[..., at, :], self.defined[..., at, :]))
 
-    def pcp_actors(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
-        """Return PCP of each scored actor, percent (..., S)."""
-        at = RULES.index(rule)
-        return 100.0 * safe_ratio(self.correct[..., at, :], self.defined[..., at, :])
-
     def mpjpe(self, rule: HeadRule = DEFAULT_RULE) -> Floats:
         """Return the mean over pairs of the mean joint error, mm (...)."""
         at = RULES.index(rule)

@@ -42,7 +42,6 @@ def test_sums_have_the_figures_of_a_summary(scene):
         assert sums.recall(rule) == pytest.approx(summary["recall"])
         assert sums.precision(rule) == pytest.approx(summary["precision"])
         assert sums.ghosts(rule) == pytest.approx(summary["ghosts_per_frame"])
-        np.testing.assert_allclose(sums.pcp_actors(rule), summary["pcp_actors"])
 
 
 def test_a_resample_is_the_sum_of_its_frames(scene):
