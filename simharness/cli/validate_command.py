@@ -55,9 +55,8 @@ def validate(
 
     Fits a detector to the recording, simulates copies of the recording (twins),
     and scores the method on both: all cameras and all subsets of them, with and
-    without added errors, by both rules for the head. Prints the error of the
-    forecasts and their skill against rivals that need no twins, then tests of
-    equivalence of every figure.
+    without added errors. Prints the error of the forecasts, their skill against
+    rivals that need no twins, and tests of equivalence of every figure.
     """
     with PROGRAM.exit_on_error():
         start = perf_counter()

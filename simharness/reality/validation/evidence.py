@@ -223,6 +223,11 @@ def number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
+def plain(value: Interval) -> dict[str, Any]:
+    """Return a value with its interval for JSON; unknown numbers are null."""
+    return {"value": number(value.mean), "interval": [number(value.low), number(value.high)]}
+
+
 def _spearman(one: Floats, other: Floats) -> float:
     known = np.isfinite(one) & np.isfinite(other)
     if known.sum() < 3:

@@ -21,7 +21,7 @@ from scipy.stats import rankdata
 
 from mvpose.arrays import Floats
 from mvpose.files.input_files import read_json_object
-from simharness.reality.validation.evidence import Compared, number, twin_means
+from simharness.reality.validation.evidence import Compared, plain, twin_means
 from simharness.reality.validation.variant_comparison import DoseResponse, SubsetComparison
 from simharness.statistics.intervals import Interval
 from simharness.statistics.resampling import interval
@@ -114,15 +114,15 @@ class Skill:
             "what": self.what,
             "variant": self.variant,
             "conditions": self.conditions,
-            "error": _plain(self.error),
+            "error": plain(self.error),
             "rivals": {
-                name: {"error": _plain(error), "skill": _plain(skill)} for name, (error, skill) in self.rivals.items()
+                name: {"error": plain(error), "skill": plain(skill)} for name, (error, skill) in self.rivals.items()
             },
         }
 
 
 @dataclass(frozen=True)
-class Agreement:
+class RankAgreement:
     """How well twins predict which of the conditions of a variant are better: subsets of cameras and added errors."""
 
     variant: str
@@ -139,8 +139,7 @@ class Agreement:
 
     def summary(self) -> dict[str, Any]:
         """Return the numbers ready for JSON."""
-        kinds = ("pearson", "spearman", "rank_violation")
-        return {"conditions": self.conditions, **{kind: _plain(getattr(self, kind)) for kind in kinds}}
+        return {key: plain(each) if isinstance(each, Interval) else each for key, each in vars(self).items()}
 
 
 def forecast_groups(
@@ -217,7 +216,7 @@ def skills(groups: Mapping[str, Mapping[str, Forecasts]]) -> list[Skill]:
 
 def agreements(
     subsets: SubsetComparison, responses: Sequence[DoseResponse], variants: Sequence[str]
-) -> list[Agreement]:
+) -> list[RankAgreement]:
     """Return the agreement over all conditions of each variant."""
     result = []
     for name in variants:
@@ -226,7 +225,7 @@ def agreements(
         real, twin = of.real, of.twin
         ranks = rankdata(real, axis=1), rankdata(twin, axis=1)
         result.append(
-            Agreement(
+            RankAgreement(
                 name,
                 len(figures),
                 _resampled(_correlation(real, twin), greatest=1.0),
@@ -265,7 +264,3 @@ def _resampled(values: Floats, *, least: float = -np.inf, greatest: float = np.i
     low, high = (float(end) - float(drawn.mean()) + value for end in interval(drawn))
     low, high = low - max(shift, 0.0), high - min(shift, 0.0)
     return Interval(value, max(min(low, value), least), min(max(high, value), greatest), 1)
-
-
-def _plain(value: Interval) -> dict[str, Any]:
-    return {"value": number(value.mean), "interval": [number(value.low), number(value.high)]}

@@ -25,7 +25,7 @@ from simharness.reality.validation.passes import (
     annotated,
     run_passes,
 )
-from simharness.reality.validation.skill import Agreement, Forecasts, Skill, agreements, forecast_groups, skills
+from simharness.reality.validation.skill import Forecasts, RankAgreement, Skill, agreements, forecast_groups, skills
 from simharness.reality.validation.treatments import treatments
 from simharness.reality.validation.twin_distance import TwinDistance
 from simharness.reality.validation.verdicts import (
@@ -89,7 +89,7 @@ class Validation:
     """Conditions by group, ``losses`` and ``subsets``, and variant."""
     skills: Sequence[Skill]
     """Error over these conditions, and skill against rivals."""
-    agreements: Sequence[Agreement]
+    agreements: Sequence[RankAgreement]
     """Correlations and rank violations over all conditions, by variant."""
     distance: TwinDistance
     """Distance of the recording from the twins over all figures at once."""

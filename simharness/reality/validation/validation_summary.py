@@ -3,12 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from simharness.reality.validation.evidence import Compared, number
+from simharness.reality.validation.evidence import Compared, number, plain
 from simharness.reality.validation.validation import HalfPrediction, Validation
 from simharness.reality.validation.variant_comparison import SCORES, DoseResponse, SubsetComparison
 from simharness.reality.validation.verdicts import BoundVerdict, VerdictState
 from simharness.scoring.frame_scores import RULES, HeadRule
-from simharness.statistics.intervals import Interval
 
 _SIDES = ("real", "twin")
 
@@ -47,7 +46,7 @@ def summarize_validation(validation: Validation) -> dict[str, Any]:
             for (one, other), figures in validation.whole.contrasts.items()
         },
         "subsets": _subsets(validation.subsets),
-        "subset_rank": {name: _rank(rank) for name, rank in validation.subsets.ranks.items()},
+        "subset_rank": {name: plain(rank) for name, rank in validation.subsets.ranks.items()},
         "subset_samples": list(validation.subsets.sampled),
         "single_subsets": {
             name: [{"cameras": list(views), **figure.summary()} for views, figure in of.items()]
@@ -125,12 +124,8 @@ def _response(response: DoseResponse) -> dict[str, Any]:
         "recall": response.recall.summary(),
         "mpjpe_mm": response.mpjpe.summary(),
         "draws": dict(zip(_SIDES, map(_numbers, response.draws), strict=True)),
-        "rank_correlation": _rank(response.rank),
+        "rank_correlation": plain(response.rank),
     }
-
-
-def _rank(rank: Interval) -> dict[str, Any]:
-    return {"value": number(rank.mean), "interval": [number(rank.low), number(rank.high)]}
 
 
 def _numbers(values: Any) -> list[float | None]:
