@@ -3,8 +3,12 @@
 Mappings that depend on the vertical (the published head mappings of Shelf) assume that z is up in the world.
 """
 
+import re
+import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -14,6 +18,7 @@ from mvpose.arrays import Floats
 from mvpose.checks import as_points
 
 HeadMapping = Literal["voxelpose", "2019"]
+_SIDES = {"left": "right_", "right": "left_"}
 
 
 @dataclass(frozen=True)
@@ -97,52 +102,20 @@ class Skeleton:
         return self.joints.index(joint)
 
 
-# fmt: off
-COCO17 = Skeleton(
-    name="coco17",
-    joints=(
-        "nose", "left_eye", "right_eye", "left_ear", "right_ear", "left_shoulder", "right_shoulder",
-        "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hip", "right_hip",
-        "left_knee", "right_knee", "left_ankle", "right_ankle",
-    ),
-    # The root is the left shoulder, because the torso is seen best and every edge is then a bone of nearly constant
-    # length. The face is attached through the nose, whose distance from the shoulder changes little with nodding.
-    # Priors on bones are mirrored, so that neither shoulder counts more.
-    parents=(5, 0, 0, 1, 2, -1, 5, 5, 6, 7, 8, 5, 6, 11, 12, 13, 14),
-    mirror=(0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15),
-    sigmas=(.026, .025, .025, .035, .035, .079, .079, .072, .072, .062, .062, .107, .107, .087, .087, .089, .089),
-)
+def _read_skeletons() -> Iterator[Skeleton]:
+    """Yield the skeletons of the method and of its recordings."""
+    file = Path(__file__).parent / "data" / "skeletons.toml"
+    for name, joints in tomllib.loads(file.read_text(encoding="utf-8")).items():
+        row = {joint: k for k, joint in enumerate(["", *joints], -1)}
+        sides = {joint: re.sub("^(left|right)_", lambda side: _SIDES[side[1]], joint) for joint in joints}
+        parents, sigmas = zip(*joints.values(), strict=True)
+        mirror = tuple(row[sides[joint]] for joint in joints)
+        yield Skeleton(name, tuple(joints), tuple(row[joint] for joint in parents), mirror, sigmas)
 
-SHELF14 = Skeleton(
-    name="shelf14",
-    joints=(
-        "right_ankle", "right_knee", "right_hip", "left_hip", "left_knee", "left_ankle",
-        "right_wrist", "right_elbow", "right_shoulder", "left_shoulder", "left_elbow", "left_wrist",
-        "head_bottom", "head_top",
-    ),
-    parents=(1, 2, 8, 9, 3, 4, 7, 8, 9, -1, 9, 10, 9, 12),
-    mirror=(5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13),
-    sigmas=(.089, .087, .107, .107, .087, .089, .062, .072, .079, .079, .072, .062, .079, .079),
-)
 
-PANOPTIC19 = Skeleton(
-    name="panoptic19",
-    joints=(
-        "neck", "nose", "mid_hip", "left_shoulder", "left_elbow", "left_wrist", "left_hip", "left_knee", "left_ankle",
-        "right_shoulder", "right_elbow", "right_wrist", "right_hip", "right_knee", "right_ankle",
-        "left_eye", "left_ear", "right_eye", "right_ear",
-    ),
-    parents=(-1, 0, 0, 0, 3, 4, 2, 6, 7, 0, 9, 10, 2, 12, 13, 1, 15, 1, 17),
-    mirror=(0, 1, 2, 9, 10, 11, 12, 13, 14, 3, 4, 5, 6, 7, 8, 17, 18, 15, 16),
-    # Sigmas of COCO, with the neck as the shoulders and the mid-hip as the hips.
-    sigmas=(
-        .079, .026, .107, .079, .072, .062, .107, .087, .089,
-        .079, .072, .062, .107, .087, .089, .025, .035, .025, .035,
-    ),
-)  # joints19 order of the CMU Panoptic dataset; its BodyCenter is mid_hip
+COCO17, SHELF14, PANOPTIC19 = _read_skeletons()
 
 _LIMBS_COCO17_TO_SHELF14 = (16, 14, 12, 11, 13, 15, 10, 8, 6, 5, 7, 9)
-# fmt: on
 
 
 def coco17_to_shelf14(joints: ArrayLike, *, head: HeadMapping = "voxelpose") -> Floats:

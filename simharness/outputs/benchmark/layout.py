@@ -15,6 +15,7 @@ even where they are hidden; the dataset's mark of an undefined joint (0 0 0 -1) 
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
+from mvpose.files.input_files import parse_toml
 from mvpose.formats.joint_names import KNOWN
 from mvpose.skeleton import COCO17, PANOPTIC19
 from mvpose.wholebody import skeleton_by_name
@@ -127,29 +129,10 @@ def confidences(visibility: ArrayLike) -> Floats:
     return np.select([seen >= 2, seen == 1], [two, one], np.where(person_seen, hidden, unseen))
 
 
-_UNITS = {
-    "calibration": "x_cam = R X + t; t in centimetres; K in pixels, of which integers are the centres; distCoef k1 k2 "
-    "p1 p2 k3",
-    "joints19": "x y z in centimetres, confidence",
-    "univTime": "milliseconds from the first frame",
-    "clock": "delay of the pictures behind the times of their frames, seconds: mean and standard deviation",
-    "lost": "frames whose picture never arrives; its file is black",
-    "repeated": "frames in which a camera repeats an earlier picture: [frame, earlier frame]",
-    "drift": "rotation of the camera about its axes, rad/s, and velocity of its centre in simharness's axes, m/s",
-    "pose_keypoints_2d": "x y in pixels, score 0 to 1; 0 0 0 where missing",
-    "rolling_shutter": "seconds from the first row of a picture to the last",
-    "stature, mass": "metres, kilograms",
-}
-_AXES = "right-handed, y down, the floor at y = 0; (X, Y, Z) = 100 (x, -z, y) of simharness's metres, z up"
-_CALIBRATION = (
-    "the true cameras, which take the pictures, at time 0; the calibration that a method is given, with the faults of "
-    "the scenario, is in calibration_believed where it differs"
-)
-_BODIES = (
-    "all people in every frame, hidden or not, at the time of the frame, also where clocks of cameras differ; an id "
-    "stands for one person in all frames"
-)
-_MADE = "neck and mid_hip are midpoints of shoulders and of hips, where both were detected"
+@cache
+def _described() -> dict[str, Any]:
+    """Return what a manifest says of its files: units, axes, contents."""
+    return parse_toml(Path(__file__).parents[1].joinpath("data", "manifest.toml").read_text(encoding="utf-8"))
 
 
 def manifest(
@@ -192,15 +175,8 @@ def manifest(
             "recording": "recording.toml",
             "truth": "truth.npz",
         },
-        "units": _UNITS,
-        "axes": _AXES,
-        "calibration": _CALIBRATION,
-        "bodies": _BODIES,
-        "confidence": {
-            "joint, by the number of pictures that show it": CONFIDENCES,
-            "none": "hidden in all pictures, which show other joints of the person",
-            "nobody": "no picture shows any joint of the person",
-        },
+        **{key: _described()[key] for key in ("units", "axes", "calibration", "bodies")},
+        "confidence": {"joint, by the number of pictures that show it": CONFIDENCES, **_described()["confidence"]},
         "skeletons": {
             "joints19": PANOPTIC19.joints,
             "pose_keypoints_2d": KNOWN["body25"].joints,
@@ -216,7 +192,7 @@ def manifest(
 def _made(scenario: Scenario) -> str:
     """Say which joints of the detections were not detected, but made or missing."""
     names = () if scenario.detector.skeleton == COCO17.name else skeleton_by_name(scenario.detector.skeleton).joints
-    parts = [] if {"neck", "mid_hip"} <= set(names) else [_MADE]
+    parts = [] if {"neck", "mid_hip"} <= set(names) else [_described()["made"]]
     return "; ".join([*parts, "feet are as detected" if "left_heel" in names else "feet are missing"])
 
 
