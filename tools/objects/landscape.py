@@ -15,8 +15,8 @@ from simharness.types.lighting import Vector
 from simharness.types.random_streams import stream
 from simharness.types.srgb import from_linear, to_linear
 from simharness.world.scene.rooms.landscape import LOWEST, WHITE
-from simharness.world.scene.rooms.weather import WEATHERS, Weather
 from tools.objects.finishes import MEADOW, smooth_noise
+from tools.objects.weather import WEATHERS, Weather
 
 _WIDTH = 4096  # pixels around the horizon: 0.09 degrees each
 _SMOOTH = 4  # pixels of the sky along each side of one in which its radiance without clouds is computed

@@ -1,9 +1,10 @@
 """Lighting of a room by its name in the scenario; outdoors the sun, the sky and the panorama around the scene."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.lighting import AreaLight, Lighting, LightSources, Panorama, Sun, Vector
 from simharness.types.random_streams import stream
 from simharness.world.scene.rooms.landscape import panorama
-from simharness.world.scene.rooms.weather import WEATHERS
 
 _EXPOSED = 0.30  # radiance of the view as a share of that of the light of a window
 
@@ -37,15 +37,21 @@ class Mood:
         object.__setattr__(self, "lamp", tuple(self.lamp))
 
 
-def _read_lights() -> tuple[Mapping[str, Lighting], Mapping[str, Mood]]:
+def _read_lights() -> Iterator[tuple[str, Lighting, Mood, Mapping[str, Any]]]:
     entries = parse_toml(Path(__file__).parents[1].joinpath("data", "lights.toml").read_text(encoding="utf-8"))
-    suns = {name: Sun(**entry.pop("sun")) for name, entry in entries.items() if "sun" in entry}
-    moods = {name: Mood(**entry.pop("mood"), sun=suns.get(name)) for name, entry in entries.items()}
-    return MappingProxyType({name: Lighting(**entry) for name, entry in entries.items()}), MappingProxyType(moods)
+    for name, entry in entries.items():
+        open_air, sun = entry.pop("open_air"), Sun(**entry.pop("sun")) if "sun" in entry else None
+        mood = Mood(**entry.pop("mood"), sun=sun)
+        yield name, Lighting(**entry), mood, open_air
 
 
-LIGHTS, MOODS = _read_lights()
-"""Lightings in closed form, and moods, by the names of lightings."""
+_LIGHTS = tuple(_read_lights())
+LIGHTS = MappingProxyType({name: light for name, light, _, _ in _LIGHTS})
+"""Lightings in closed form by name."""
+MOODS = MappingProxyType({name: mood for name, _, mood, _ in _LIGHTS})
+"""Moods by the names of lightings."""
+OPEN_AIR = MappingProxyType({name: open_air for name, _, _, open_air in _LIGHTS})
+"""Weathers by the names of lightings: see ``lights.toml``."""
 
 
 def room_lighting(room: RoomSection, seed: int, areas: Sequence[AreaLight] | None = None) -> Lighting:
@@ -83,13 +89,12 @@ def open_air(name: str, light: Lighting, seed: int) -> Lighting:
         seed: seed of the scenario.
     """
     bearing = float(np.arctan2(light.direction[1], light.direction[0]))
-    weather = replace(WEATHERS[name], bearing=bearing)
-    return replace(
-        light,
-        direction=weather.towards,
-        sources=LightSources((), weather.sun, weather.sky, brightness=weather.brightness, balance=weather.balance),
-        panorama=panorama(seed, name, bearing),
-    )
+    weather, height = OPEN_AIR[name], np.radians(OPEN_AIR[name]["elevation"])
+    x, y, z = np.cos(height) * np.cos(bearing), np.cos(height) * np.sin(bearing), np.sin(height)
+    sun = Sun((x, y, z), weather["sun"]) if "sun" in weather else None
+    sources = LightSources((), sun, weather["sky"], brightness=weather["brightness"], balance=weather["balance"])
+    direction = (float(x), float(y), float(z))
+    return replace(light, direction=direction, sources=sources, panorama=panorama(seed, name, bearing))
 
 
 def view_outside(name: str, light: Lighting, seed: int, window: Vector) -> Panorama:

@@ -11,10 +11,10 @@ from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.rooms.landscape import AROUND, WHITE, make_surroundings, read_panorama
-from simharness.world.scene.rooms.room_lighting import room_lighting
+from simharness.world.scene.rooms.room_lighting import LIGHTS, room_lighting
 from simharness.world.scene.rooms.shell import make_room
-from simharness.world.scene.rooms.weather import WEATHERS, clear_sky, overcast_sky
 from tools.objects.finishes import MEADOW
+from tools.objects.weather import WEATHERS, clear_sky, overcast_sky
 
 ROOM = RoomSection(kind="outdoors", floor="paving", size=(8.0, 6.0, 3.0))
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -69,6 +69,19 @@ def test_sun_and_sky_give_the_ground_a_light_of_one(name):
     ways = hemisphere(40_000)
     sky = 2 * (weather.radiance(ways) * ways[:, 2:]).mean(axis=0)  # of a uniform density, pi times the mean over pi
     np.testing.assert_allclose(sky, weather.sky, rtol=0.03)
+
+
+@pytest.mark.parametrize("name", WEATHERS)
+def test_the_light_of_a_weather_is_that_of_its_models(name):
+    light, model = room_lighting(ROOM.model_copy(update={"light": name}), 3), WEATHERS[name]
+    x, y, _ = LIGHTS[name].direction
+    turned = replace(model, bearing=float(np.arctan2(y, x)))
+    np.testing.assert_allclose(light.direction, turned.towards, atol=1e-9)
+    np.testing.assert_allclose(light.sources.sky, turned.sky, atol=2e-3)
+    assert (light.sources.brightness, light.sources.balance) == (model.brightness, model.balance)
+    assert (light.sources.sun is None) == (turned.sun is None)
+    if turned.sun is not None:
+        np.testing.assert_allclose(light.sources.sun.irradiance, turned.sun.irradiance, atol=1e-4)
 
 
 def test_light_outdoors_is_that_of_the_sun_in_the_bearing_of_the_closed_form():

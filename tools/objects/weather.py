@@ -47,7 +47,7 @@ class Weather:
     Attributes:
         bearing: bearing of the sun from +x, radians.
         elevation: elevation of the sun, degrees; None behind an overcast sky.
-        turbidity: haze of a clear sky: see :func:`~simharness.world.scene.rooms.weather.clear_sky`.
+        turbidity: haze of a clear sky: see :func:`~tools.objects.weather.clear_sky`.
         beam: colour of the sunlight.
         diffuse: share of the sky in the irradiance of a horizontal surface.
         cover: share of the sky under clouds, least and most.

@@ -1,0 +1,11 @@
+from .camera import Camera as Camera
+from .camera import Rig as Rig
+from .detections import Detections as Detections
+from .estimate import Estimate as Estimate
+from .estimate import Matching as Matching
+from .pipeline import Pipeline as Pipeline
+from .presets import preset as preset
+from .skeleton import COCO17 as COCO17
+from .skeleton import PANOPTIC19 as PANOPTIC19
+from .skeleton import SHELF14 as SHELF14
+from .skeleton import Skeleton as Skeleton

@@ -1,0 +1,16 @@
+from .api import Blame as Blame
+from .api import TrialResult as TrialResult
+from .api import assert_robust as assert_robust
+from .api import blame as blame
+from .api import load_scenario as load_scenario
+from .api import run_trial as run_trial
+from .api import score as score
+from .api import simulate as simulate
+from .scenario.sections.scenario import Scenario as Scenario
+from .trial.foreign_program import ForeignProgram as ForeignProgram
+from .types.recording import Recording as Recording
+from .types.sequence import Sequence as Sequence
+from .types.truth import KeypointError as KeypointError
+from .types.truth import Truth as Truth
+from .types.views import Views as Views
+from .types.views import Visibility as Visibility
