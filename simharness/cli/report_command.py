@@ -53,14 +53,15 @@ def report(
     with PROGRAM.exit_on_error():
         if trial is not None and rerun is None:
             raise ValueError("--trial: chooses the trial that --rerun writes; add --rerun FILE, or remove --trial")
-        if rerun is not None and digest is not None:
-            raise ValueError("--rerun and --digest: each is written instead of the report; give one of them")
-        if blame and (rerun is not None or digest is not None):
-            raise ValueError("--blame: is part of the report, which --rerun and --digest replace; give one of them")
-        if out is not None and (rerun is not None or digest is not None):
-            raise ValueError("--out: names the report, which --rerun and --digest replace; give one of them")
-        if threshold and rerun is not None:
-            raise ValueError("--threshold: is about the report, which --rerun replaces; give one of them")
+        instead = rerun is not None or digest is not None
+        for wrong, text in (
+            (rerun and digest, "--rerun and --digest: each is written instead of the report"),
+            (blame and instead, "--blame: is part of the report, which --rerun and --digest replace"),
+            (out and instead, "--out: names the report, which --rerun and --digest replace"),
+            (threshold and rerun, "--threshold: is about the report, which --rerun replaces"),
+        ):
+            if wrong:
+                raise ValueError(f"{text}; give one of them")
         from mvpose.commands.output_files import HTML, check_place
 
         check_place(out, option="--out", mark=HTML)

@@ -117,17 +117,8 @@ def print_twin_comparison(comparison: "TwinComparison", console: Console) -> Non
     """Print the PCP of every variant in reality and in simulation side by side."""
     from simharness.reality.twin import TOLERANCE
 
-    table = Table(
-        title=f"{comparison.name}: PCP in reality and in simulation, with 95 % intervals; median MPJPE",
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        show_edge=False,
-        pad_edge=False,
-    )
-    table.add_column("variant", no_wrap=True)
-    for column in ("real", "simulated", "change", "mm, real", "mm, sim."):
-        table.add_column(column, justify="right", no_wrap=True)
+    title = f"{comparison.name}: PCP in reality and in simulation, with 95 % intervals; median MPJPE"
+    table = _table(title, "variant", ("real", "simulated", "change", "mm, real", "mm, sim."), box=SIMPLE_HEAD)
     for name, real in comparison.real.items():
         simulated = comparison.simulated[name]
         errors = [comparison.summaries[which][name]["mpjpe_mm"]["median"] for which in ("real", "simulated")]
@@ -178,9 +169,7 @@ def _paper(evaluation: "Evaluation") -> "Mapping[str, PublishedPcp]":
 
 def _pcp_table(name: str, evaluation: "Evaluation") -> Table:
     scores, actors = evaluation.variants[name], evaluation.actors
-    table = _table(f"PCP, {name}", "actor")
-    for group in GROUPS:
-        table.add_column(group.replace("_", " "), justify="right")
+    table = _table(f"PCP, {name}", "actor", [group.replace("_", " ") for group in GROUPS])
     table.add_column("all", justify="right", style="bold")
     published = _paper(evaluation).get(name)
     if published:
@@ -199,9 +188,7 @@ def _pcp_table(name: str, evaluation: "Evaluation") -> Table:
 
 def _variants_table(evaluation: "Evaluation") -> Table:
     """Return the PCP of all actors with a row for each variant, followed by the row of the paper if it has one."""
-    table = _table("PCP of the variants", "variant")
-    for actor in evaluation.actors:
-        table.add_column(f"actor {actor + 1}", justify="right")
+    table = _table("PCP of the variants", "variant", [f"actor {actor + 1}" for actor in evaluation.actors])
     table.add_column("average", justify="right", style="bold")
     for name, scores in evaluation.summary()["variants"].items():
         table.add_row(name, *(_number(value, 1) for value in (*scores["pcp_actors"], scores["pcp"])))
@@ -211,29 +198,20 @@ def _variants_table(evaluation: "Evaluation") -> Table:
 
 
 def _people_table(summaries: Mapping[str, Any]) -> Table:
-    table = _table("People, one-to-one: %, people per frame, and MPJPE in mm", "variant")
     columns = ("precision", "recall", "ghosts", "missed", "mean", "median", "same view")
-    for column in columns:
-        table.add_column(column, justify="right")
+    table = _table("People, one-to-one: %, people per frame, and MPJPE in mm", "variant", columns)
     for name, scores in summaries.items():
-        table.add_row(
-            name,
-            _number(scores["precision"], 1, scale=100),
-            _number(scores["recall"], 1, scale=100),
-            _number(scores["ghosts_per_frame"], 2),
-            _number(scores["missed_per_frame"], 2),
-            _number(scores["mpjpe_mm"]["mean"], 1),
-            _number(scores["mpjpe_mm"]["median"], 1),
-            _number(scores["same_view_violations"], 0),
-        )
+        shares = (_number(scores[key], 1, scale=100) for key in ("precision", "recall"))
+        counts = (_number(scores[key], 2) for key in ("ghosts_per_frame", "missed_per_frame"))
+        errors = (_number(scores["mpjpe_mm"][key], 1) for key in ("mean", "median"))
+        table.add_row(name, *shares, *counts, *errors, _number(scores["same_view_violations"], 0))
     return table
 
 
 def _identities_table(tracked: Mapping[str, Sequence[Mapping[str, Any]]]) -> Table:
     """Return the scores of identities by variant, means over its recordings."""
-    table = _table("Identities of annotated people: PCP and IDR in %, MPJPE in mm", "variant")
-    for column in ("PCP", "IDR", "MPJPE", "switches", "a minute", "interrupted"):
-        table.add_column(column, justify="right")
+    columns = ("PCP", "IDR", "MPJPE", "switches", "a minute", "interrupted")
+    table = _table("Identities of annotated people: PCP and IDR in %, MPJPE in mm", "variant", columns)
     for name, recordings in tracked.items():
         at = [each["mean_joint"][f"{DISTANCE:g}"] for each in recordings]
         counted = 0 if len(recordings) == 1 else 1  # decimals: means of counts are no whole numbers
@@ -256,9 +234,7 @@ def _mean(figures: Sequence[Mapping[str, Any]], key: str) -> float | None:
 
 
 def _time_table(summaries: Mapping[str, Any]) -> Table:
-    table = _table("Time per frame, ms: median (99th percentile)", "variant")
-    for stage in STAGES:
-        table.add_column(stage, justify="right", style="bold" if stage == "total" else "")
+    table = _table("Time per frame, ms: median (99th percentile)", "variant", STAGES)
     for name, scores in summaries.items():
         times = (scores["timings_ms"][stage] for stage in STAGES)
         table.add_row(name, *(f"{_number(time['median'], 2)} ({_number(time['p99'], 2)})" for time in times))
@@ -268,9 +244,11 @@ def _time_table(summaries: Mapping[str, Any]) -> Table:
 _RULES = Box("    \n    \n ── \n    \n ── \n ── \n    \n    \n")  # a rule under the header and between sections
 
 
-def _table(title: str, first: str) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold", box=_RULES, show_edge=False, pad_edge=False)
+def _table(title: str, first: str, columns: Sequence[str], *, box: Box = _RULES) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold", box=box, show_edge=False, pad_edge=False)
     table.add_column(first, min_width=8, no_wrap=True)
+    for column in columns:
+        table.add_column(column, justify="right", no_wrap=True, style="bold" if column == "total" else "")
     return table
 
 

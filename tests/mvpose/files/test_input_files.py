@@ -133,7 +133,7 @@ SHIPPED = {
     "simharness/reality/detector_fit/profile.py", "simharness/study/causes/cause_catalogue.py",
     "simharness/world/scene/rooms/room_lighting.py", "simharness/reality/evaluation.py",
     "simharness/trial/kernel_compilation.py", "mvpose/formats/joint_names.py", "mvpose/networks/catalogue/published.py",
-    "mvpose/skeleton.py", "simharness/outputs/benchmark/layout.py",
+    "mvpose/public_names.py", "mvpose/skeleton.py", "simharness/outputs/benchmark/layout.py",
 }  # fmt: skip
 CALLS = re.compile(
     r"(?:^|\.)(?:read_text|read_bytes|loadmat|read_parquet|scan_parquet|FileStorage|imread)$|^(?:np\.load|json\.loads?|"
