@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from simharness.types.floor import Volume
 
 _MOST_PEOPLE = 40
-_PEOPLE = 4
-_DETECTOR = "typical"
+_DETECTOR = "topdown"
 _SMALL = 3  # cameras: each set of two and more is the rig, or the rig without one
 _CROWD = 6  # scenes of other numbers of people
 
@@ -47,14 +46,14 @@ class Surroundings:
     )
     people: int | None = option(
         None,
-        "People in the volume, instead of the file's. [dim]\\[default: 4][/]",
+        "People in the volume, instead of the file's. [dim]\\[default: one for each 3 m², from 2 to 4][/]",
         metavar="N",
         min=1,
         max=_MOST_PEOPLE,
     )
     detector: str | None = option(
         None,
-        "A detector profile, a shipped name or a TOML file, instead of the room file's. [dim]\\[default: typical][/]",
+        "A detector profile, a shipped name or a TOML file, instead of the room file's. [dim]\\[default: topdown][/]",
         metavar="PROFILE",
     )
 
@@ -141,7 +140,7 @@ def _room(given: Surroundings) -> "Room | None":
 
 def _setup(rig: "Rig", room: "Room | None", given: Surroundings) -> "RehearsalSetup":
     """Return what the rig is rehearsed for: the room file's, or the defaults, as the options change it."""
-    from simharness.planning.floor_coverage import covered_volume
+    from simharness.planning.floor_coverage import covered_volume, usual_people
     from simharness.planning.rehearsal_scene import RehearsalSetup
     from simharness.scenario.presets import read_profile
 
@@ -149,7 +148,7 @@ def _setup(rig: "Rig", room: "Room | None", given: Surroundings) -> "RehearsalSe
         setup = RehearsalSetup.in_room(room)
         return replace(setup, volume=rectangle_of(given.volume)) if given.volume else setup
     volume = rectangle_of(given.volume) if given.volume else covered_volume(rig)[0]
-    return RehearsalSetup(volume, read_profile(given.detector or _DETECTOR), given.people or _PEOPLE)
+    return RehearsalSetup(volume, read_profile(given.detector or _DETECTOR), given.people or usual_people(volume))
 
 
 def rectangle_of(text: str) -> "Volume":

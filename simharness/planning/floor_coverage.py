@@ -4,6 +4,7 @@ Geometry without people, obstacles or a detector: what :class:`~simharness.plann
 """
 
 import numpy as np
+import shapely
 
 from mvpose import Rig
 from mvpose.arrays import Bools, Floats, Integers
@@ -16,9 +17,11 @@ _STEP = 0.25  # metres between places where a volume is sought
 _AHEAD = 4.0  # metres ahead of every camera to which it may reach
 _LEAST_PIXELS = 60.0  # of a person in the picture: smaller ones are not found by common detectors
 _BODY = 0.25  # metres: half the width of a person
-_LARGEST = 8.0  # metres: longest side of a volume that is found
-_SMALLEST = 1.0  # metres
-_ENOUGH = 3  # cameras: one of them may lose a person whom somebody hides
+_SMALLEST = 3.0  # m² that three cameras have to see
+_LEAST = 1.0  # m² that two cameras have to see
+_ENOUGH = 3  # cameras
+_FLOOR = 3.0  # m² for each person: eight people in the dome of CMU Panoptic, 5.5 m across
+_FEWEST, _MOST = 2, 4  # people of a rehearsal whose number nobody has said
 
 
 def coverage(rig: Rig, places: Floats, heights: tuple[float, ...]) -> Integers:
@@ -54,12 +57,13 @@ def whole_people(rig: Rig, places: Floats) -> Bools:
 
 
 def covered_volume(rig: Rig) -> tuple[Volume, int]:
-    """Return the volume over the largest upright rectangle in which enough cameras see a standing person whole.
+    """Return the volume over the largest connected part of the floor where enough cameras see a standing person whole.
 
-    Enough are three, or two where there is no such rectangle or the rig has no more than three cameras.
+    Enough are three: one of them may lose a person whom somebody hides. They are two for a rig of two cameras, and
+    where three see less than 3 m².
 
     Returns:
-        The volume, and the number of cameras that see every place of it.
+        The volume, and the number of cameras that see every place of it but for the rounding of its outline.
 
     Raises:
         ValueError: two cameras nowhere see one person whole.
@@ -69,16 +73,24 @@ def covered_volume(rig: Rig) -> tuple[Volume, int]:
     low, high = corners.min(axis=0), corners.max(axis=0)
     xs, ys = (np.arange(low[axis], high[axis] + _STEP, _STEP) for axis in (0, 1))
     grid = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=-1)
-    count = whole_people(rig, grid.reshape(-1, 2)).sum(axis=0).reshape(grid.shape[:2])
-    for needed in range(max(2, min(_ENOUGH, len(rig) - 1)), 1, -1):
-        found = largest_rectangle(count >= needed, longest=round(_LARGEST / _STEP))
-        if found is not None and min(found[1] - found[0], found[3] - found[2]) * _STEP >= _SMALLEST:
-            x0, x1, y0, y1 = xs[found[0]], xs[found[1]], ys[found[2]], ys[found[3]]
-            return Volume(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])), needed
+    count = whole_people(rig, grid.reshape(-1, 2)).sum(axis=0)
+    for needed in range(min(_ENOUGH, len(rig)), 1, -1):
+        cells = grid.reshape(-1, 2)[count >= needed]
+        parts = shapely.union_all(shapely.box(*(cells - _STEP / 2).T, *(cells + _STEP / 2).T), grid_size=1e-6)
+        largest = max(shapely.get_parts(parts), key=shapely.area, default=shapely.Polygon())
+        if largest.area >= (_SMALLEST if needed > 2 else _LEAST):
+            # Stairs of cells become sides; holes, in which a camera lacks somebody's feet, are left to the simulation.
+            outline = shapely.Polygon(largest.exterior).simplify(_STEP)
+            return Volume(shapely.get_coordinates(outline)[:-1]), needed
     raise ValueError(
         "nowhere on the floor do two cameras see one standing person whole: the cameras look past each other, or the "
         "floor of the calibration is not at z = 0; give --volume to rehearse anyway, or check the calibration"
     )
+
+
+def usual_people(volume: Volume) -> int:
+    """Return the number of people where none is given: one for each 3 m², as in published recordings, from 2 to 4."""
+    return min(max(round(volume.area / _FLOOR), _FEWEST), _MOST)
 
 
 def good_rectangle(places: Floats, good: Bools) -> tuple[Floats, Floats] | None:

@@ -10,6 +10,7 @@ import numpy as np
 from mvpose import Rig
 from simharness.planning.candidates import Candidate
 from simharness.planning.fast_layer import Prediction
+from simharness.planning.forecast_error import forecast_loss, forecast_text
 from simharness.planning.planned_room import Room
 from simharness.planning.room_keys import TargetKeys
 from simharness.statistics.intervals import Interval
@@ -20,7 +21,8 @@ class Figures:
     """Figures of a rig in the volume."""
 
     pcp: Interval
-    """Percentage of correct parts, with its interval (90 % by the fast layer, 95 % by simulation)."""
+    """Percentage of correct parts, with its 90 % interval: of a recording of ten seconds by the fast layer, of a forecast
+    by simulation."""
     error_mm: Interval
     """Mean error of joints, millimetres, with its interval."""
     share: float = math.nan
@@ -184,8 +186,8 @@ def sentences(plan: RigPlan) -> list[str]:
     people = "1 person" if room.keys.people.count == 1 else f"{room.keys.people.count} people"
     how = f"in {plan.simulated_scenes} simulated scenes" if plan.best.simulated is not None else "by the fast layer"
     lines = [
-        f"{len(plan.rig)} cameras give {figures.pcp.mean:.1f} PCP and {figures.error_mm.mean:.0f} mm for {people} "
-        f"within {area}, {how}."
+        f"{len(plan.rig)} cameras give {forecast_text(figures.pcp)} PCP and "
+        f"{forecast_text(figures.error_mm, digits=0)} mm for {people} within {area}, {how}."
     ]
     share = plan.best.predicted.share
     if math.isfinite(share):
@@ -203,11 +205,10 @@ def sentences(plan: RigPlan) -> list[str]:
     same = next((p for p in plan.curve if p.cameras == now), None)
     if more is not None and same is not None:
         gain = more.figures.pcp.mean - same.figures.pcp.mean
-        lines.append(
-            f"One more camera would add {max(gain, 0.0):.1f} PCP."
-            if gain >= 0.05
-            else "One more camera would add nothing."
-        )
+        # Two draws of one layer: their difference has the error of the model alone.
+        added = forecast_loss(Interval(gain, np.nan, np.nan, 1))
+        helps = "would" if added.low > 0 else "may"
+        lines.append(f"One more camera {helps} add {forecast_text(added)} PCP.")
     placed = [each for each in plan.cameras if each.candidate is not None]
     sure = [each.name for each in placed if each.sure >= 0.8]
     free = [each.name for each in placed if each.sure < 0.4]

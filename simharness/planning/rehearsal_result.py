@@ -10,10 +10,14 @@ from mvpose import Camera, Rig
 from mvpose.arrays import Bools, Integers
 from simharness.planning.fast_layer import Prediction
 from simharness.planning.floor_coverage import good_rectangle
+from simharness.planning.forecast_error import forecast_text
 from simharness.planning.rehearsal_scene import RehearsalSetup
 from simharness.planning.simulated_scenes import SceneResult
 from simharness.planning.tolerance import CLIFF, FaultTolerance
 from simharness.statistics.intervals import Interval
+
+LITTLE = 2.0
+"""Points of PCP, lost or gained, that are no reason to buy or to move a camera."""
 
 HEIGHTS = (0.1, 0.9, 1.7, 2.2)
 """Heights of coverage maps, metres: feet, hips, crown, and a raised hand."""
@@ -54,8 +58,13 @@ class CameraWorth:
 
     @property
     def redundant(self) -> bool:
-        """Whether its failure costs less than half a point of PCP, and surely less than one."""
-        return self.without is not None and self.worth.high < 1.0 and self.worth.mean < 0.5
+        """Whether its failure costs less than :data:`LITTLE` points of PCP, by the whole interval."""
+        return self.without is not None and self.worth.high < LITTLE
+
+    @property
+    def needed(self) -> bool:
+        """Whether its failure costs more than half a point of PCP, by the whole interval."""
+        return self.worth.low > 0.5
 
 
 @dataclass(frozen=True)
@@ -223,7 +232,6 @@ def _plain(value: Any) -> Any:
     return value
 
 
-_LITTLE = 0.5  # points of PCP: less is no reason to buy or to move a camera
 _CROWDED = 90.0  # PCP, percent: with fewer the method is of little use
 
 
@@ -246,17 +254,21 @@ def sentences(rehearsal: Rehearsal) -> tuple[str, ...]:
 
 
 def _verdict(rehearsal: Rehearsal) -> str:
-    setup, count = rehearsal.setup, len(rehearsal.rig)
+    setup, count, whole = rehearsal.setup, len(rehearsal.rig), rehearsal.whole
     people, size = _people(setup.people), _size(*setup.volume.size)
     target = f"PCP {setup.target.pcp:g} and {setup.target.error:g} mm"
+    surely = whole.pcp.low >= setup.target.pcp and whole.mpjpe_mm.high <= setup.target.error
+    never = whole.pcp.high < setup.target.pcp or whole.mpjpe_mm.low > setup.target.error
+    enough = "are enough" if surely else "may be enough"
     if rehearsal.good_share > 0.995:
-        return f"{count} cameras are enough for {people} in the whole volume of {size}: everywhere {target} are met."
+        return f"{count} cameras {enough} for {people} in the whole volume of {size}: everywhere {target} are met."
     rectangle = good_rectangle(rehearsal.prediction.places, rehearsal.good)
     if rectangle is None:
-        return f"{count} cameras are not enough for {people} in {size}: nowhere are {target} met."
+        short = "are not" if never else "may not be"
+        return f"{count} cameras {short} enough for {people} in {size}: nowhere are {target} met."
     inner = _size(*(rectangle[1] - rectangle[0]))
     return (
-        f"{count} cameras are enough for {people} within {inner}; {100 * rehearsal.good_share:.0f} % of the volume of "
+        f"{count} cameras {enough} for {people} within {inner}; {100 * rehearsal.good_share:.0f} % of the volume of "
         f"{size} meets the target, {target}."
     )
 
@@ -264,26 +276,33 @@ def _verdict(rehearsal: Rehearsal) -> str:
 def _numbers(rehearsal: Rehearsal) -> str:
     whole = rehearsal.whole
     return (
-        f"In simulation {_with_interval(whole.pcp)} % of the body parts are placed correctly (PCP), and joints of "
-        f"people who are found are off by {_with_interval(whole.mpjpe_mm, digits=0)} mm."
+        f"The forecast: {forecast_text(whole.pcp)} % of the body parts are placed correctly (PCP), and joints of "
+        f"people who are found are off by {forecast_text(whole.mpjpe_mm, digits=0)} mm."
     )
 
 
 def _cameras(rehearsal: Rehearsal) -> str:
-    worths = list(rehearsal.cameras.values())
+    worths = sorted(rehearsal.cameras.values(), key=lambda each: -each.worth.mean)
     if all(each.without is None for each in worths):
         return "With two cameras, the failure of either one leaves no positions in space."
-    redundant = [each.camera.name for each in worths if each.redundant]
-    most = max(worths, key=lambda each: (each.worth.mean, each.worth_mm.mean))
+    first, second = worths[0], worths[1]
+    redundant = [each for each in worths if each.redundant]
+    needed = [each for each in worths if each.needed]
     parts = []
-    if most.worth.mean >= _LITTLE:
-        parts.append(f"camera {most.camera.name} matters most: without it PCP falls by {most.worth.mean:.1f} points")
-    if redundant:
-        which = (
-            f"camera {redundant[0]} is" if len(redundant) == 1 else f"any one of the cameras {_listed(redundant)} is"
+    if first.needed and first.worth.low > second.worth.mean:
+        size = forecast_text(first.worth)
+        parts.append(f"camera {first.camera.name} matters most: its failure costs {size} points of PCP")
+    elif len(redundant) < len(worths):
+        low, high = min(each.worth.low for each in worths), max(each.worth.high for each in worths)
+        parts.append(
+            "which camera matters most cannot be told: the failure of one costs "
+            f"{max(low, 0.0):.1f} to {high:.1f} points of PCP"
         )
-        parts.append(f"{which} redundant: without it PCP falls by less than {_LITTLE:g} points")
-    else:
+    if redundant:
+        which = "any one of the cameras" if len(redundant) > 1 else "camera"
+        names = _listed([each.camera.name for each in redundant])
+        parts.append(f"{which} {names} is redundant: its failure costs less than {LITTLE:g} points")
+    if len(needed) == len(worths):
         parts.append("no camera is redundant")
     return _sentence("; ".join(parts))
 
@@ -294,25 +313,28 @@ def _one_more(rehearsal: Rehearsal) -> str:
         return ""
     x, y, z = extra.camera.center
     where = f"at x = {x:.1f}, y = {y:.1f}, {z:.1f} m high"
-    gained = (
-        f"{max(extra.gain.mean, 0.0):.1f} points of PCP and takes {max(extra.gain_mm.mean, 0.0):.0f} mm from the error"
-    )
-    if extra.gain.mean < _LITTLE and extra.gain_mm.mean < 0.1 * rehearsal.whole.mpjpe_mm.mean:
+    gained = f"{forecast_text(extra.gain)} points of PCP and takes {max(extra.gain_mm.mean, 0.0):.0f} mm from the error"
+    if extra.gain.high < LITTLE and extra.gain_mm.mean < 0.1 * rehearsal.whole.mpjpe_mm.mean:
         return f"One more camera brings little: the best place, {where}, adds {gained}."
-    return f"One more camera should hang {where}: it adds {gained}."
+    if extra.gain.low > 0:
+        return f"One more camera should hang {where}: it adds {gained}."
+    return f"Whether one more camera helps cannot be told: the best place, {where}, adds {gained}."
 
 
 def _crowd_sentence(rehearsal: Rehearsal) -> str:
-    known = [(each.people, each.pcp.mean) for each in rehearsal.crowds if each.pcp is not None]
+    known = [(each.people, each.pcp) for each in rehearsal.crowds if each.pcp is not None]
     if len(known) < 2:
         return ""
-    most, pcp = known[-1]
-    enough = [people for people, value in known if value >= _CROWDED]
-    if pcp >= _CROWDED:
-        return f"Up to {most} people PCP stays at {_CROWDED:g} or above: it is {pcp:.0f} with {most}."
-    if not enough:
-        return f"PCP is below {_CROWDED:g} with any number of people; with {most} it is {pcp:.0f}."
-    return f"PCP stays at {_CROWDED:g} or above up to {_people(max(enough))}; with {most} it is {pcp:.0f}."
+    people, pcp = known[-1]
+    last = f"with {people} it is {forecast_text(pcp, digits=0)}"
+    surely = max((count for count, value in known if value.low >= _CROWDED), default=0)
+    perhaps = max((count for count, value in known if value.high >= _CROWDED), default=0)
+    if not perhaps:
+        return f"PCP is below {_CROWDED:g} with any number of people; {last}."
+    if surely == perhaps:
+        return f"PCP stays at {_CROWDED:g} or above up to {_people(surely)}; {last}."
+    first = f"for certain up to {_people(surely)}, perhaps" if surely else "perhaps"
+    return f"PCP stays at {_CROWDED:g} or above {first} up to {_people(perhaps)}; {last}."
 
 
 def _tolerance_sentence(rehearsal: Rehearsal) -> str:
@@ -329,11 +351,6 @@ def _matching(rehearsal: Rehearsal) -> str:
     if not np.isfinite(rehearsal.mixed.mean) or rehearsal.mixed.mean < 1.0:
         return ""
     return f"In {rehearsal.mixed.mean:.0f} % of the matches two people are taken for one."
-
-
-def _with_interval(value: Interval, *, digits: int = 1) -> str:
-    text = f"{value.mean:.{digits}f}"
-    return f"{text} ({value.low:.{digits}f} to {value.high:.{digits}f})" if np.isfinite(value.low) else text
 
 
 def _size(x: float, y: float) -> str:

@@ -213,7 +213,7 @@ def _camera_rows(rehearsal: Rehearsal) -> list[dict[str, Any]]:
             "worth": _cell(each.worth, 1),
             "worth_mm": _cell(each.worth_mm, 0),
             "layer": signed(each.layer_worth, 1) if np.isfinite(each.layer_worth) else NOTHING,
-            "verdict": "redundant" if each.redundant else "needed" if each.worth.low > 1.0 else "",
+            "verdict": "redundant" if each.redundant else "needed" if each.needed else "",
         }
         for each in rows
     ]

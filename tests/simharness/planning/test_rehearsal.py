@@ -21,6 +21,7 @@ from simharness.planning.rehearsal_scene import RehearsalSetup
 from simharness.planning.rehearse_rig import RehearsalEffort, rehearse_rig
 from simharness.planning.rig_file import read_rig
 from simharness.scenario.presets import read_profile
+from simharness.statistics.intervals import Interval
 from simharness.trial.identity import provenance
 from simharness.types.floor import Volume
 
@@ -51,7 +52,7 @@ def test_four_cameras_in_the_corners_are_good_in_the_middle(rehearsal):
     assert rehearsal.whole.pcp.mean > 95
     assert rehearsal.good_share > 0.7
     assert abs(rehearsal.whole.layer_pcp - rehearsal.whole.pcp.mean) < 6
-    assert "4 cameras are enough for 2 people" in rehearsal.sentences[0]
+    assert "4 cameras may be enough for 2 people" in rehearsal.sentences[0]  # two scenes say little
 
 
 def test_the_json_is_plain_and_has_the_contract(rehearsal):
@@ -62,11 +63,35 @@ def test_the_json_is_plain_and_has_the_contract(rehearsal):
     assert content["cameras"]["cam0"]["worth"]["mean"] == round(rehearsal.cameras["cam0"].worth.mean, 4)
 
 
+def forecast(rehearsal, low, high):
+    return replace(rehearsal, whole=replace(rehearsal.whole, pcp=Interval(low / 2 + high / 2, low, high, 2)))
+
+
 def test_sentences_say_where_a_rig_is_not_enough(rehearsal):
     nowhere = replace(rehearsal, good=np.zeros_like(rehearsal.good))
-    assert "not enough" in sentences(nowhere)[0]
+    assert "4 cameras are not enough" in sentences(forecast(nowhere, 80.0, 90.0))[0]
+    assert "4 cameras may not be enough" in sentences(forecast(nowhere, 80.0, 99.0))[0]
+    assert "4 cameras may be enough" in sentences(forecast(rehearsal, 80.0, 99.0))[0]
     half = replace(rehearsal, good=rehearsal.prediction.places[:, 0] > 0)
     assert "within 1.0 by 2.0 m; 50 % of the volume" in sentences(half)[0]
+
+
+def worths(rehearsal, *ends):
+    costs = [Interval(low / 2 + high / 2, low, high, 2) for low, high in ends]
+    named = zip(rehearsal.cameras.items(), costs, strict=True)
+    return replace(rehearsal, cameras={name: replace(each, worth=cost) for (name, each), cost in named})
+
+
+def test_cameras_are_ranked_only_where_their_intervals_are(rehearsal):
+    told = worths(rehearsal, (5.0, 9.0), (1.0, 3.0), (1.0, 4.0), (2.0, 4.0))
+    assert sentences(told)[2] == (
+        "Camera cam0 matters most: its failure costs 7.0 (5.0 to 9.0) points of PCP; no camera is redundant."
+    )
+    untold = worths(rehearsal, (0.2, 12.0), (0.0, 5.0), (-1.0, 4.0), (-1.0, 1.5))
+    assert sentences(untold)[2] == (
+        "Which camera matters most cannot be told: the failure of one costs 0.0 to 12.0 points of PCP; camera cam3 is "
+        "redundant: its failure costs less than 2 points."
+    )
 
 
 def test_the_largest_rectangle_of_good_places():

@@ -1,0 +1,84 @@
+"""Errors of forecasts: by how much the figures of rigs that nobody has recorded turn out to be different.
+
+Scenes of the simulator differ by their people and draws; that is the noise of a forecast, which more scenes make small.
+What a forecast does not know stays: the network that will be used, how people stand and move, how exact the calibration
+is, and how the truth is annotated. These errors are measured where both are known: forecasts that know no more than the
+rig, where people are and their number, beside a network on rendered pictures of ten rigs, and beside the recording
+Shelf (``python -m benchmarks.planning.blind_forecasts``).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from simharness.statistics.intervals import LEVEL as SCENES
+from simharness.statistics.intervals import Interval
+
+LEVEL = 0.9
+"""Coverage probability of the intervals of forecasts."""
+
+
+@dataclass(frozen=True)
+class ForecastError:
+    """Error of a kind of figure, normally distributed about the forecast."""
+
+    least: float
+    """Standard deviation for figures of size 0, in the unit of the figure."""
+    share: float
+    """Standard deviation as a share of the size, for large ones."""
+
+    def deviation(self, size: float) -> float:
+        """Return the standard deviation for a figure of some size."""
+        return float(np.hypot(self.least, self.share * size))
+
+    def interval(self, scenes: Interval, size: float, *, low: float = -np.inf, high: float = np.inf) -> Interval:
+        """Return the interval of a forecast.
+
+        Args:
+            scenes: mean over scenes, with the interval of their noise.
+            size: size of the figure, which is 0 where nothing can be wrong: points lost, millimetres.
+            low: least possible value.
+            high: greatest possible value.
+        """
+        if not np.isfinite(scenes.mean):
+            return scenes
+        model = norm.ppf((1 + LEVEL) / 2) * self.deviation(size)
+        noise = norm.ppf((1 + LEVEL) / 2) / norm.ppf((1 + SCENES) / 2)
+        down, up = (
+            np.hypot(model, noise * width if np.isfinite(width) else 0.0)
+            for width in (scenes.mean - scenes.low, scenes.high - scenes.mean)
+        )
+        ends = max(scenes.mean - down, low), min(scenes.mean + up, high)
+        return Interval(scenes.mean, float(ends[0]), float(ends[1]), scenes.n)
+
+
+PCP = ForecastError(1.5, 0.4)
+"""Of PCP, points; its size are the points below 100."""
+
+LOSS = ForecastError(1.0, 0.6)
+"""Of PCP lost or gained by a camera or a fault, points."""
+
+MPJPE = ForecastError(0.0, 0.25)
+"""Of joint errors, mm."""
+
+
+def forecast_pcp(scenes: Interval) -> Interval:
+    """Return the interval of a forecast of PCP, or of recall, percent."""
+    return PCP.interval(scenes, 100.0 - scenes.mean, low=0.0, high=100.0)
+
+
+def forecast_loss(scenes: Interval) -> Interval:
+    """Return the interval of a forecast of a difference of PCP, points."""
+    return LOSS.interval(scenes, abs(scenes.mean))
+
+
+def forecast_mm(scenes: Interval) -> Interval:
+    """Return the interval of a forecast of joint errors, mm."""
+    return MPJPE.interval(scenes, scenes.mean, low=0.0)
+
+
+def forecast_text(forecast: Interval, *, digits: int = 1) -> str:
+    """Return a figure and its interval as text: "96.4 (94.0 to 98.1)"; alone where it has none."""
+    text = f"{forecast.mean:.{digits}f}"
+    return f"{text} ({forecast.low:.{digits}f} to {forecast.high:.{digits}f})" if np.isfinite(forecast.low) else text
