@@ -23,7 +23,6 @@ from typing import TypeVar
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import norm
 
 from benchmarks.planning.shelf_subsets import Subset, SubsetFigures
 from mvpose import Rig, preset
@@ -32,7 +31,7 @@ from mvpose.commands.progress import reporter
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.planning.fast_layer import Volume
 from simharness.planning.floor_coverage import covered_volume, usual_people
-from simharness.planning.forecast_error import LEVEL, ForecastError
+from simharness.planning.forecast_error import QUANTILE, ForecastError
 from simharness.planning.rehearsal_scene import RehearsalSetup, SceneSettings
 from simharness.planning.rig_file import read_rig
 from simharness.planning.simulated_scenes import Condition, SceneBatch, SceneResult, simulate_scenes
@@ -49,7 +48,6 @@ from simharness.scoring.pcp import Part
 from simharness.trial.conditioned_trial import estimate_frames
 
 _RIGS = Path(__file__).with_name("filmed_rigs.toml")
-_Z = float(norm.ppf((1 + LEVEL) / 2))
 Scores = Mapping[Subset, Floats]
 """Scores of n scenes or resamples by set of cameras: PCP and MPJPE, (2, n)."""
 T = TypeVar("T")
@@ -126,7 +124,7 @@ def covered(error: ForecastError, figures: Floats) -> Floats:
     """Return which figures (n, 4) lie within the intervals of a forecast, (n,)."""
     _, size, apart, noise = figures.T
     deviation = np.array([error.deviation(each) for each in size])
-    return np.asarray(np.abs(apart) <= _Z * np.hypot(deviation, noise))
+    return np.asarray(np.abs(apart) <= QUANTILE * np.hypot(deviation, noise))
 
 
 def forecast_rig(rig: Rig, volume: Volume, people: int, *, detector: str, scenes: int, workers: int) -> Scores:

@@ -10,13 +10,17 @@ Shelf (``python -m benchmarks.planning.blind_forecasts``).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import norm, t
 
 from simharness.statistics.intervals import LEVEL as SCENES
 from simharness.statistics.intervals import Interval
 
 LEVEL = 0.9
 """Coverage probability of the intervals of forecasts."""
+
+_RIGS = 11  # from which the errors come: the quantile is that of Student's t
+QUANTILE = float(t.ppf((1 + LEVEL) / 2, _RIGS - 1))
+"""Half the width of an interval in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,7 @@ class ForecastError:
         """
         if not np.isfinite(scenes.mean):
             return scenes
-        model = norm.ppf((1 + LEVEL) / 2) * self.deviation(size)
+        model = QUANTILE * self.deviation(size)
         noise = norm.ppf((1 + LEVEL) / 2) / norm.ppf((1 + SCENES) / 2)
         down, up = (
             np.hypot(model, noise * width if np.isfinite(width) else 0.0)
@@ -53,13 +57,13 @@ class ForecastError:
         return Interval(scenes.mean, float(ends[0]), float(ends[1]), scenes.n)
 
 
-PCP = ForecastError(1.5, 0.4)
+PCP = ForecastError(4.3, 0.36)
 """Of PCP, points; its size are the points below 100."""
 
-LOSS = ForecastError(1.0, 0.6)
+LOSS = ForecastError(0.86, 0.4)
 """Of PCP lost or gained by a camera or a fault, points."""
 
-MPJPE = ForecastError(0.0, 0.25)
+MPJPE = ForecastError(1.0, 0.43)
 """Of joint errors, mm."""
 
 

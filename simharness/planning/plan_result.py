@@ -21,8 +21,8 @@ class Figures:
     """Figures of a rig in the volume."""
 
     pcp: Interval
-    """Percentage of correct parts, with its 90 % interval: of a recording of ten seconds by the fast layer, of a forecast
-    by simulation."""
+    """Percentage of correct parts, with its 90 % interval: by the fast layer of a recording of ten seconds, else of a
+    forecast by simulation."""
     error_mm: Interval
     """Mean error of joints, millimetres, with its interval."""
     share: float = math.nan

@@ -299,9 +299,9 @@ def _cameras(rehearsal: Rehearsal) -> str:
             f"{max(low, 0.0):.1f} to {high:.1f} points of PCP"
         )
     if redundant:
-        which = "any one of the cameras" if len(redundant) > 1 else "camera"
-        names = _listed([each.camera.name for each in redundant])
-        parts.append(f"{which} {names} is redundant: its failure costs less than {LITTLE:g} points")
+        names = [each.camera.name for each in redundant]
+        which = f"camera {names[0]}" if len(names) == 1 else f"any one of the cameras {_listed(names)}"
+        parts.append(f"{which} is redundant: its failure costs less than {LITTLE:g} points")
     if len(needed) == len(worths):
         parts.append("no camera is redundant")
     return _sentence("; ".join(parts))

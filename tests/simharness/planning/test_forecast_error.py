@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 from simharness.planning.forecast_error import ForecastError, forecast_loss, forecast_mm, forecast_pcp
 from simharness.statistics.intervals import Interval
 
-Z90, Z95 = 1.6448536269514722, 1.959963984540054
+Z90, Z95, T90 = 1.6448536269514722, 1.959963984540054, 1.8124611228107335  # t of 10 degrees of freedom
 
 
 def test_without_noise_the_interval_is_that_of_the_model_alone():
     made = ForecastError(3.0, 0.4).interval(Interval(70.0, 70.0, 70.0, 9), 10.0)
     assert (made.mean, made.low, made.high, made.n) == (
         70.0,
-        pytest.approx(70 - 5 * Z90),
-        pytest.approx(70 + 5 * Z90),
+        pytest.approx(70 - 5 * T90),
+        pytest.approx(70 + 5 * T90),
         9,
     )
 
