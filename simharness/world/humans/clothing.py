@@ -78,7 +78,7 @@ def face_colors(body: Body, look: Look) -> NDArray[np.float32]:
     colors[body.part == FacePart.LIPS] = look.lips
     colors[body.part == FacePart.SCLERA] = _SCLERA
     colors[body.part == FacePart.IRIS] = look.eyes
-    express(colors, body, expression=look.expression, brow=mix(look.hair, look.skin, 0.3))
+    express(colors, expression=look.expression, brow=mix(look.hair, look.skin, 0.3))
     for part, color in accessory_colors(look).items():
         colors[body.part == part] = color
     return colors

@@ -97,7 +97,7 @@ _CHOICES = {
     "bottom_pattern": PATTERNS,
     "lower_garment": LOWER_GARMENTS,
     "hair_style": HAIR_STYLES,
-    "expression": tuple(EXPRESSIONS),
+    "expression": EXPRESSIONS,
     "glasses": GLASSES,
     "hat": HATS,
     "mask": MASKS,
