@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from people import crowd, ring
 
-from mvpose.tracking.drift_charts import INTERVAL, STRAY, Charts, DriftTest, _close_batch, update_charts
+from mvpose.tracking.drift_charts import INTERVAL, STRAY, Charts, DriftTest, _close_batch, _count_people, update_charts
 from mvpose.tracking.picture_shift import TERMS, ExpectedPeople
 from mvpose.tracking.pose_update import MatchedRays
 
@@ -193,3 +194,47 @@ def test_a_batch_is_full_with_five_people_after_a_second(found):
     np.testing.assert_array_equal(charts.people, [[0 if found == 5 else found, 0]] * 3)
     look(charts, 1.9, 1.0, found=5)  # less than a second after the latest batch
     assert (charts.start == (1.0 if found == 5 else 1.9)).all()
+
+
+def counted(labels, view, *, groups=(0, 1), reported=(True, True), away=()) -> list[float]:
+    """Return the found and stray people in the picture of camera 0 of four, which sees all but some."""
+    rig = ring(4)
+    people = crowd(len(groups))
+    people[list(away)] += [0.0, 0.0, 50.0]
+    m, counts = len(labels), np.zeros(2)
+    rays = MatchedRays(
+        np.array(labels), np.array(view), np.zeros((m, 3)), np.zeros((m, 17, 3)), np.ones((m, 17)), np.zeros(m),
+        np.zeros(m),
+    )  # fmt: skip
+    state = np.concatenate([people, np.zeros_like(people)], axis=2)
+    expected = ExpectedPeople(np.array(groups), np.array(reported), state)
+    _count_people(counts, 0, expected, rays, rig.packed[0], np.array([1280.0, 960.0]))
+    return counts.tolist()
+
+
+@pytest.mark.parametrize(
+    ("labels", "view", "expected"),
+    [
+        ([0, 0, 0, 1, 1, 1], [0, 1, 2, 0, 1, 2], [2, 0]),  # both are found
+        ([0, 0, 1, 1], [1, 2, 1, 2], [0, 0]),  # this picture has no detection, as of a camera that is covered
+        ([0, 0, 0, 1, 1], [0, 1, 2, 1, 2], [1, 0]),  # its only detection is the other person's
+        ([0, 0, 0, 1, 1, -1], [0, 1, 2, 1, 2, 0], [1, 1]),  # one is beside its place
+        ([0, 0, 1, 1, -1, -1, -1], [1, 2, 1, 2, 0, 0, 0], [0, 2]),
+        ([0, 0, 1, 1, -1], [1, 2, 1, 2, 0], [0, 1]),  # one detection is nobody's: one is hidden
+        ([0, 0, 1, 1, -1, -1], [1, 2, 1, 2, 3, 3], [0, 0]),  # another camera's phantoms
+        ([0, 0, 1, 1, 2], [1, 2, 1, 2, 0], [0, 1]),  # a group of this picture alone
+        ([0, 1, -1, -1], [1, 2, 0, 0], [0, 0]),  # one other camera is no evidence of a person
+        ([0, 0, 1], [0, 1, 0], [0, 0]),
+    ],
+)
+def test_people_whom_others_see_are_stray_where_detections_are_nobodys(labels, view, expected):
+    assert counted(labels, view) == expected
+
+
+def test_people_outside_of_the_picture_or_not_yet_reported_are_not_stray():
+    labels, view = [0, 0, 1, 1, -1, -1], [1, 2, 1, 2, 0, 0]
+    assert counted(labels, view) == [0, 2]
+    assert counted(labels, view, away=[1]) == [0, 1]
+    assert counted(labels, view, reported=(True, False)) == [0, 1]
+    assert counted(labels, view, groups=(0, -1)) == [0, 1]
+    assert counted([0, 0, 0, -1], [0, 1, 2, 0], groups=(0,), reported=(False,)) == [0, 0]

@@ -13,7 +13,7 @@ from mvpose.reconstruction.likelihood import Noise
 from mvpose.skeleton import COCO17
 from mvpose.tracking import DriftModel, Tracker, TrackerState, TrackingModel
 from mvpose.tracking.drift_watch import DriftWatch
-from mvpose.tracking.picture_shift import TERMS, ExpectedPeople, measure_shifts, solve_shift
+from mvpose.tracking.picture_shift import TERMS, ExpectedPeople, _place, measure_shifts, solve_shift
 from mvpose.tracking.pose_update import MatchedRays
 
 RIG = ring(5)
@@ -114,6 +114,18 @@ def test_the_variance_of_a_shift_is_that_of_least_squares():
         / np.tile(deviation, 2)[:, None]
     )
     np.testing.assert_allclose(variance, np.linalg.inv(A.T @ A).diagonal(), rtol=0.02)
+
+
+@pytest.mark.parametrize("cameras", [0, 1, 2, 4])
+def test_a_joint_is_where_two_trusted_cameras_or_else_the_past_place_it(cameras):
+    rays = viewing_rays(RIG, pictures(RIG, 0.0, np.random.default_rng(0), noise=0.0, count=1))
+    joints, nose = people_at(0.0, 1), 0
+    state = np.append(joints[0, nose] + 0.1, np.ones(3))
+    memory, work = np.full(4, 7.0), np.empty((8, 3))  # the place must stay within its three numbers
+    trusted = np.arange(5) <= cameras  # the watched camera 0, and so many others
+    _place(memory[:3], 0, 0, state, nose, trusted, matched_rays(rays, np.zeros(5, np.int64)), work)
+    np.testing.assert_allclose(memory[:3], joints[0, nose] if cameras >= 2 else state[:3], atol=4e-3)
+    assert memory[3] == 7.0
 
 
 @pytest.mark.parametrize(("view", "axis"), [(0, (0, 1, 0)), (3, (1, 0, 0)), (4, (0.7, 0.7, 0))])

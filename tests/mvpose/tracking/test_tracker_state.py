@@ -3,6 +3,7 @@
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -47,6 +48,17 @@ def middle(tmp_path_factory):
     tracker.state().save(path)
     assert [each.name for each in path.parent.iterdir()] == ["middle.npz"]
     return rig, frames[12:], _bytes([tracker.estimate(rig, frame) for frame in frames[12:]]), path
+
+
+def test_a_tracker_has_a_time_from_its_first_picture_on():
+    rig, frames, _ = _film()
+    tracker = _tracker()
+    assert tracker.time is None
+    dark = Detections.empty()
+    tracker.estimate(rig, replace(dark, time=np.full(len(rig), np.nan)))
+    assert tracker.time is None
+    tracker.estimate(rig, frames[0])
+    assert tracker.time == 0.0
 
 
 def test_a_restored_tracker_goes_on_with_the_same_bytes(middle):
