@@ -10,7 +10,7 @@ from mvpose.rays import viewing_rays
 from mvpose.reconstruction.error_scale import SHARED
 from mvpose.tracking import Tracker, TrackingModel
 from mvpose.tracking.association import TrackAffinity
-from mvpose.tracking.existence import Existence, MeasuredClutter, gather_evidence, log_odds
+from mvpose.tracking.existence import Existence, MeasuredClutter, gather_evidence, in_image, log_odds
 from mvpose.tracking.frame_kernels import vagueness_of
 
 RATE = 25.0
@@ -175,3 +175,30 @@ def test_pictures_that_miss_who_has_just_come_count_in_full_and_later_ones_by_th
     assert gathered(rig, state, [], step=quarter, fresh=True)[1] == pytest.approx([1.0])
     assert gathered(rig, state, [], step=quarter)[1] == pytest.approx([0.25])
     assert gathered(rig, state, [0], step=quarter, fresh=True)[0] == pytest.approx([0.0])  # born from it
+
+
+@pytest.mark.parametrize(
+    ("pixels", "inside"),
+    [
+        ([(0.0, 0.0)] * 3, True),  # the first pixel, exactly
+        ([(-0.5, 10.0)] * 3, False),
+        ([(10.0, -0.5)] * 3, False),
+        ([(64.0, 10.0)] * 3, False),  # one behind the last
+        ([(10.0, 48.0)] * 3, False),
+        ([(63.5, 47.5)] * 3, True),
+        ([(10.0, 10.0), (10.0, 10.0), (90.0, 10.0)], True),  # most joints
+        ([(10.0, 10.0), (90.0, 10.0), (90.0, 10.0)], False),
+        ([(10.0, 10.0), (90.0, 10.0), None], False),  # one of two known joints
+        ([(10.0, 10.0), None, None], True),
+        ([None, None, None], False),
+    ],
+)
+@pytest.mark.parametrize("depth", [2.0, -2.0])
+def test_a_person_is_in_the_image_with_most_known_joints(pixels, inside, depth):
+    """The camera looks along z from the origin; its focal lengths are 16 and 8 pixels, its centre is (32, 24)."""
+    camera = np.array([16.0, 0.0, 32.0, 8.0, 24.0, *np.eye(3).ravel(), *np.zeros(8)])
+    places = [
+        (np.nan,) * 3 if p is None else ((p[0] - 32) / 16 * depth, (p[1] - 24) / 8 * depth, depth) for p in pixels
+    ]
+    state = np.concatenate([places, np.zeros((3, 3))], axis=1)
+    assert in_image(camera, np.array([64.0, 48.0]), state) == (inside and depth > 0)
