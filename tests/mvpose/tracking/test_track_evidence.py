@@ -202,3 +202,5 @@ def test_a_person_is_in_the_image_with_most_known_joints(pixels, inside, depth):
     ]
     state = np.concatenate([places, np.zeros((3, 3))], axis=1)
     assert in_image(camera, np.array([64.0, 48.0]), state) == (inside and depth > 0)
+    beside_camera = np.full((3, 6), [0.5, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert not in_image(camera, np.array([64.0, 48.0]), beside_camera)
