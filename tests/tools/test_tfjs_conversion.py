@@ -1,12 +1,14 @@
-"""Graphs of TensorFlow.js converted to ONNX, against the formulas of their operations."""
+"""Graphs of TensorFlow.js converted to ONNX, and filled with weights, against the formulas of their operations."""
 
 import numpy as np
 import pytest
-from tfjs_graphs import TfjsGraph
+from tfjs_graphs import TfjsGraph, package_of_networks
 
 from mvpose.networks import Card, Session
-from mvpose.networks.catalogue.tfjs_conversion import convert
-from mvpose.networks.catalogue.tfjs_graph import read_graph
+from mvpose.networks.catalogue.fetch import filled
+from tools.networks.__main__ import DATA, check, graphs
+from tools.networks.tfjs_conversion import convert
+from tools.networks.tfjs_graph import read_graph
 
 RAW = Card(mean=(0.0,) * 3, std=(1 / 255,) * 3, size=(13, 10))
 RANDOM = np.random.default_rng(3)
@@ -15,11 +17,13 @@ INPUT = PICTURES.astype(float)
 
 
 def computed(graph, output, tmp_path, *, sigmoid=()):
+    content, weights = graph.files()
     model = convert(
-        read_graph(*graph.files()), pictures="pictures", outputs={"result": output}, sigmoid=sigmoid, card=RAW
+        read_graph(content, weights), name="network", pictures="pictures", outputs={"result": output}, sigmoid=sigmoid
     )
     path = tmp_path / "network.onnx"
-    path.write_bytes(model.SerializeToString())
+    path.write_bytes(filled(model.SerializeToString(), weights, RAW))
+    check(path.read_bytes())
     (result,) = Session(path)(PICTURES)
     return result
 
@@ -130,11 +134,13 @@ def test_reshaping(tmp_path):
 @pytest.mark.parametrize(
     ("stored", "scale", "tolerance"), [(None, None, 1e-6), ("float16", None, 1e-3), ("uint8", 1 / 100, 0.005)]
 )
-def test_weights_that_are_stored_shorter(stored, scale, tolerance):
+def test_weights_that_are_stored_shorter(tmp_path, stored, scale, tolerance):
     graph = TfjsGraph()
-    values = np.linspace(-1.0, 1.5, 11)
+    values = np.linspace(-1.0, 1.5, 39).reshape(13, 3)
     name = graph.weight(values, stored=stored, scale=scale, least=-1.0)
     after = graph.weight(np.array([7, -9]))
+    added = computed(graph, graph.add("Add", "pictures", name), tmp_path) - INPUT
+    np.testing.assert_allclose(added, np.broadcast_to(values, added.shape), atol=tolerance + 3e-5)
     weights = read_graph(*graph.files()).weights
     np.testing.assert_allclose(weights[name], values, atol=tolerance)
     np.testing.assert_array_equal(weights[after], [7, -9])
@@ -148,7 +154,7 @@ def branch():
 
 def refused(graph, message, output="wanted"):
     with pytest.raises(ValueError, match=message):
-        convert(read_graph(*graph.files()), pictures="pictures", outputs={"result": output}, sigmoid=(), card=RAW)
+        convert(read_graph(*graph.files()), name="network", pictures="pictures", outputs={"result": output})
 
 
 def test_what_the_outputs_do_not_need_is_left_out(tmp_path):
@@ -188,3 +194,9 @@ def test_weights_of_another_size_are_refused(change):
     content, weights = graph.files()
     with pytest.raises(ValueError, match="weights have"):
         read_graph(content, change(weights))
+
+
+@pytest.mark.slow
+def test_the_shipped_graphs_are_those_of_the_package():
+    for name, content in graphs(package_of_networks()).items():
+        assert (DATA / f"{name}_without_weights.onnx").read_bytes() == content

@@ -35,6 +35,9 @@ class GraphModel:
     """Operations by name; constants are in ``weights``."""
     weights: Mapping[str, NDArray[Any]]
     """Constants by name, float32 or int64."""
+    stored: Mapping[str, Mapping[str, str]]
+    """How each constant is stored in the file of weights: ``offset`` in bytes and ``type``, and ``scale`` and ``least``
+    where it is quantised."""
 
     def between(self, start: str, ends: Iterable[str]) -> list[GraphNode]:
         """Return the operations from the output of one to those of others, each after those that it takes.
@@ -77,7 +80,7 @@ def read_graph(graph: bytes, weights: bytes) -> GraphModel:
         content = json.loads(graph)
         nodes = content["modelTopology"]["node"]
         entries = [entry for group in content["weightsManifest"] for entry in group["weights"]]
-        constants = _constants(entries, weights)
+        constants, stored = _constants(entries, weights)
         found = [
             GraphNode(
                 node["name"],
@@ -90,12 +93,18 @@ def read_graph(graph: bytes, weights: bytes) -> GraphModel:
         ]
     except (KeyError, TypeError, AttributeError, RecursionError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise ValueError(f"not a graph model of TensorFlow.js: {type(error).__name__} {error}") from None
-    return GraphModel({node.name: node for node in found}, constants)
+    return GraphModel({node.name: node for node in found}, constants, stored)
 
 
-def _constants(entries: list[dict[str, Any]], content: bytes) -> dict[str, NDArray[Any]]:
-    """Return the weights, one after the other in the file; quantised ones are ``scale * value + min``."""
+def _constants(
+    entries: list[dict[str, Any]], content: bytes
+) -> tuple[dict[str, NDArray[Any]], dict[str, dict[str, str]]]:
+    """Return the weights, one after the other in the file, and how they are stored.
+
+    Quantised ones are ``scale * value + min``.
+    """
     found: dict[str, NDArray[Any]] = {}
+    places: dict[str, dict[str, str]] = {}
     start = 0
     for entry in entries:
         stored = entry.get("quantization", {})
@@ -104,13 +113,15 @@ def _constants(entries: list[dict[str, Any]], content: bytes) -> dict[str, NDArr
         if start + count * kind.itemsize > len(content):
             raise ValueError(f"the weights have {len(content)} bytes and are cut off in {entry['name'][:80]!r}")
         values = np.frombuffer(content, kind, count, start).reshape(entry["shape"])
+        places[entry["name"]] = {"offset": str(start), "type": kind.str}
         start += count * kind.itemsize
         if "scale" in stored:
+            places[entry["name"]] |= {"scale": repr(stored["scale"]), "least": repr(stored["min"])}
             values = values.astype(np.float32) * np.float32(stored["scale"]) + np.float32(stored["min"])
         found[entry["name"]] = values.astype(np.float32 if entry["dtype"] == "float32" else np.int64)
     if start != len(content):
         raise ValueError(f"the weights have {len(content)} bytes, and the graph takes {start}")
-    return found
+    return found, places
 
 
 def _value(value: dict[str, Any]) -> Any:

@@ -1,4 +1,6 @@
-"""Graphs of TensorFlow.js to ONNX: convolutional networks up to their heads, with pictures as input.
+"""Graphs of TensorFlow.js to ONNX without weights: convolutional networks up to their heads, with pictures as input.
+
+For :func:`mvpose.networks.catalogue.fetch.filled` constants say, as external data, where their values are stored.
 
 Tensors keep the layout of TensorFlow, (n, height, width, channels), and integers become 64 bits wide. Convolutions
 stand between two transpositions, which onnxruntime cancels against each other when it opens the file.
@@ -10,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.networks.card import Card
-from mvpose.networks.catalogue.tfjs_graph import GraphModel, GraphNode
+from tools.networks.tfjs_graph import GraphModel, GraphNode
 
 if TYPE_CHECKING:
     from onnx import ModelProto
@@ -22,39 +23,37 @@ _ACTIVATIONS = ("Relu", "Relu6")
 
 
 def convert(
-    model: GraphModel, *, pictures: str, outputs: Mapping[str, str], sigmoid: Collection[str], card: Card
+    model: GraphModel, *, name: str, pictures: str, outputs: Mapping[str, str], sigmoid: Collection[str] = ()
 ) -> "ModelProto":
     """Convert the part of a graph between two sets of tensors to ONNX.
 
     Args:
         model: the graph.
+        name: name of the network.
         pictures: operation whose output is replaced by the input, pictures (n, height, width, 3), float32.
         outputs: operations whose outputs are those of the network, by their new names.
         sigmoid: names of outputs to which a sigmoid is added.
-        card: model card, which is stored in the file.
 
     Returns:
-        The network, for any number of pictures, and where the graph allows it of any size.
+        The network without weights, for any number of pictures, and where the graph allows it of any size.
 
     Raises:
         ValueError: an operation or an attribute that is not supported, or a name of no operation.
     """
-    from onnx import TensorProto, checker, helper
+    from onnx import TensorProto, helper
 
     graph = _Conversion(model)
     for node in model.between(pictures, outputs.values()):
         if node.kind not in _OPERATIONS:
             raise ValueError(f"operation {node.kind[:60]!r} is not supported ({node.name[:80]!r})")
         _OPERATIONS[node.kind](graph, node)
-    for name, tensor in outputs.items():
-        graph.add("Sigmoid" if name in sigmoid else "Identity", [tensor], name)
+    for output, tensor in outputs.items():
+        graph.add("Sigmoid" if output in sigmoid else "Identity", [tensor], output)
     taken = helper.make_tensor_value_info(pictures, TensorProto.FLOAT, ["n", "height", "width", 3])
-    results = [helper.make_tensor_value_info(name, TensorProto.FLOAT, [None] * 4) for name in outputs]
-    made = helper.make_graph(graph.nodes, card.name or "network", [taken], results, graph.initializers)
+    results = [helper.make_tensor_value_info(output, TensorProto.FLOAT, [None] * 4) for output in outputs]
+    made = helper.make_graph(graph.nodes, name, [taken], results, graph.initializers)
     network = helper.make_model(made, opset_imports=[helper.make_opsetid("", _OPSET)], producer_name="mvpose")
     network.ir_version = _IR
-    helper.set_model_props(network, card.to_metadata())
-    checker.check_model(network)
     return network
 
 
@@ -62,7 +61,7 @@ class _Conversion:
     """ONNX nodes and constants that are made so far."""
 
     def __init__(self, model: GraphModel) -> None:
-        self.weights = model.weights
+        self.weights, self._places = model.weights, model.stored
         self.nodes: list[Any] = []
         self.initializers: list[Any] = []
         self._stored: set[str] = set()
@@ -73,7 +72,7 @@ class _Conversion:
 
         for name in inputs:
             if name in self.weights and name not in self._stored:
-                self.constant(name, self.weights[name])
+                self.stored(name, name)
         self.nodes.append(helper.make_node(kind, list(inputs), [output], name=output, **attributes))
         return output
 
@@ -83,6 +82,18 @@ class _Conversion:
 
         self._stored.add(name)
         self.initializers.append(numpy_helper.from_array(np.ascontiguousarray(values), name))
+        return name
+
+    def stored(self, name: str, weight: str, kernel: NDArray[Any] | None = None) -> str:
+        """Add a constant whose values are weights, or a kernel of them for convolutions, and return its name."""
+        values = self.weights[weight] if kernel is None else kernel
+        axes = range(values.ndim) if kernel is None else (3, 2, 0, 1)
+        self.constant(name, values.transpose(tuple(axes)))
+        constant = self.initializers[-1]
+        constant.ClearField("raw_data")
+        how = {"shape": " ".join(map(str, values.shape)), "axes": " ".join(map(str, axes))}
+        for key, value in {**self._places[weight], **how}.items():
+            constant.external_data.add(key=key, value=value)
         return name
 
     def weight(self, node: GraphNode, position: int) -> NDArray[Any]:
@@ -107,10 +118,11 @@ def _convolution(graph: _Conversion, node: GraphNode) -> None:
     if "Depthwise" in node.kind:  # (h, w, channels, multiplier)
         groups = kernel.shape[2]
         kernel = kernel.reshape(*kernel.shape[:2], 1, -1)
-    inputs = [node.inputs[0], graph.constant(f"{node.name}/kernel", kernel.transpose(3, 2, 0, 1))]
+    inputs = [node.inputs[0], graph.stored(f"{node.name}/kernel", node.inputs[1], kernel)]
     fused = list(node.attributes.get("fused_ops", []))
     if fused[:1] == ["BiasAdd"]:
-        inputs.append(graph.constant(f"{node.name}/bias", graph.weight(node, 2)))
+        graph.weight(node, 2)
+        inputs.append(graph.stored(f"{node.name}/bias", node.inputs[2]))
         fused = fused[1:]
     if len(fused) > 1 or any(each not in _ACTIVATIONS for each in fused):
         raise ValueError(f"{node.kind} {node.name[:80]!r}: fused operations {fused} are not supported")
