@@ -23,6 +23,12 @@ def test_frames_come_in_blocks():
     assert (blocks(TIME), blocks(TIME, block=2.0), blocks(TIME, block=100.0), blocks([0.0])) == (12, 6, 1, 1)
 
 
+@pytest.mark.parametrize(("frames", "step"), [(2, 0.5), (4, 0.5), (6, 0.5), (9, 1 / 3), (5, 0.2), (3, 1.0), (3, 2.0)])
+def test_few_frames_make_as_many_blocks_as_they_last(frames, step):
+    """Each frame lasts until the next; a longer one is a block of its own."""
+    assert blocks(np.arange(frames) * step) == max(round(min(frames * step, frames)), 1)
+
+
 def test_sums_of_a_resample_are_those_of_its_frames():
     rng = np.random.default_rng(0)
     values, weights = rng.normal(size=(300, 2, 3)), block_weights(TIME, resamples=5)
