@@ -80,16 +80,14 @@ def test_the_variants_default_to_those_of_the_scenario():
 def test_blame_uses_the_detections_that_the_variant_was_given(monkeypatch):
     seen = {}
 
-    def look(recording, estimator, estimates, failures):
-        (detections,) = recording.detections
-        again = estimator.estimate(recording.rig, detections)
-        (estimate,) = estimates
+    def look(real, estimator, estimate, failures, tracked):
+        again = estimator.estimate(real.rig, real.detections)
         assert again.joints == pytest.approx(estimate.joints, nan_ok=True)
-        seen.setdefault(id(estimator), detections.likelihoods is not None)
-        return find_stages(recording, estimator, estimates, failures)
+        seen.setdefault(id(estimator), real.detections.likelihoods is not None)
+        return find_stages(real, estimator, estimate, failures, tracked)
 
-    find_stages = stage_blame.blame
-    monkeypatch.setattr(stage_blame, "blame", look)
+    find_stages = stage_blame._blame_frame
+    monkeypatch.setattr(stage_blame, "_blame_frame", look)
     measure(cheap("detector.heatmaps.size=64x48"), ["full", "fast"])
     assert sorted(seen.values()) == [False, True]
 
