@@ -5,8 +5,9 @@
 FOLDER keeps what is finished. Ten rigs (``filmed_rigs.toml``) are rendered, and their pictures read by the network
 MoveNet (``mvpose networks get movenet``); where the data of Shelf are, its recording is the eleventh. The forecast of a
 rig knows the cameras, where people are and their number, as somebody would say them who plans it; of Shelf, only the
-calibration. Neither knows the network: all have the same profile of a detector. PCP is that of ``full`` with missing
-joints of the head filled from the others, for all sets of two cameras and more.
+calibration. Neither knows the network, and all have the same profile of a detector; with ``--detector movenet``, that
+of the network of the rendered rigs. PCP is that of ``full`` with missing joints of the head filled from the others, for
+all sets of two cameras and more.
 
 The errors of all rigs but one give the intervals of that one; how many of its figures they hold is the test of the
 intervals, and the errors of all rigs are the constants of the module.
@@ -31,7 +32,7 @@ from mvpose.commands.progress import reporter
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.planning.fast_layer import Volume
 from simharness.planning.floor_coverage import covered_volume, usual_people
-from simharness.planning.forecast_error import QUANTILE, ForecastError
+from simharness.planning.forecast_error import ForecastError
 from simharness.planning.rehearsal_scene import RehearsalSetup, SceneSettings
 from simharness.planning.rig_file import read_rig
 from simharness.planning.simulated_scenes import Condition, SceneBatch, SceneResult, simulate_scenes
@@ -117,14 +118,14 @@ def fit_error(figures: Sequence[Floats]) -> ForecastError:
         return total
 
     best = minimize(cost, np.log([1.0, 0.3]), method="Nelder-Mead").x
-    return ForecastError(*(float(each) for each in np.exp(best)))
+    return ForecastError(*(float(each) for each in np.exp(best)), len(figures))
 
 
 def covered(error: ForecastError, figures: Floats) -> Floats:
     """Return which figures (n, 4) lie within the intervals of a forecast, (n,)."""
     _, size, apart, noise = figures.T
     deviation = np.array([error.deviation(each) for each in size])
-    return np.asarray(np.abs(apart) <= QUANTILE * np.hypot(deviation, noise))
+    return np.asarray(np.abs(apart) <= error.quantile * np.hypot(deviation, noise))
 
 
 def forecast_rig(rig: Rig, volume: Volume, people: int, *, detector: str, scenes: int, workers: int) -> Scores:
@@ -248,8 +249,8 @@ def report(forecasts: Sequence[BlindForecast]) -> str:
         error = fit_error(figures)
         rates = ", ".join(f"{each.name} {100 * one.mean():.0f}" for each, one in zip(forecasts, held, strict=True))
         lines.append(
-            f"\n{kind}: ForecastError({error.least:.2g}, {error.share:.2g}); intervals from the other rigs hold "
-            f"{100 * np.mean([one.mean() for one in held]):.0f} % ({rates})"
+            f"\n{kind}: ForecastError({error.least:.2g}, {error.share:.2g}, {error.rigs}); intervals from the "
+            f"other rigs hold {100 * np.mean([one.mean() for one in held]):.0f} % ({rates})"
         )
     return "\n".join(lines)
 

@@ -4,7 +4,8 @@ Scenes of the simulator differ by their people and draws; that is the noise of a
 What a forecast does not know stays: the network that will be used, how people stand and move, how exact the calibration
 is, and how the truth is annotated. These errors are measured where both are known: forecasts that know no more than the
 rig, where people are and their number, beside a network on rendered pictures of ten rigs, and beside the recording
-Shelf (``python -m benchmarks.planning.blind_forecasts``).
+Shelf (``python -m benchmarks.planning.blind_forecasts``). A profile of that network, measured in other pictures, leaves
+a third of them.
 """
 
 from dataclasses import dataclass
@@ -12,15 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm, t
 
+from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.statistics.intervals import LEVEL as SCENES
 from simharness.statistics.intervals import Interval
 
 LEVEL = 0.9
 """Coverage probability of the intervals of forecasts."""
-
-_RIGS = 11  # from which the errors come: the quantile is that of Student's t
-QUANTILE = float(t.ppf((1 + LEVEL) / 2, _RIGS - 1))
-"""Half the width of an interval in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +29,13 @@ class ForecastError:
     """Standard deviation for figures of size 0, in the unit of the figure."""
     share: float
     """Standard deviation as a share of the size, for large ones."""
+    rigs: int
+    """Number of rigs on which it was measured: the quantile is that of Student's t."""
+
+    @property
+    def quantile(self) -> float:
+        """Half the width of an interval in standard deviations."""
+        return float(t.ppf((1 + LEVEL) / 2, self.rigs - 1))
 
     def deviation(self, size: float) -> float:
         """Return the standard deviation for a figure of some size."""
@@ -47,7 +52,7 @@ class ForecastError:
         """
         if not np.isfinite(scenes.mean):
             return scenes
-        model = QUANTILE * self.deviation(size)
+        model = self.quantile * self.deviation(size)
         noise = norm.ppf((1 + LEVEL) / 2) / norm.ppf((1 + SCENES) / 2)
         down, up = (
             np.hypot(model, noise * width if np.isfinite(width) else 0.0)
@@ -57,29 +62,40 @@ class ForecastError:
         return Interval(scenes.mean, float(ends[0]), float(ends[1]), scenes.n)
 
 
-PCP = ForecastError(4.3, 0.36)
-"""Of PCP, points; its size are the points below 100."""
+@dataclass(frozen=True)
+class ForecastErrors:
+    """Errors of the forecasts with a kind of detector profile."""
 
-LOSS = ForecastError(0.86, 0.4)
-"""Of PCP lost or gained by a camera or a fault, points."""
+    pcp: ForecastError
+    """Of PCP, points; its size are the points below 100."""
+    loss: ForecastError
+    """Of PCP lost or gained by a camera or a fault, points."""
+    mpjpe: ForecastError
+    """Of joint errors, mm."""
 
-MPJPE = ForecastError(1.0, 0.43)
-"""Of joint errors, mm."""
+    @classmethod
+    def of_detector(cls, detector: DetectorSection) -> "ForecastErrors":
+        """Return those of a profile: whether it was measured on the network that will be used, or is a general one."""
+        return MEASURED if detector.measured else GENERAL
+
+    def of_pcp(self, scenes: Interval) -> Interval:
+        """Return the interval of a forecast of PCP, or of recall, percent, given that over scenes."""
+        return self.pcp.interval(scenes, 100.0 - scenes.mean, low=0.0, high=100.0)
+
+    def of_loss(self, scenes: Interval) -> Interval:
+        """Return the interval of a forecast of a difference of PCP, points."""
+        return self.loss.interval(scenes, abs(scenes.mean))
+
+    def of_mm(self, scenes: Interval) -> Interval:
+        """Return the interval of a forecast of joint errors, mm."""
+        return self.mpjpe.interval(scenes, scenes.mean, low=0.0)
 
 
-def forecast_pcp(scenes: Interval) -> Interval:
-    """Return the interval of a forecast of PCP, or of recall, percent."""
-    return PCP.interval(scenes, 100.0 - scenes.mean, low=0.0, high=100.0)
+GENERAL = ForecastErrors(ForecastError(4.3, 0.36, 11), ForecastError(0.86, 0.4, 11), ForecastError(1.0, 0.43, 11))
+"""Errors with a shipped profile of no certain network."""
 
-
-def forecast_loss(scenes: Interval) -> Interval:
-    """Return the interval of a forecast of a difference of PCP, points."""
-    return LOSS.interval(scenes, abs(scenes.mean))
-
-
-def forecast_mm(scenes: Interval) -> Interval:
-    """Return the interval of a forecast of joint errors, mm."""
-    return MPJPE.interval(scenes, scenes.mean, low=0.0)
+MEASURED = ForecastErrors(ForecastError(0.59, 0.28, 9), ForecastError(0.21, 0.41, 9), ForecastError(1.0, 0.12, 9))
+"""Errors with a profile that was measured on other pictures of the network (``simharness profile-network``)."""
 
 
 def forecast_text(forecast: Interval, *, digits: int = 1) -> str:

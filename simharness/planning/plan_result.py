@@ -10,7 +10,7 @@ import numpy as np
 from mvpose import Rig
 from simharness.planning.candidates import Candidate
 from simharness.planning.fast_layer import Prediction
-from simharness.planning.forecast_error import forecast_loss, forecast_text
+from simharness.planning.forecast_error import ForecastErrors, forecast_text
 from simharness.planning.planned_room import Room
 from simharness.planning.room_keys import TargetKeys
 from simharness.statistics.intervals import Interval
@@ -206,7 +206,7 @@ def sentences(plan: RigPlan) -> list[str]:
     if more is not None and same is not None:
         gain = more.figures.pcp.mean - same.figures.pcp.mean
         # Two draws of one layer: their difference has the error of the model alone.
-        added = forecast_loss(Interval(gain, np.nan, np.nan, 1))
+        added = ForecastErrors.of_detector(room.detector).of_loss(Interval(gain, np.nan, np.nan, 1))
         helps = "would" if added.low > 0 else "may"
         lines.append(f"One more camera {helps} add {forecast_text(added)} PCP.")
     placed = [each for each in plan.cameras if each.candidate is not None]

@@ -25,7 +25,7 @@ from mvpose.arrays import Floats
 from mvpose.commands.progress import Reporter, Silence
 from simharness.planning.candidates import Candidate, alike, around, candidates_in
 from simharness.planning.fast_layer import FastLayer, Prediction
-from simharness.planning.forecast_error import forecast_mm, forecast_pcp
+from simharness.planning.forecast_error import ForecastErrors
 from simharness.planning.plan_result import Alternative, CurvePoint, Figures, PlannedCamera, RigPlan
 from simharness.planning.planned_room import Room
 from simharness.planning.rig_comparison import VARIANT, corner_rig, fit_value, layer_of, rig_of, ring_rig, simulate_rigs
@@ -328,10 +328,11 @@ class _Work:
                 workers=self.effort.workers,
                 reporter=self.reporter,
             )
+            errors = ForecastErrors.of_detector(self.room.detector)
             return [
                 Figures(
-                    forecast_pcp(interval_of(results, each, "pcp")),
-                    forecast_mm(interval_of(results, each, "mpjpe_mm")),
+                    errors.of_pcp(interval_of(results, each, "pcp")),
+                    errors.of_mm(interval_of(results, each, "mpjpe_mm")),
                 ).to_row()
                 for each in conditions
             ]

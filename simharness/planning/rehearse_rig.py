@@ -11,7 +11,7 @@ from mvpose import Camera, Rig
 from mvpose.commands.progress import Reporter, Silence
 from simharness.planning.fast_layer import CameraTerms, FastLayer, Prediction
 from simharness.planning.floor_coverage import coverage
-from simharness.planning.forecast_error import forecast_loss, forecast_mm, forecast_pcp
+from simharness.planning.forecast_error import ForecastErrors
 from simharness.planning.rehearsal_result import (
     HEIGHTS,
     CameraWorth,
@@ -149,6 +149,11 @@ class _Rehearsing:
         """Indices of all cameras."""
         return tuple(range(len(self.rig)))
 
+    @property
+    def errors(self) -> ForecastErrors:
+        """Errors of the forecast, besides the noise of its scenes."""
+        return ForecastErrors.of_detector(self.setup.detector)
+
     def _layer(self, *, people: int, coarse: bool) -> FastLayer:
         return FastLayer.in_volume(
             self.setup.volume,
@@ -256,7 +261,7 @@ class _Rehearsing:
     def _estimated(self, scenes: Sequence[SceneResult], cameras: tuple[int, ...], prediction: Prediction) -> Estimated:
         summary, condition = prediction.summary(), Condition(cameras)
         pcp, error, recall = (interval_of(scenes, condition, score) for score in ("pcp", "mpjpe_mm", "recall"))
-        forecasts = forecast_pcp(pcp), forecast_mm(error), forecast_pcp(recall)
+        forecasts = self.errors.of_pcp(pcp), self.errors.of_mm(error), self.errors.of_pcp(recall)
         return Estimated(summary["pcp"].mean, summary["mpjpe_mm"].mean, *forecasts)
 
     def _worth(self, k: int, sees: float, scenes: Sequence[SceneResult], compared: _Compared) -> CameraWorth:
@@ -268,7 +273,7 @@ class _Rehearsing:
             camera=self.rig[k],
             sees=sees,
             without=None if predicted is None else self._estimated(scenes, rest.cameras, predicted),
-            worth=forecast_loss(loss_of(scenes, rest, base)),
+            worth=self.errors.of_loss(loss_of(scenes, rest, base)),
             worth_mm=gained,
             layer_worth=float(layer if predicted is None else layer - predicted.summary()["pcp"].mean),
         )
@@ -282,7 +287,7 @@ class _Rehearsing:
             camera,
             places,
             self._estimated(scenes, more, prediction),
-            forecast_loss(loss_of(scenes, whole, Condition(more))),
+            self.errors.of_loss(loss_of(scenes, whole, Condition(more))),
             loss_of(scenes, Condition(more), whole, "mpjpe_mm"),
             float(prediction.summary()["pcp"].mean - base.summary()["pcp"].mean),
         )
@@ -293,7 +298,7 @@ class _Rehearsing:
         for number, prediction in compared.crowds.items():
             summary, scenes = prediction.summary(), simulated.get(number)
             pcp, mixed = (None if scenes is None else interval_of(scenes, whole, key) for key in ("pcp", "mixed"))
-            pcp = None if pcp is None else forecast_pcp(pcp)
+            pcp = None if pcp is None else self.errors.of_pcp(pcp)
             risk = _mean(prediction.risk)
             crowds.append(Crowd(number, summary["pcp"].mean, summary["mpjpe_mm"].mean, risk, pcp, mixed))
         return tuple(crowds)

@@ -39,7 +39,7 @@ def settings(measurement: MeasuredDetector, *, name: str, bias: Floats | None = 
         name: name of the profile.
         bias: offset of the joints by kind, (9, 3) metres; None: no bias.
     """
-    result: dict[str, Any] = {"name": name, "kind": measurement.kind}
+    result: dict[str, Any] = {"name": name, "kind": measurement.kind, "measured": True}
     lists: dict[str, list[float]] = {}
     for key, measured in measurement.values.items():
         section, kind = key.partition(".")[0], key.rpartition(".")[2]
@@ -87,7 +87,7 @@ def as_toml(
     lines = [*_wrapped(head)]
     if command:
         lines.append(f"# Made by: {command}")
-    lines += [f'name = "{tree["name"]}"', f'kind = "{tree["kind"]}"']
+    lines += [f'name = "{tree["name"]}"', f'kind = "{tree["kind"]}"', "measured = true"]
     for section in ("keypoints", "bias", "correlation", "scores", "boxes", "phantoms", "decoys"):
         if section in tree or section != "decoys":
             lines += _section(section, tree.get(section, {}), measurement, all_notes[notes])

@@ -336,6 +336,11 @@ class DetectorSection(Section):
         "bottom-up: parts are joined to people along a tree, and a joint is reported only with its parent; "
         "top-down: joints are reported independently",
     )
+    measured: bool = key(
+        False,
+        "whether the errors below were measured on a network, by profile-network or fit-detector: forecasts with them "
+        "are more exact",
+    )
     source: Literal["simulated", "network"] = key(
         "simulated",
         "simulated: detections are the truth with the errors below; network: a network finds the people in "

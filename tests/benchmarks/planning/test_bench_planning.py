@@ -7,7 +7,6 @@ from scipy.stats import norm
 from benchmarks.planning.blind_forecasts import BlindForecast, covered, fit_error
 from benchmarks.planning.shelf_subsets import SubsetFigures
 from benchmarks.planning.simulated_rigs import random_scenario
-from simharness.planning.forecast_error import QUANTILE
 
 REAL = {(0, 1): 70.0, (0, 2): 80.0, (1, 2): 90.0, (0, 1, 2): 95.0}
 
@@ -45,7 +44,7 @@ def test_errors_of_forecasts_are_found_again_and_their_intervals_hold_nine_in_te
     assert fitted.least == pytest.approx(1.5, rel=0.15)
     assert fitted.share == pytest.approx(0.3, rel=0.1)
     held = np.mean([covered(fitted, each).mean() for each in figures])
-    assert held == pytest.approx(2 * norm.cdf(QUANTILE) - 1, abs=0.015)  # of errors that are really normal
+    assert held == pytest.approx(2 * norm.cdf(fitted.quantile) - 1, abs=0.015)  # of errors that are really normal
 
 
 def test_the_loss_of_a_camera_is_that_of_the_whole_set_less_the_others():
