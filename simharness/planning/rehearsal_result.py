@@ -286,7 +286,7 @@ def _cameras(rehearsal: Rehearsal) -> str:
     if all(each.without is None for each in worths):
         return "With two cameras, the failure of either one leaves no positions in space."
     first, second = worths[0], worths[1]
-    redundant = [each for each in worths if each.redundant]
+    redundant = [each for each in rehearsal.cameras.values() if each.redundant]
     needed = [each for each in worths if each.needed]
     parts = []
     if first.needed and first.worth.low > second.worth.mean:
