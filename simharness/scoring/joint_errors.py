@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from mvpose.skeleton import COCO17
-from simharness.scoring.score_registry import ScoreInfo, ScoreInput, finite_mean, score
+from simharness.scoring.score_registry import ScoreInput, finite_mean, score, shipped_scores
 
 
 def joint_errors(truth: ArrayLike, estimate: ArrayLike) -> Floats:
@@ -80,18 +80,13 @@ def pck_area(errors: ArrayLike, limit: float) -> float:
     return 100.0 * float(np.clip(1.0 - counted / limit, 0.0, 1.0).mean()) if len(counted) else float("nan")
 
 
-@score(
-    ScoreInfo("bone_mm", "Bone length", "mm", "mean absolute error of the bone lengths of the people found", "lower", 1)
-)
+@score(shipped_scores()["bone_mm"])
 def bone_length_score(given: ScoreInput) -> float | None:
     """Return the mean absolute error of the bone lengths, mm."""
     return finite_mean(1000.0 * np.abs(bone_errors(given.truth, given.paired)))
 
 
-_JITTER = "mean second difference of the joint error over frames; grows with the time between frames"
-
-
-@score(ScoreInfo("jitter_mm", "Jitter", "mm", _JITTER, "lower", 1))
+@score(shipped_scores()["jitter_mm"])
 def jitter_score(given: ScoreInput) -> float | None:
     """Return the mean jitter, mm."""
     return finite_mean(1000.0 * jitter(given.truth, given.paired))
@@ -141,10 +136,7 @@ def brier(probability: ArrayLike, happened: NDArray[np.bool_]) -> float | None:
     return finite_mean((np.asarray(probability, float) - happened) ** 2)
 
 
-_COVERAGE = "true joints of the people found inside of the estimate's 90 % ellipsoid; the best value is 90"
-
-
-@score(ScoreInfo("coverage_90", "Coverage", "%", _COVERAGE, "higher", 1, target=100.0 * SHARE, tolerance=1.0))
+@score(shipped_scores()["coverage_90"])
 def coverage_score(given: ScoreInput) -> float | None:
     """Return the share of placed joints inside of their ellipsoids, percent; None without ellipsoids."""
     shares = []
@@ -157,10 +149,7 @@ def coverage_score(given: ScoreInput) -> float | None:
     return None if share is None else 100.0 * share
 
 
-_BRIER = "mean squared error of joint scores as probabilities of an error within 100 mm; joints of ghosts are wrong"
-
-
-@score(ScoreInfo("score_brier", "Brier score", "", _BRIER, "lower", 3, tolerance=0.005))
+@score(shipped_scores()["score_brier"])
 def brier_score(given: ScoreInput) -> float | None:
     """Return the Brier score of the placed joints of all estimates; None without any."""
     scores, right = [], []

@@ -21,12 +21,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
+from mvpose.files.input_files import parse_toml
 
 if TYPE_CHECKING:
     from mvpose import Estimate
@@ -60,6 +62,14 @@ class ScoreInfo:
     tolerance: float | None = None
     """Largest loss of its mean that a gate does not call a regression by default, in its unit; None: no gate compares
     it."""
+
+
+@cache
+def shipped_scores(table: str = "recordings") -> dict[str, ScoreInfo]:
+    """Return the scores of a table of ``data/scores.toml`` by key; by default those that shipped modules register."""
+    tables = parse_toml((Path(__file__).parent / "data" / "scores.toml").read_text(encoding="utf-8"))
+    usual = {"unit": "%", "better": "higher", "digits": 1}
+    return {key: ScoreInfo(key, **(usual | entry)) for key, entry in tables[table].items()}
 
 
 @dataclass(frozen=True)

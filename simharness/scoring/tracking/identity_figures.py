@@ -12,7 +12,7 @@ from mvpose import COCO17, SHELF14, Estimate
 from mvpose.arrays import Floats
 from mvpose.skeleton import HeadMapping, coco17_to_shelf14
 from simharness.scoring.pairing import pair
-from simharness.scoring.score_registry import ScoreInfo, ScoreInput, finite_mean, score, scores
+from simharness.scoring.score_registry import ScoreInput, finite_mean, score, scores, shipped_scores
 from simharness.scoring.tracking.identity_scores import clear_mot, hota, identity_scores, pose_figures
 from simharness.scoring.tracking.tracked_frames import DISTANCES, PLACES, TrackedFrames, ids_of, tracked_frames
 
@@ -29,37 +29,13 @@ OF_SOME_PEOPLE = ("idr", "id_switches", "interruptions", "switches_per_minute")
 """Figures that hold where some people are annotated, in some frames: all others count the estimates of the rest as
 false, or the other frames as gaps."""
 
-_SHARES = {
-    "hota": ("HOTA", "people found and kept under one identity, mean over 19 thresholds"),
-    "deta": ("DetA", "part of HOTA: people found; ghosts and missed people lower it"),
-    "assa": ("AssA", "part of HOTA: agreement of tracks with people over the whole time"),
-    "loca": ("LocA", "part of HOTA: similarity of pairs, 100 at no distance, 50 at 0.5 m"),
-    "idf1": ("IDF1", "harmonic mean of IDP and IDR"),
-    "idp": ("IDP", "estimates within 0.5 m of the person that their identity stands for"),
-    "idr": ("IDR", "people with the estimate of their identity within 0.5 m"),
-    "mota": ("MOTA", "100 less missed people, ghosts and switches per true person"),
-    "pcp_tracked": ("PCP tracked", "PCP where estimates under another identity are missed"),
-}
-_ERRORS = (
-    ScoreInfo("mpjpe_tracked_mm", "MPJPE tracked", "mm", "MPJPE of people found under their identity", "lower", 1),
-    ScoreInfo("id_switches", "Switches", "", "changes of identity of people in the whole recording", "lower", 0),
-    ScoreInfo("switches_per_minute", "Switch rate", "/min", "changes of identity per minute and person", "lower", 2),
-    ScoreInfo("fragmentations", "Fragmentations", "", "people found again after frames without them", "lower", 0),
-)
-_GATED = {"hota": 1.0, "idf1": 1.0}  # tolerances
-_IDENTITIES = (
-    *(
-        ScoreInfo(key, title, "%", about, "higher", 1, tolerance=_GATED.get(key))
-        for key, (title, about) in _SHARES.items()
-    ),
-    *_ERRORS,
-)
-
-IDENTITY_SCORES = tuple(info.key for info in _IDENTITIES)
+IDENTITY_SCORES = (
+    *SHARES, "pcp_tracked", "mpjpe_tracked_mm", "id_switches", "switches_per_minute", "fragmentations",
+)  # fmt: skip
 """Keys of the scores that only variants with identities have."""
 
 
-@scores(*_IDENTITIES)
+@scores(*(shipped_scores()[key] for key in IDENTITY_SCORES))
 def identity_columns(given: ScoreInput) -> Mapping[str, float | None]:
     """Return the scores of identities; all None without identities."""
     ids = ids_of(given.estimates)
@@ -242,20 +218,14 @@ def jerk_ratio(truth: ArrayLike, estimate: ArrayLike, time: ArrayLike) -> float 
     return rms[0] / rms[1] if rms and rms[1] > _STILL else None
 
 
-_VELOCITY = "mean error of the velocity of joints of people found, from frame to frame"
-
-
-@score(ScoreInfo("velocity_mm_s", "Velocity error", "mm/s", _VELOCITY, "lower", 0))
+@score(shipped_scores()["velocity_mm_s"])
 def velocity_column(given: ScoreInput) -> float | None:
     """Return the mean error of velocities, mm/s."""
     error = velocity_error(given.truth, given.paired, given.recording.time)
     return None if error is None else 1000.0 * error
 
 
-_JERK = "RMS jerk of joints of people found over that of the truth; 1 is as smooth as people are"
-
-
-@score(ScoreInfo("jerk_ratio", "Jerk", "", _JERK, "lower", 2, target=1.0))
+@score(shipped_scores()["jerk_ratio"])
 def jerk_column(given: ScoreInput) -> float | None:
     """Return the ratio of the jerk of the estimates to that of the truth."""
     return jerk_ratio(given.truth, given.paired, given.recording.time)

@@ -133,7 +133,8 @@ SHIPPED = {
     "simharness/world/scene/rooms/room_lighting.py", "simharness/reality/evaluation.py",
     "simharness/trial/kernel_compilation.py", "mvpose/formats/joint_names.py", "mvpose/networks/catalogue/published.py",
     "mvpose/networks/catalogue/fetch.py", "mvpose/public_names.py", "mvpose/skeleton.py",
-    "simharness/outputs/benchmark/layout.py", "simharness/world/humans/face_colors.py",
+    "simharness/outputs/benchmark/layout.py", "simharness/scoring/score_registry.py",
+    "simharness/world/humans/face_colors.py",
 }  # fmt: skip
 CALLS = re.compile(
     r"(?:^|\.)(?:read_text|read_bytes|loadmat|read_parquet|scan_parquet|FileStorage|imread)$|^(?:np\.load|json\.loads?|"

@@ -1,5 +1,8 @@
+from mvpose import COCO17
 from simharness.scoring.catalogue import AP_MM, HEADLINE, PCK_MM, SCORES
 from simharness.scoring.failure_classes import FailureKind
+from simharness.scoring.joint_errors import SHARE
+from simharness.scoring.pcp import GROUPS
 
 
 def test_every_score_is_described():
@@ -38,3 +41,12 @@ def test_every_class_of_failures_has_a_score():
 def test_every_limit_has_a_score():
     assert [key for key in SCORES if key.startswith("ap")] == [f"ap{limit}" for limit in AP_MM]
     assert {f"pck{limit}" for limit in PCK_MM} < set(SCORES)
+    assert all(f"{limit} mm" in SCORES[f"ap{limit}"].about for limit in AP_MM)
+    assert all(f"{limit} mm" in SCORES[f"pck{limit}"].about for limit in PCK_MM)
+    assert SCORES["coverage_90"].target == 100.0 * SHARE
+
+
+def test_groups_and_joints_have_scores_in_their_order():
+    assert [key for key in SCORES if key.startswith("pcp_")][: len(GROUPS)] == [f"pcp_{group}" for group in GROUPS]
+    joints = [key for key in SCORES if key.startswith("mpjpe_") and "median" not in key and "tracked" not in key]
+    assert joints == ["mpjpe_mm", *(f"mpjpe_{joint}_mm" for joint in COCO17.joints)]
