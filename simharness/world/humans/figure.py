@@ -13,30 +13,8 @@ from simharness.types.mesh import Finish, Material, Mesh
 from simharness.world.humans.body import Body, FacePart, body_model
 from simharness.world.humans.clothing import Garment, garments, paint
 from simharness.world.humans.face_colors import places_of_head
-from simharness.world.humans.wardrobe import Look
+from simharness.world.humans.wardrobe import LOOKS, Look
 
-_OF_PART = {
-    FacePart.SKIN: Material.SKIN,
-    FacePart.HAND: Material.SKIN,
-    FacePart.LIPS: Material.SKIN,
-    FacePart.SCALP: Material.HAIR,
-    FacePart.BROW: Material.MATTE,
-    FacePart.SCLERA: Material.EYE,
-    FacePart.IRIS: Material.EYE,
-    FacePart.GLASSES: Material.PLASTIC,
-    FacePart.LENS: Material.PLASTIC,
-    FacePart.HAT: Material.MATTE,
-    FacePart.HAT_BAND: Material.MATTE,
-    FacePart.MASK: Material.MATTE,
-    FacePart.BAG: Material.LEATHER,
-    FacePart.STRAP: Material.MATTE,
-}
-_OF_GARMENT = {
-    Garment.TOP: Material.CLOTH,
-    Garment.TROUSERS: Material.CLOTH,
-    Garment.SHOE: Material.LEATHER,
-    Garment.SOLE: Material.MATTE,
-}
 _STRAND, _FOLD = 0.022, 0.055  # metres along hair and cloth over which their direction is measured
 _WHORL = (-0.045, 0.01, 0.0)  # metres from the crown: hair runs away from here
 _AROUND = 0.6  # metres around the head
@@ -89,10 +67,11 @@ def materials_of(body: Body, look: Look) -> NDArray[np.int8]:
 
     What a person wears is made of cloth or leather; bare arms and legs, and all else of the body, of skin.
     """
-    of_part = np.array([_OF_PART.get(part, Material.SKIN) for part in FacePart], np.int8)
-    of_garment = np.array([_OF_GARMENT.get(garment, Material.MATTE) for garment in Garment], np.int8)
+    part_of, garment_of = LOOKS["parts"], LOOKS["garments"]
+    of_part = np.array([Material[part_of.get(part.name, "SKIN")] for part in FacePart], np.int8)
+    of_garment = np.array([Material[garment_of.get(garment.name, "MATTE")] for garment in Garment], np.int8)
     worn = garments(body, look)
-    covered = np.isin(worn, list(_OF_GARMENT))
+    covered = np.isin(worn, [Garment[name] for name in garment_of])
     materials = np.where(covered, of_garment[worn], of_part[body.part]).astype(np.int8)
     lips = np.flatnonzero(body.part == FacePart.LIPS)
     height = places_of_head(body)[lips, 2]

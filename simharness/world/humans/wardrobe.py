@@ -10,13 +10,15 @@ Shares of accessories and their sources:
 - Which kind of hat, masks (3 %), hair styles and all colours are assumptions.
 """
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from mvpose.files.input_files import parse_toml
 from simharness.types.random_streams import stream
 from simharness.world.humans.clothing_colors import Color, draw_color, palette
 from simharness.world.humans.face_colors import EXPRESSIONS
@@ -27,47 +29,29 @@ HATS = ("none", "cap", "beanie", "brimmed")
 MASKS = ("none", "medical")
 BAGS = ("none", "backpack", "shoulder")
 
-_WEARERS = {"female": 0.52, "male": 0.42}
-_WORN = 0.7
-_SUNGLASSES = 0.03
-_HATS: Mapping[str, float] = MappingProxyType({"cap": 0.05, "beanie": 0.03, "brimmed": 0.02})
-_MASK = 0.03
-_BAGS: Mapping[str, Mapping[str, float]] = MappingProxyType(
-    {"female": {"backpack": 0.08, "shoulder": 0.20}, "male": {"backpack": 0.12, "shoulder": 0.10}}
+LOOKS: Mapping[str, Any] = MappingProxyType(
+    parse_toml((Path(__file__).parent / "data" / "looks.toml").read_text(encoding="utf-8"))
 )
+"""Tables of ``looks.toml``."""
+
+_WORN, _SUNGLASSES, _RECTANGULAR = 0.7, 0.03, 0.65  # shares
 _ACCESSORY_DRAWS = 24
 
 
-@dataclass(frozen=True)
-class Accessories:
-    """Accessories of one person; for the fields see :class:`simharness.world.humans.wardrobe.Look`."""
-
-    glasses: str
-    hat: str
-    mask: str
-    bag: str
-    frame_color: Color
-    hat_color: Color
-    bag_color: Color
-    mask_color: Color
-
-
-def draw_accessories(rng: np.random.Generator, *, female: bool) -> Accessories:
-    """Draw the accessories of one person from a random stream."""
+def draw_accessories(rng: np.random.Generator, *, female: bool) -> dict[str, Any]:
+    """Draw the accessories of one person from a random stream: the fields of :class:`Look` about them."""
     drawn = rng.random(_ACCESSORY_DRAWS).tolist()
-    sex = "female" if female else "male"
-    shape = "rectangular" if drawn[1] < 0.65 else "round"
-    glasses = {shape: _WORN * _WEARERS[sex], "sunglasses": _SUNGLASSES}
-    return Accessories(
-        glasses=_choice(glasses, drawn[0]),
-        hat=_choice(_HATS, drawn[2]),
-        mask=_choice({"medical": _MASK}, drawn[3]),
-        bag=_choice(_BAGS[sex], drawn[4]),
-        frame_color=draw_color(palette("frames"), drawn[5], drawn[6], drawn[7]),
-        hat_color=draw_color(palette("hats"), drawn[8], drawn[9], drawn[10]),
-        bag_color=draw_color(palette("bags"), drawn[11], drawn[12], drawn[13]),
-        mask_color=draw_color(palette("masks"), drawn[14], drawn[15], drawn[16]),
-    )
+    wearers = LOOKS["wearers"]["female" if female else "male"]
+    shape = "rectangular" if drawn[1] < _RECTANGULAR else "round"
+    glasses = {shape: _WORN * wearers["glasses"], "sunglasses": _SUNGLASSES}
+    return {
+        "glasses": _choice(glasses, drawn[0]),
+        **{kind: _choice(wearers[kind], drawn[k]) for k, kind in enumerate(("hat", "mask", "bag"), 2)},
+        **{
+            f"{kind}_color": draw_color(palette(f"{kind}s"), *drawn[k : k + 3])
+            for k, kind in zip((5, 8, 11, 14), ("frame", "hat", "bag", "mask"), strict=True)
+        },
+    }
 
 
 def _choice(shares: Mapping[str, float], drawn: float) -> str:
@@ -185,17 +169,9 @@ UNIFORM_COLORS = ("top", "trousers", "shoes", "accent", "hat_color", "bag_color"
 UNIFORM_NUMBERS = ("fit", "length")
 UNIFORM_CHOICES = ("sleeves", "legs", "hem", "top_pattern", "bottom_pattern", "repeats", "lower_garment", "hat", "bag")
 
-# Albedos, chosen by eye. Hair and skins both run from fair to dark, so that one draw can correlate the two.
-_SKINS = ("efcdb8", "e2b798", "cf9d7b", "b67f5e", "925f46", "6b4331", "4a2e23")
-_HAIR = ("c8a468", "8d6a3f", "8c8a88", "6b3a22", "5a3f2a", "3b281d", "2a1d17", "1b1512", "151112")
-_EYES = ("2a1b12", "3d5468", "3f4f36", "22160f")
-_ACCENTS = ("e4e1da", "cdbb95", "9fb0c4", "25282f", "313f5e", "6e2a36")
-_TOP_PATTERNS = (*("plain",) * 8, "stripes", "stripes", "checks", "blocks")
 _GOLDEN = (5**0.5 - 1) / 2
 _DRAWS = 32
-_STYLES: Mapping[str, Mapping[str, float]] = MappingProxyType({"long": {"ponytail": 0.4}, "short": {"bob": 0.65}})
 _CURLY, _CURLY_OF_DARK, _DARK = 0.08, 0.5, 0.42  # shares of short hair; skin darker than _DARK on average is dark
-_EXPRESSIONS = ("neutral", "neutral", "neutral", "smile", "speaking", "frown")
 _BEARDS, _BALD, _CROPPED = 0.4, 0.25, 0.9  # shares of men, and of those with short hair below a volume of 0.9
 
 
@@ -209,16 +185,15 @@ def draw_look(rng: np.random.Generator, *, female: bool = False, place: float | 
     """
     drawn = rng.random(_DRAWS).tolist()
     place = drawn[0] if place is None else place
-    skin = _between(_SKINS, drawn[1])
-    lower_garment = _pick(
-        ("trousers", "trousers", "skirt", "dress", "coat") if female else (*("trousers",) * 7, "coat"), drawn[12]
-    )
+    sex = "female" if female else "male"
+    skin = _between(LOOKS["skins"], drawn[1])
+    lower_garment = _pick(LOOKS["lower_garments"][sex], drawn[12])
     top = draw_color(palette("tops"), place % 1, drawn[4], drawn[5])
     return Look(
         skin=skin,
-        hair=_color(_pick(_HAIR, drawn[1] + (1 - drawn[1]) * drawn[2])),
+        hair=_color(_pick(LOOKS["hair"], drawn[1] + (1 - drawn[1]) * drawn[2])),
         lips=mix(skin, (0.62, 0.22, 0.22), 0.45),
-        eyes=_color(_pick(_EYES, drawn[3])),
+        eyes=_color(_pick(LOOKS["eyes"], drawn[3])),
         top=top,
         trousers=draw_color(palette("trousers"), drawn[6], drawn[20], drawn[21]),
         shoes=draw_color(palette("shoes"), drawn[7], drawn[22], drawn[23]),
@@ -226,13 +201,13 @@ def draw_look(rng: np.random.Generator, *, female: bool = False, place: float | 
         sleeves="long" if lower_garment == "coat" else _pick(("short", "short", "half", "long", "long"), drawn[8]),
         legs="long" if lower_garment == "coat" else _pick(("shorts", "cropped", *("long",) * 4), drawn[9]),
         hem="tucked" if lower_garment != "trousers" else _pick(("tucked", "loose"), drawn[10]),
-        top_pattern="plain" if lower_garment == "coat" else _pick(_TOP_PATTERNS, drawn[14]),
+        top_pattern="plain" if lower_garment == "coat" else _pick(LOOKS["top_patterns"], drawn[14]),
         bottom_pattern=_pick(("plain", "checks", "stripes"), drawn[15]) if lower_garment == "skirt" else "plain",
         repeats=6 * (2 + int(3 * drawn[16])),
         lower_garment=lower_garment,
         length=0.6 + 0.38 * drawn[17],
         fit=drawn[18] ** 1.5,
-        hair_style=_pick(("short", "long", "long", "bun") if female else (*("short",) * 9, "long"), drawn[19]),
+        hair_style=_pick(LOOKS["hair_styles"][sex], drawn[19]),
         volume=0.2 + 1.5 * drawn[11],
     )
 
@@ -272,7 +247,9 @@ def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0
             look = _groomed(look, stream(seed, "people", i, "grooming"))
         look = _styled(look, stream(seed, "people", i, "hair style"), female=female)
         look = _with_accessories(look, stream(seed, "people", i, "accessories"), female=female)
-        look = replace(look, expression=_pick(_EXPRESSIONS, float(stream(seed, "people", i, "expression").random())))
+        look = replace(
+            look, expression=_pick(LOOKS["expressions"], float(stream(seed, "people", i, "expression").random()))
+        )
         looks.append(_toward(look, uniform, look_alike, changes.tolist()) if i < (alike or count) else look)
     return tuple(looks)
 
@@ -296,7 +273,7 @@ def _styled(look: Look, rng: np.random.Generator, *, female: bool) -> Look:
         if curls < (_CURLY_OF_DARK if dark else _CURLY):
             return replace(look, hair_style="curly")
     if female:
-        for style, share in _STYLES.get(look.hair_style, {}).items():
+        for style, share in LOOKS["instead"].get(look.hair_style, {}).items():
             if of_women < share:
                 return replace(look, hair_style=style)
     return look
@@ -304,7 +281,7 @@ def _styled(look: Look, rng: np.random.Generator, *, female: bool) -> Look:
 
 def _with_accessories(look: Look, rng: np.random.Generator, *, female: bool) -> Look:
     """Return the look with accessories drawn from a random stream."""
-    return replace(look, **asdict(draw_accessories(rng, female=female)))
+    return replace(look, **draw_accessories(rng, female=female))
 
 
 def _toward(look: Look, uniform: Look, share: float, changes: list[bool]) -> Look:
@@ -323,13 +300,13 @@ def camouflaged(look: Look, color: Color, share: float) -> Look:
 
 def _contrasting(color: Color, share: float) -> Color:
     """Pick an accent colour whose lightness differs clearly from that of a colour; ``share`` 0 to 1 selects it."""
-    accents = [_color(code) for code in _ACCENTS]
+    accents = [_color(code) for code in LOOKS["accents"]]
     contrast = [abs(sum(accent) - sum(color)) / 3 for accent in accents]
     candidates = [accent for accent, value in zip(accents, contrast, strict=True) if value >= sorted(contrast)[-3]]
     return candidates[min(int(share * len(candidates)), len(candidates) - 1)]
 
 
-def _pick(choices: tuple[str, ...], share: float) -> str:
+def _pick(choices: Sequence[str], share: float) -> str:
     return choices[min(int(share * len(choices)), len(choices) - 1)]
 
 
@@ -339,7 +316,7 @@ def _color(code: str) -> Color:
     return red, green, blue
 
 
-def _between(codes: tuple[str, ...], share: float) -> Color:
+def _between(codes: Sequence[str], share: float) -> Color:
     """Interpolate in a scale of hexadecimal colours, ``share`` 0 at the first to 1 at the last."""
     place = share * (len(codes) - 1)
     low = min(int(place), len(codes) - 2)
