@@ -132,8 +132,8 @@ SHIPPED = {
     "simharness/reality/detector_fit/profile.py", "simharness/study/causes/cause_catalogue.py",
     "simharness/world/scene/rooms/room_lighting.py", "simharness/reality/evaluation.py",
     "simharness/trial/kernel_compilation.py", "mvpose/formats/joint_names.py", "mvpose/networks/catalogue/published.py",
-    "mvpose/networks/catalogue/fetch.py", "mvpose/public_names.py", "mvpose/skeleton.py",
-    "simharness/outputs/benchmark/layout.py", "simharness/scoring/score_registry.py",
+    "mvpose/calibration/file_mistakes.py", "mvpose/networks/catalogue/fetch.py", "mvpose/public_names.py",
+    "mvpose/skeleton.py", "simharness/outputs/benchmark/layout.py", "simharness/scoring/score_registry.py",
     "simharness/world/humans/face_colors.py", "simharness/world/humans/wardrobe.py",
 }  # fmt: skip
 CALLS = re.compile(
