@@ -64,6 +64,8 @@ class DetectorFit:
 
     real: MeasuredDetector
     """Measurement of the detector."""
+    calibrated: MeasuredDetector
+    """Parameters at which a simulated detector measures as the real one."""
     annotation: AnnotationFit
     """Errors of the truth, and the bias of the detector against all annotators."""
     people: People
@@ -77,7 +79,14 @@ class DetectorFit:
 
 
 def fit(
-    recording: AnnotatedRecording, *, name: str = "", command: str = "", resamples: int = RESAMPLES, seed: int = 0
+    recording: AnnotatedRecording,
+    *,
+    name: str = "",
+    command: str = "",
+    resamples: int = RESAMPLES,
+    seed: int = 0,
+    people: People | None = None,
+    filmed: FilmedRecording | None = None,
 ) -> DetectorFit:
     """Measure the detector of a recording against the consensus of its views, and the truth against the same.
 
@@ -87,12 +96,14 @@ def fit(
         command: command that made the profile, to be written into its file.
         resamples: number of resamples of the bootstrap.
         seed: seed of the resamples, and of the bodies of the re-enactment.
+        people: who is where; None: tracked.
+        filmed: re-enactment of these people; None: filmed.
 
     Raises:
         ValueError: nobody to re-enact; see also :func:`.measure_detector`.
     """
-    people = track_people(recording)
-    filmed = film(recording, people, seed=seed)
+    people = track_people(recording) if people is None else people
+    filmed = film(recording, people, seed=seed) if filmed is None else filmed
     sample = sample_of(recording, people, filmed)
     labels = label_joints(sample)
     real = measure_detector(sample, labels=labels, resamples=resamples, seed=seed)
@@ -120,7 +131,7 @@ def fit(
     calibrated = real.with_values({**calibrate(counted, lambda values: simulate({**values, **rare})), **rare})
     profile = DetectorSection.model_validate(settings(calibrated, name=name, bias=bias))
     text = as_toml(calibrated, name=name, bias=bias, command=command)
-    return DetectorFit(real, annotation, people, filmed, profile, text)
+    return DetectorFit(real, calibrated, annotation, people, filmed, profile, text)
 
 
 def write_profile(fitted: DetectorFit, path: str | Path) -> None:
