@@ -17,7 +17,6 @@ from pathlib import Path
 from benchmarks.fit.loop import run
 from benchmarks.fit.recordings import RIGS
 from benchmarks.fit.table import tables
-
 from mvpose.files.atomic_files import write_atomic
 
 
@@ -27,17 +26,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--draws", type=int, default=20)
     parser.add_argument("--cameras", type=int, nargs="+", default=list(RIGS), choices=list(RIGS))
+    parser.add_argument("--truth", nargs="+", default=["exact", "annotated"], choices=["exact", "annotated"])
     parser.add_argument("--films", type=Path, help="folder of re-enactments; default: films in FOLDER")
     options = parser.parse_args(arguments)
     draws = []
     options.folder.mkdir(parents=True, exist_ok=True)
     for draw in range(options.draws):
         for cameras in options.cameras:
-            for annotated in (False, True):
-                file = options.folder / f"{cameras}_{'annotated' if annotated else 'exact'}_{draw}.json"
+            for truth in options.truth:
+                file = options.folder / f"{cameras}_{truth}_{draw}.json"
                 if not file.exists():
                     films = options.films or options.folder / "films"
-                    found = run(cameras, annotated=annotated, draw=draw, films=films)
+                    found = run(cameras, annotated=truth == "annotated", draw=draw, films=films)
                     write_atomic(file, json.dumps(found).encode())
                 draws.append(json.loads(file.read_text("utf-8")))
     for line in tables(draws):

@@ -10,8 +10,8 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from benchmarks.fit.recordings import DETECTOR, known_recording
 
+from benchmarks.fit.recordings import DETECTOR, known_recording
 from mvpose.arrays import Floats
 from mvpose.files.atomic_files import write_atomic
 from simharness.reality.annotated_recording import AnnotatedRecording
@@ -43,9 +43,9 @@ def run(cameras: int, *, annotated: bool, draw: int, films: Path) -> dict[str, A
     known = known_recording(cameras, annotated=annotated, draw=draw)
     recording = known.recording
     people = track_people(recording)
-    filmed = kept_film(recording, people, films)
+    kept = [kept_film(recording, people, films, seed=seed) for seed in (0, 1)]
     start = perf_counter()
-    fitted = fit(recording, resamples=RESAMPLES, people=people, filmed=filmed)
+    fitted = fit(recording, resamples=RESAMPLES, people=people, films=kept)
     seconds = perf_counter() - start
     profile, found = _flat(DETECTOR.model_dump()), _flat(fitted.profile.model_dump())
     measured = fitted.calibrated.values
@@ -61,7 +61,7 @@ def run(cameras: int, *, annotated: bool, draw: int, films: Path) -> dict[str, A
         for key in sorted(set(measured) & set(profile))
         if measured[key].known
     }
-    twin = detected_twin(TwinModel.of_fit(recording, fitted), filmed, seed=1000 + draw)
+    twin = detected_twin(TwinModel.of_fit(recording, fitted), kept[0], seed=1000 + draw)
     annotation = fitted.annotation.annotation
     return {
         "cameras": cameras,
@@ -79,14 +79,14 @@ def run(cameras: int, *, annotated: bool, draw: int, films: Path) -> dict[str, A
     }
 
 
-def kept_film(recording: AnnotatedRecording, people: People, folder: Path) -> FilmedRecording:
+def kept_film(recording: AnnotatedRecording, people: People, folder: Path, *, seed: int) -> FilmedRecording:
     """Return the re-enactment of tracks, from the folder if it is there."""
     digest = hashlib.sha256(people.joints.tobytes() + recording.rig.P.tobytes()).hexdigest()[:24]
-    file = folder / f"{digest}.pickle"
+    file = folder / f"{digest}{f'_{seed}' if seed else ''}.pickle"
     if file.exists():
         kept: FilmedRecording = pickle.loads(file.read_bytes())
         return kept
-    filmed = film(recording, people, seed=0)
+    filmed = film(recording, people, seed=seed)
     folder.mkdir(parents=True, exist_ok=True)
     write_atomic(file, pickle.dumps(filmed))
     return filmed

@@ -10,9 +10,7 @@ import numpy as np
 
 from mvpose.commands.progress import Silence, Stages
 from mvpose.files.input_files import parse_toml
-from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.detect import detect
-from simharness.detector.viewing_conditions import world_offsets
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationModel
 from simharness.scenario.load import load

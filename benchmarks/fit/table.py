@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from benchmarks.fit.loop import BONE_NAMES
 
+from benchmarks.fit.loop import BONE_NAMES
 from simharness.scenario.sections.detector_section import KINDS
 
 FACE = KINDS[:3]
@@ -44,7 +44,7 @@ def _parameters(draws: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             group = start if kind in KINDS or kind.isdigit() else key
             groups[group][kind].append(values)
     yield f"{'parameter':34s} {'true':>7s} {'raw':>7s} {'fit':>7s} {'bias':>8s} {'rms':>7s} {'inside':>7s}"
-    covered = []
+    covered: list[float] = []
     for group, kinds in groups.items():
         rows = [
             (
@@ -57,8 +57,8 @@ def _parameters(draws: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             )
             for values in kinds.values()
         ]
-        covered += [row[-1] for row in rows]
-        mean = np.mean(rows, axis=0)
+        covered += [float(row[-1]) for row in rows]
+        mean = np.array(rows, float).mean(axis=0)
         yield f"{group:34s} {mean[0]:7.3f} {mean[1]:7.3f} {mean[2]:7.3f} {mean[3]:+8.4f} {mean[4]:7.4f} {mean[5]:7.0%}"
     yield f"{'all, mean over parameters':34s} {'':40s} {np.nanmean(covered):7.0%}"
 
@@ -83,4 +83,5 @@ def _bones(draws: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         by_name = {name: [index for index, each in enumerate(BONE_NAMES) if each == name] for name in BONE_NAMES}
         for name, rows in by_name.items():
             one, other = first[:, rows].mean(), second[:, rows].mean()
-            yield f"{key}, {name}: {1000 * one:.1f} mm, of the twin {1000 * other:.1f}, ratio {other / max(one, 1e-9):.2f}"
+            ratio = other / max(one, 1e-9)
+            yield f"{key}, {name}: {1000 * one:.1f} mm, of the twin {1000 * other:.1f}, ratio {ratio:.2f}"

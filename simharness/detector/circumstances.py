@@ -1,8 +1,8 @@
 """Circumstances in which a detector takes left for right, or one person for another: factors of the shares of errors.
 
 A detector distinguishes left and right by the face and by which limb hides the other: from behind and from the side
-they are inverted more often than from the front. A joint is taken for that of another person where both are near in
-the picture.
+they are inverted more often than from the front. A joint is taken for its counterpart, or for that of another person,
+where both are near in the picture.
 """
 
 import numpy as np
@@ -30,17 +30,17 @@ def inversion_factors(joints: ArrayLike, rig: Rig, factors: tuple[float, ...] | 
     return np.interp(away, np.deg2rad(FACTOR_BEARINGS), factors)
 
 
-def swap_factors(target: Floats, neighbour: Floats, height: Floats, reach: float) -> Floats:
-    """Return the factors of swaps of joints, (..., J): exp(-distance / (reach x height)); 1 with a reach of 0.
+def distance_factors(target: Floats, other: Floats, height: Floats, reach: float) -> Floats:
+    """Return the factors of inversions or swaps, (..., J): exp(-distance / (reach x height)); 1 with a reach of 0.
 
     Args:
         target: true places of the joints, (..., J, 2) pixels.
-        neighbour: the same joints of the other person, (..., J, 2) pixels.
+        other: places of their counterparts, or of the same joints of the other person, (..., J, 2) pixels.
         height: height of the person's box, (...) pixels.
         reach: distance at which a factor of 1 has fallen to 1 / e, heights.
     """
     if reach == 0:
         return np.ones(target.shape[:-1])
     with np.errstate(invalid="ignore"):
-        far = np.hypot(*np.moveaxis(target - neighbour, -1, 0)) / np.maximum(height, 1.0)[..., None]
+        far = np.hypot(*np.moveaxis(target - other, -1, 0)) / np.maximum(height, 1.0)[..., None]
     return np.nan_to_num(np.exp(-far / reach))

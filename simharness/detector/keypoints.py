@@ -19,7 +19,7 @@ from scipy.special import ndtr, ndtri
 
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
-from simharness.detector.circumstances import inversion_factors, swap_factors
+from simharness.detector.circumstances import distance_factors, inversion_factors
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import ErrorDraws, KeyedDraws, logistic
 from simharness.detector.error_classes import MIRROR, PAIRED, jitter_distance
@@ -188,8 +188,10 @@ class _KeypointErrors:
                 found[stray] = self._anywhere(person)[stray]
 
         share = config.quality * self._inversion_factor[:, :, person, None] * self._inversion
-        inverted = self._errors.occurs("inversion", person, share)
         other = true[:, :, MIRROR]
+        if config.inversion_reach:
+            share = share * distance_factors(true, other, self._boxes[:, :, person, 3], config.inversion_reach)
+        inverted = self._errors.occurs("inversion", person, share)
         inverted &= np.isfinite(other[..., 0])
         swapped, neighbour = self._swaps(person)
         place = np.where(swapped[..., None], neighbour, other)
@@ -254,7 +256,7 @@ class _KeypointErrors:
         if self._config.swap_reach and share.any():
             height = self._boxes[:, :, person, 3]
             target = self._target[:, :, person]
-            share = share * swap_factors(target, of_neighbour, height, self._config.swap_reach)
+            share = share * distance_factors(target, of_neighbour, height, self._config.swap_reach)
         return possible & self._errors.occurs("swap", person, np.where(possible, share, 0.0)), of_neighbour
 
     def _labels(self, found: Floats, person: int, inverted: Bools, swapped: Bools) -> NDArray[np.int8]:

@@ -6,6 +6,7 @@ recording that is to be scored as a real one needs a truth with the same errors;
 """
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -21,17 +22,24 @@ from simharness.detector.viewing_conditions import SIDE, body_axes
 from simharness.reality.detector_fit.consensus import Consensus
 from simharness.reality.detector_fit.frame_sums import lags
 from simharness.reality.detector_fit.tetrachoric import fit_noisy_life
-from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, SMOOTHING, actors_of
+from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, actors_of
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS
 from simharness.scenario.sections.scenario import AnnotationSection, Scenario
 from simharness.types.random_streams import stream
-from simharness.types.sequence import Sequence
+from simharness.types.sequence import Sequence as PoseSequence
 
 _LIMBS = len(LIMB_JOINTS)  # limb joints of SHELF14 come first, then the head
 _AGREEING = 3  # views that have to agree on a joint that the truth is compared with
 _FEWEST = 10  # frames in which an actor's joint has to be compared to say something about it
 _SHIFT_ROUNDS = 2
-_STEADIEST = 0.5  # of the usual deviation
+_OUTLYING = 4.0  # usual deviations from which an offset is a gross error of the track
+
+_PUBLISHED, _PUBLISHED_SPREAD = 0.017, 1.0
+"""Usual deviation of published annotations along each axis, metres, and the spread of its logarithm: the truth of Shelf
+is off by 22 to 38 mm in space."""
+
+_DEVIATIONS = np.geomspace(0.0005, 0.15, 60)  # metres, that joints may have
+_SPREADS = (0.1, 0.2, 0.4, 0.7)  # of the logarithms of the joints of one recording
 
 # Left and right of each joint of SHELF14: 1 for left joints and the head, -1 for right ones.
 _SIDE14 = np.ones(len(SHELF14))
@@ -93,7 +101,7 @@ class AnnotationModel:
         return np.asarray(drawn[ticks] * self.deviation[..., None])
 
 
-def annotate_simulation(scenario: Scenario, sequence: Sequence, rig: Rig) -> Floats:
+def annotate_simulation(scenario: Scenario, sequence: PoseSequence, rig: Rig) -> Floats:
     """Return the truth of a simulated recording as annotators would publish it, (T, P, 14, 3) metres, NaN where not.
 
     Args:
@@ -145,65 +153,104 @@ class AnnotationFit:
         }
 
 
-def fit_annotation(
-    truth: Floats,
-    people: People,
-    consensus: Consensus,
-    time: Floats,
-    *,
-    sigma: Floats,
-    scatter_life: float = 0.0,
-    scatter_noise: float = 0.0,
-) -> AnnotationFit:
-    """Fit the errors of a truth, by comparing it with what the detections of all views say.
+def annotation_offsets(truth: Floats, people: People, consensus: Consensus) -> Floats:
+    """Return by how much a truth is off what the detections of all views say, in the frames of the bodies.
 
     Args:
         truth: annotated joints, SHELF14, (F, A, 14, 3) metres; NaN where unknown.
         people: joints of everyone, as the method places them with all cameras: nothing places them better.
         consensus: joints on which the views agree, of the same people; limbs are compared where three views do.
-        time: times of the frames, (F,) seconds.
-        sigma: scatter of keypoints by joint, (17,) units of OKS sigma x sqrt(area): what smoothing leaves of it in the
-            joints is not the annotation's.
-        scatter_life: correlation time of that scatter, seconds; 0: drawn anew in every frame.
-        scatter_noise: share of its variance that is drawn anew in every frame, whatever its correlation time.
+
+    Returns:
+        Annotation minus track, forward, left and up, (F, A, 14, 3) metres; NaN where not compared.
     """
-    actors = truth.shape[1]
-    away = np.full(truth.shape, np.nan)  # annotation minus track in the body's frame
-    expected = np.full(truth.shape[:3], np.nan)
-    step = _step(time)
-    noise = _smoothed(np.arange(1), step, life=scatter_life, noise=scatter_noise)
+    away = np.full(truth.shape, np.nan)
     agreeing = consensus.agrees.sum(axis=1) >= _AGREEING
     for person, actor in enumerate(actors_of(people, truth)):
-        if actor < 0:
-            continue
-        joints = np.where(agreeing[:, person, :, None], people.joints[:, person], np.nan)
-        joints[:, : LIMB_JOINTS[0]] = people.joints[:, person, : LIMB_JOINTS[0]]
-        offset = truth[:, actor] - coco17_to_shelf14(joints)
-        away[:, actor] = np.einsum("fjc,fkc->fjk", offset, body_axes(people.joints[:, person]))
-        expected[:, actor, :_LIMBS] = _limbs14(consensus.variance[:, person] * sigma**2 * noise)
-    compared = np.isfinite(away[..., 0]).sum(axis=0)
-    shift = _robust_mean(away)
-    shift = np.where((compared >= _FEWEST)[..., None], shift, 0.0)
-    rest = away - shift
-    total = _mean((rest**2).sum(axis=-1)) / 3 - np.nan_to_num(_mean(expected))
-    usual = np.sqrt(_median(np.where(compared >= _FEWEST, np.maximum(total, 0.0), np.nan).ravel()))
-    # The noise of the consensus can exceed what is seen in few frames; nobody annotates much better than usual.
-    least = _STEADIEST * np.nan_to_num(usual)
-    deviation = np.where(compared >= _FEWEST, np.maximum(np.sqrt(np.maximum(total, 0.0)), least), np.nan_to_num(usual))
+        if actor >= 0:
+            joints = np.where(agreeing[:, person, :, None], people.joints[:, person], np.nan)
+            joints[:, : LIMB_JOINTS[0]] = people.joints[:, person, : LIMB_JOINTS[0]]
+            offset = truth[:, actor] - coco17_to_shelf14(joints)
+            away[:, actor] = np.einsum("fjc,fkc->fjk", offset, body_axes(people.joints[:, person]))
+    return away
+
+
+def common_bias(away: Floats) -> Floats:
+    """Return the offset of the detector's joints that all actors share, (9, 3) metres, from annotation offsets."""
+    return -_common(*_shifts(away))
+
+
+def fit_annotation(away: Floats, of_tracks: Sequence[Floats], time: Floats) -> AnnotationFit:
+    """Fit the errors of a truth, by comparing it with what the detections of all views say.
+
+    What the tracks are off, by noise, shared errors and smoothing, is taken from simulated recordings whose truth is
+    exact; the rest of the variance is the annotation's. The random part of each joint of each actor has a prior that
+    all of them share (empirical Bayes), so that a joint in few frames, or less visible than the errors of its track,
+    has the deviation of the others, and none is taken for exact by chance.
+
+    Args:
+        away: offsets of the truth, of :func:`annotation_offsets`, (F, A, 14, 3) metres.
+        of_tracks: the same of simulated recordings of the same people with an exact truth.
+        time: times of the frames, (F,) seconds.
+    """
+    shift, compared = _shifts(away)
     bias = -_common(shift, compared)
-    shift = shift + _per_joint(bias)
-    scale = np.where(deviation > 0, deviation, np.inf)
-    steps = lags(step)
-    kept = _smoothed(steps, step, life=scatter_life, noise=scatter_noise) / noise
-    life, white = _memory(rest / scale[..., None], expected / scale**2, time, steps, kept)
-    return AnnotationFit(AnnotationModel(shift.reshape(actors, -1, 3), deviation, life, white), bias, compared)
+    rest, others = _rest(away), [_rest(each) for each in of_tracks]
+    life, white = _memory(rest, others, time)
+    total, expected = _variance(rest), _mean(np.stack([_variance(each) for each in others]))
+    # The random part lasts: its squares in successive frames say less than independent ones.
+    independent = 3 * compared / (1 + (1 - white) ** 2 * life / _step(time))
+    freedom = independent / (1 + 1 / len(others))
+    freedom = np.where((compared >= _FEWEST) & np.isfinite(total) & np.isfinite(expected), freedom, 0.0)
+    deviation = _deviations(np.nan_to_num(total), np.nan_to_num(expected), freedom)
+    return AnnotationFit(AnnotationModel(shift + _per_joint(bias), deviation, life, white), bias, compared)
 
 
-def _limbs14(values: Floats) -> Floats:
-    """Return values of limb joints of COCO-17 (F, 17) in the order of SHELF14, (F, 12)."""
-    result = np.empty((len(values), _LIMBS))
-    result[:, SHELF14_OF_LIMBS] = values[:, LIMB_JOINTS]
-    return result
+def _shifts(away: Floats) -> tuple[Floats, Floats]:
+    """Return the mean offset of each joint of each actor, (A, 14, 3), and in how many frames it is known, (A, 14)."""
+    compared = np.isfinite(away[..., 0]).sum(axis=0)
+    return np.where((compared >= _FEWEST)[..., None], _robust_mean(away), 0.0), compared
+
+
+def _rest(away: Floats) -> Floats:
+    """Return offsets (F, A, 14, 3) without their means and without outliers, NaN there."""
+    rest = away - _robust_mean(away)
+    far = np.linalg.norm(rest, axis=-1)
+    return np.where((far < _OUTLYING * _median(far) / 1.54)[..., None], rest, np.nan)
+
+
+def _variance(rest: Floats) -> Floats:
+    """Return the mean square along each axis, (A, 14)."""
+    return _mean((rest**2).sum(axis=-1)) / 3
+
+
+def _deviations(total: Floats, expected: Floats, freedom: Floats) -> Floats:
+    """Return the deviation of the random part of each joint, (A, 14) metres: the mean square of its posterior.
+
+    Logarithms of the deviations are normal; mean and spread of that prior are the most likely ones for all joints.
+
+    Args:
+        total: variance of the offsets, (A, 14) square metres.
+        expected: variance that the tracks have, likewise.
+        freedom: degrees of freedom of the total, (A, 14); 0 where it is unknown.
+    """
+    if not freedom.any():
+        return np.zeros(total.shape)
+    grid = np.log(_DEVIATIONS)
+    variance = np.exp(2 * grid) + expected[..., None]
+    fit = -freedom[..., None] / 2 * (np.log(variance) + total[..., None] / variance)
+    fit -= fit.max(axis=-1, keepdims=True)
+    best, priors = -np.inf, np.zeros(len(grid))
+    for mean in grid:
+        for spread in _SPREADS:
+            prior = np.exp(-(((grid - mean) / spread) ** 2) / 2)
+            prior /= prior.sum()
+            likelihood = np.log(np.exp(fit) @ prior)[freedom > 0].sum()
+            likelihood -= ((mean - np.log(_PUBLISHED)) / _PUBLISHED_SPREAD) ** 2 / 2
+            if likelihood > best:
+                best, priors = likelihood, prior
+    posterior = np.exp(fit) * priors
+    return np.asarray(np.sqrt(posterior @ np.exp(2 * grid) / posterior.sum(axis=-1)))
 
 
 def _robust_mean(away: Floats) -> Floats:
@@ -211,7 +258,7 @@ def _robust_mean(away: Floats) -> Floats:
     center = _median(away)
     for _ in range(_SHIFT_ROUNDS):
         far = np.linalg.norm(away - center, axis=-1)
-        kept = far < 4 * _median(far) / 1.54
+        kept = far < _OUTLYING * _median(far) / 1.54
         center = _mean(np.where(kept[..., None], away, np.nan))
     return np.nan_to_num(center)
 
@@ -257,47 +304,36 @@ def _step(time: Floats) -> float:
     return float(np.diff(time).min(initial=np.inf)) if len(time) > 1 else 1.0
 
 
-def _smoothed(lag: NDArray[np.int64], step: float, *, life: float, noise: float) -> Floats:
-    """Return the autocovariance of smoothed scatter, (L,), as a share of the variance of scatter.
-
-    Args:
-        lag: lags, (L,) frames.
-        step: seconds between frames.
-        life: correlation time of scatter, seconds; 0: drawn anew in every frame.
-        noise: share of its variance that is drawn anew in every frame.
-    """
-    reach = np.arange(-np.ceil(6 * SMOOTHING / step), np.ceil(6 * SMOOTHING / step) + 1)
-    weight = np.exp(-((reach * step / SMOOTHING) ** 2) / 4)  # the kernel's autocorrelation
-    apart = np.abs(lag[:, None] + reach)
-    correlation = (1 - noise) * np.exp(-apart * step / life) if life > 0 else np.zeros(apart.shape)
-    return np.where(apart == 0, 1.0, correlation) @ (weight / weight.sum())
-
-
-def _memory(
-    rest: Floats, expected: Floats, time: Floats, steps: NDArray[np.int64], kept: Floats
-) -> tuple[float, float]:
+def _memory(rest: Floats, others: Sequence[Floats], time: Floats) -> tuple[float, float]:
     """Return life, seconds, and share of white noise of the random part.
 
     Args:
-        rest: annotation minus track without the shift, (F, A, 14, 3), in deviations of the random part.
-        expected: variance of the tracks along each axis, (F, A, 14), in squares of these deviations.
+        rest: offsets of the truth without their means, (F, A, 14, 3) metres.
+        others: the same of recordings with an exact truth.
         time: times of the frames, (F,) seconds.
-        steps: lags, (L,) frames.
-        kept: autocorrelation of the errors of the tracks, (L,).
     """
     step = _step(time)
-    product, square = np.zeros(len(steps)), np.zeros(len(steps))
-    rest, expected = rest[:, :, :_LIMBS], 3 * expected[:, :, :_LIMBS]
-    for index, lag in enumerate(steps[steps < len(time)]):
-        near = time[lag:] - time[:-lag] < (lag + 0.5) * step
-        now, later = rest[:-lag][near], rest[lag:][near]
-        both = np.isfinite(now).all(axis=-1) & np.isfinite(later).all(axis=-1)
-        of_tracks = (expected[:-lag][near] + expected[lag:][near])[both].sum() / 2
-        product[index] = (now * later).sum(axis=-1)[both].sum() - kept[index] * of_tracks
-        square[index] = ((now**2 + later**2).sum(axis=-1) / 2)[both].sum() - of_tracks
+    steps = lags(step)
+    products = [_products(each[:, :, :_LIMBS], time, steps) for each in (rest, *others)]
+    product, square = products[0] - np.mean(products[1:], axis=0)
     square = np.maximum(square, 0.0)
     if not square.any():
         return 0.0, 1.0
     with np.errstate(invalid="ignore", divide="ignore"):
         life, noise = fit_noisy_life(steps, step, (product / square)[None], square[None])
     return float(life[0]), float(noise[0])
+
+
+def _products(rest: Floats, time: Floats, steps: NDArray[np.int64]) -> Floats:
+    """Return the mean products of offsets some lags apart, and of their squares, (2, L)."""
+    result = np.zeros((2, len(steps)))
+    for index, lag in enumerate(steps[steps < len(time)]):
+        near = time[lag:] - time[:-lag] < (lag + 0.5) * _step(time)
+        now, later = rest[:-lag][near], rest[lag:][near]
+        both = np.isfinite(now[..., 0]) & np.isfinite(later[..., 0])
+        if both.any():
+            result[:, index] = (
+                (now * later).sum(axis=-1)[both].mean(),
+                (now**2 + later**2).sum(axis=-1)[both].mean() / 2,
+            )
+    return result

@@ -20,8 +20,9 @@ from mvpose.formats.calibration.opencv import write_calibration
 from mvpose.formats.people import write_people
 from mvpose.recording import People
 from simharness.detector.detect import detect
+from simharness.detector.viewing_conditions import world_offsets
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.people_tracks import present
+from simharness.reality.people_tracks import actors_of, present
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.build_trial import build_trial
@@ -69,6 +70,24 @@ class FilmedRecording:
     def joints(self) -> Floats:
         """True joints in the recording's world, COCO-17, (F, P, 17, 3) metres; NaN where absent."""
         return self.sequence.of_skeleton(COCO17) + [0.0, 0.0, self.floor]
+
+    def shown(self, people: People, truth: Floats, config: DetectorSection) -> Floats:
+        """Return the joints of each actor as the detector places them on average, COCO-17, (F, A, 17, 3) metres.
+
+        NaN where the actor is absent. Limbs of the film are the detected ones; the face has the detector's bias.
+
+        Args:
+            people: the people who are re-enacted.
+            truth: truth of the recording, which says who the actors are, (F, A, 14, 3).
+            config: parameters of the detector.
+        """
+        joints = self.joints
+        joints = joints + world_offsets(joints, config.bias.of_face())
+        result = np.full((*truth.shape[:2], *joints.shape[2:]), np.nan)
+        for person, actor in enumerate(actors_of(people, truth)):
+            if actor >= 0:
+                result[:, actor] = joints[:, person]
+        return result
 
     def detected(self, config: DetectorSection, *, seed: int) -> list[Detections]:
         """Return the detections of a simulated detector in each frame.

@@ -13,17 +13,15 @@ from typing import Any, Self
 
 import numpy as np
 
-from mvpose import COCO17, preset
+from mvpose import preset
 from mvpose.commands.progress import Reporter, Silence
 from mvpose.recording import People
 from mvpose.skeleton import HeadMapping
-from simharness.detector.viewing_conditions import world_offsets
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationModel
 from simharness.reality.detector_fit.fit import DetectorFit
 from simharness.reality.evaluation import evaluate
 from simharness.reality.filmed_recording import FilmedRecording, cut_takes, film
-from simharness.reality.people_tracks import actors_of
 from simharness.reality.seed_evaluation import PcpInterval, pcp_interval
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scoring.score_summary import VariantScores
@@ -51,7 +49,7 @@ class TwinModel:
     @classmethod
     def of_fit(cls, recording: AnnotatedRecording, fitted: DetectorFit) -> Self:
         """Return the model of twins of a recording, with its own fit."""
-        return cls(recording, fitted.people, fitted.profile, fitted.annotation.of_detected, (fitted.film,))
+        return cls(recording, fitted.people, fitted.profile, fitted.annotation.of_detected, fitted.films)
 
 
 def simulate_twins(model: TwinModel, *, count: int, reporter: Reporter | None = None) -> list[AnnotatedRecording]:
@@ -76,12 +74,8 @@ def simulate_twins(model: TwinModel, *, count: int, reporter: Reporter | None = 
 def detected_twin(model: TwinModel, filmed: FilmedRecording, *, seed: int) -> AnnotatedRecording:
     """Return the twin of a recording from its film: detections and annotation are drawn from the seed."""
     recording = model.recording
-    joints = np.full((len(recording), recording.people, len(COCO17), 3), np.nan)
-    # Annotated heads are fitted to the detected face; limbs of the film are the detected ones already.
-    shown = filmed.joints + world_offsets(filmed.joints, model.detector.bias.of_face())
-    for person, actor in enumerate(actors_of(model.people, recording.truth)):
-        if actor >= 0:
-            joints[:, actor] = shown[:, person]
+    # Annotated heads are fitted to the detected face.
+    joints = filmed.shown(model.people, recording.truth, model.detector)
     truth = model.annotation.annotate(joints, recording.time, seed=seed)
     truth[~np.isfinite(recording.truth)] = np.nan
     detections = tuple(filmed.detected(model.detector, seed=seed))

@@ -23,6 +23,7 @@ _RULE_OF_THREE = 3.0
 count as fewer."""
 
 _COUNTED: Mapping[str, Callable[[FrameSums], Floats]] = {
+    "keypoints.inversion_reach": lambda sums: sums.apart.k,
     "keypoints.stray": lambda sums: sums.miss.n,
     "boxes": lambda sums: sums.people.all.n,
     "boxes.duplicates": lambda sums: sums.people.detected,
@@ -50,12 +51,14 @@ class MeasuredValue:
         value: estimate from all frames.
         low, high: bounds of its 95 % interval.
         count: number of joints, people or pictures behind it.
+        by_prior: whether it is an inferred parameter about which the recording says little.
     """
 
     value: float
     low: float
     high: float
     count: int
+    by_prior: bool = False
 
     @property
     def known(self) -> bool:

@@ -130,6 +130,8 @@ class FrameSums(NamedTuple):
     """Limb joints that are reported, and those not good, by tercile of the person's size, (..., 3)."""
     size_drop: Trials
     """Limb joints that may be dropped, and those dropped, by tercile, (..., 3)."""
+    apart: Trials
+    """Limb joints that may be inverted, and those inverted, by the distance of their counterpart, (..., B)."""
     miss: MissSums
     """Misses of limbs."""
     scatter: ScatterSums

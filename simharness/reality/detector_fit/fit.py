@@ -20,23 +20,25 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.files.atomic_files import write_atomic
 from mvpose.recording import People
+from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.viewing_conditions import SIDE, body_axes
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.annotation_errors import AnnotationFit, fit_annotation
+from simharness.reality.annotation_errors import AnnotationFit, annotation_offsets, common_bias, fit_annotation
 from simharness.reality.detector_fit.detector_measurement import (
     RESAMPLES,
     MeasuredDetector,
     measure_detector,
     point_estimates,
 )
+from simharness.reality.detector_fit.inference import infer
 from simharness.reality.detector_fit.joint_labels import label_joints
-from simharness.reality.detector_fit.profile import as_toml, settings
+from simharness.reality.detector_fit.profile import as_toml, prior_of, settings
 from simharness.reality.detector_fit.sample import sample_of
 from simharness.reality.filmed_recording import FilmedRecording, film
 from simharness.reality.people_tracks import LIMB_JOINTS, track_people
-from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
+from simharness.scenario.sections.detector_section import KIND_OF_JOINT, DetectorSection
 
-_TWINS = 2  # simulated in each round of the calibration
+_FILMS = 2
 _FEWEST = 100  # joints behind a value that is calibrated: Shelf has 130 reported shoulders that others hide
 ROUNDS = 3
 
@@ -70,8 +72,8 @@ class DetectorFit:
     """Errors of the truth, and the bias of the detector against all annotators."""
     people: People
     """Who is where in the recording."""
-    film: FilmedRecording
-    """Re-enactment of the recording, which shows what hides what."""
+    films: tuple[FilmedRecording, ...]
+    """Re-enactments of the recording by different bodies; the first shows what hides what."""
     profile: DetectorSection
     """[detector] parameters at which the simulated detector errs alike."""
     text: str
@@ -86,7 +88,7 @@ def fit(
     resamples: int = RESAMPLES,
     seed: int = 0,
     people: People | None = None,
-    filmed: FilmedRecording | None = None,
+    films: Sequence[FilmedRecording] = (),
 ) -> DetectorFit:
     """Measure the detector of a recording against the consensus of its views, and the truth against the same.
 
@@ -97,41 +99,47 @@ def fit(
         resamples: number of resamples of the bootstrap.
         seed: seed of the resamples, and of the bodies of the re-enactment.
         people: who is where; None: tracked.
-        filmed: re-enactment of these people; None: filmed.
+        films: re-enactments of these people that exist already, of seeds ``seed``, ``seed`` + 1, ...
 
     Raises:
         ValueError: nobody to re-enact; see also :func:`.measure_detector`.
     """
     people = track_people(recording) if people is None else people
-    filmed = film(recording, people, seed=seed) if filmed is None else filmed
+    films = tuple(films) + tuple(film(recording, people, seed=seed + k) for k in range(len(films), _FILMS))
+    filmed = films[0]
     sample = sample_of(recording, people, filmed)
     labels = label_joints(sample)
     real = measure_detector(sample, labels=labels, resamples=resamples, seed=seed)
-    scatter = np.array([real[f"keypoints.scatter.{KINDS[kind]}"].value for kind in KIND_OF_JOINT])
-    annotation = fit_annotation(
-        recording.truth,
-        people,
-        labels.consensus,
-        recording.time,
-        sigma=np.nan_to_num(scatter, nan=np.nanmean(scatter)),
-        scatter_life=float(np.nan_to_num(real["correlation.scatter_life"].value)),
-        scatter_noise=float(np.nan_to_num(real["correlation.scatter_noise"].value)),
-    )
+    away = annotation_offsets(recording.truth, people, labels.consensus)
     name = name or recording.name
-    bias = annotation.bias.copy()
+    bias = common_bias(away)
     bias[:3] = face_bias(people.joints, filmed.joints)
 
-    def simulate(values: Mapping[str, float]) -> list[dict[str, float]]:
+    def simulate(values: Mapping[str, float], draw: int) -> dict[str, float]:
         profile = DetectorSection.model_validate(settings(real.with_values(values), name=name, bias=bias))
-        twins = (replace(recording, detections=tuple(filmed.detected(profile, seed=1 + k))) for k in range(_TWINS))
-        return [point_estimates(sample_of(twin, people, filmed)) for twin in twins]
+        # What hides what is seen in one film, and detections are simulated in the other: real bodies differ, too.
+        one, other = films[draw % _FILMS], films[(draw + 1) % _FILMS]
+        return point_estimates(sample_of(filmed_twin(recording, one, profile, seed=1 + draw), people, other))
 
-    counted = {key: each.value for key, each in real.values.items() if each.count >= _FEWEST}
-    rare = {key: each.value for key, each in real.values.items() if key not in counted}
-    calibrated = real.with_values({**calibrate(counted, lambda values: simulate({**values, **rare})), **rare})
+    calibrated = replace(real, values=infer(real.values, simulate, prior_of(recording.kind)))
     profile = DetectorSection.model_validate(settings(calibrated, name=name, bias=bias))
+    of_tracks = []
+    for number, each in enumerate(films[:_FILMS]):
+        twin = filmed_twin(recording, each, profile, seed=1 + number)
+        exact = coco17_to_shelf14(each.shown(people, recording.truth, profile))
+        twin = replace(twin, truth=np.where(np.isfinite(recording.truth), exact, np.nan))
+        tracks = track_people(twin)
+        of_tracks.append(annotation_offsets(twin.truth, tracks, label_joints(sample_of(twin, tracks)).consensus))
+    annotation = fit_annotation(away, of_tracks, recording.time)
     text = as_toml(calibrated, name=name, bias=bias, command=command)
-    return DetectorFit(real, calibrated, annotation, people, filmed, profile, text)
+    return DetectorFit(real, calibrated, annotation, people, films, profile, text)
+
+
+def filmed_twin(
+    recording: AnnotatedRecording, filmed: FilmedRecording, profile: DetectorSection, *, seed: int
+) -> AnnotatedRecording:
+    """Return a recording with the detections of a simulated detector in its film."""
+    return replace(recording, detections=tuple(filmed.detected(profile, seed=seed)))
 
 
 def write_profile(fitted: DetectorFit, path: str | Path) -> None:

@@ -41,6 +41,9 @@ NEAR = (*BONES, (5, 11), (6, 12))
 BORDER = np.linspace(0.0, 6.0, 25)
 """Edges of the histogram of distances from the border of the image, units."""
 
+APART = np.linspace(0.0, 0.6, 31)
+"""Edges of the histogram of distances of left-right counterparts in the picture, heights of the box."""
+
 _OUTLYING = 3.5  # deviations of a bone's length from which a joint is wrong
 _CELLS = 12  # in each direction, of the grid on a person's box
 
@@ -59,6 +62,7 @@ def frame_sums(labels: LabelledJoints) -> detector_sums.FrameSums:
         face=_face(labels),
         size=size,
         size_drop=size_drop,
+        apart=_apart(labels),
         miss=_misses(labels),
         scatter=_scatter(labels),
         jitter=_jitters(labels),
@@ -154,6 +158,17 @@ def _wrong(labels: LabelledJoints) -> Bools:
     return labels.taken["swap"] | labels.taken["inversion"] | labels.taken["miss"] | labels.taken["jitter"]
 
 
+def _apart(labels: LabelledJoints) -> detector_sums.Trials:
+    """Return limb joints that may be inverted, and those inverted, by the distance of the counterpart, (T, B)."""
+    at_risk, taken = (each["inversion"][..., LIMB_JOINTS] for each in (labels.risk, labels.taken))
+    away = (labels.target - labels.target[..., MIRROR, :])[..., LIMB_JOINTS, :]
+    far = np.hypot(away[..., 0], away[..., 1]) / np.maximum(labels.boxes[..., 3, None], 1.0)
+    place = np.digitize(far, APART[1:-1])[..., None] == np.arange(len(APART) - 1)
+    return detector_sums.Trials(
+        *((place & each[..., None]).sum(axis=(1, 2, 3)).astype(float) for each in (at_risk, taken))
+    )
+
+
 def _misses(labels: LabelledJoints) -> detector_sums.MissSums:
     """Return the sums of misses of limbs."""
     miss = labels.taken["miss"].copy()
@@ -240,10 +255,6 @@ def _dependence(labels: LabelledJoints) -> detector_sums.DependenceSums:
         chance = k / np.maximum(n, 1)
         curves = joint_probability(chance[one], chance[other])
 
-        def pairs(count: Floats) -> Floats:
-            """Return the number of pairs of states (..., 378), from the number of joints in each state, (..., 27)."""
-            return count[..., one] * (count[..., other] - same) / (1 + same)
-
         # Over views: the same joint of a person, so only states of one kind form pairs.
         by_joint = at_risk.sum(axis=1, dtype=np.float32).reshape(frames, -1, states)
         by_limb = np.einsum("tvpjs,lj->tvpls", at_risk.astype(np.float32), limbs.astype(np.float32))
@@ -255,8 +266,9 @@ def _dependence(labels: LabelledJoints) -> detector_sums.DependenceSums:
                 np.einsum("tvpj,lj->tvpl", taken.astype(float), limbs).reshape(frames, -1),
             ),
         ):
-            # One frame at a time: all pairs of all frames would take a gigabyte.
-            met = np.stack([pairs(each).sum(axis=0) for each in count])
+            # Pairs of states of the joints in one row, summed over the rows of a frame.
+            met = (np.swapaxes(count, 1, 2) @ count)[:, one, other] - same * count.sum(axis=1)[:, one]
+            met = met / (1 + same)
             sums.expected[:] += met @ curves
             sums.k[:] += (whole * (whole - 1) / 2).sum(axis=1)
 

@@ -11,7 +11,7 @@ from mvpose.arrays import Floats
 from simharness.detector.viewing_conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.detector_sums import FrameSums
-from simharness.reality.detector_fit.frame_sums import BORDER, LOGITS, SCORED, TERCILES, lags
+from simharness.reality.detector_fit.frame_sums import APART, BORDER, LOGITS, SCORED, TERCILES, lags
 from simharness.reality.detector_fit.joint_labels import CLASSES
 from simharness.reality.detector_fit.tetrachoric import (
     fit_life,
@@ -30,7 +30,10 @@ _MIN_ERRORS = 200  # errors needed to estimate their correlations
 _ROUNDS = 4
 _PRIOR = 20.0  # joints
 _PRIOR_ERRORS = 3.0
+_LEAST_FACTOR = 0.1  # hidden joints may err less than visible ones by chance
 _MIN_HIDDEN = 20  # joints of a kind needed to say something about the kind
+_MIN_INVERTED = 20.0  # inversions needed to see how far left and right are apart
+_REACHES = np.geomspace(0.02, 3.0, 60)  # heights; beyond, inversions are as frequent at all distances
 _MIN_OUTSIDE = 50  # joints outside of the image needed to see how far the detector reports them
 _HIDDEN = ((SELF_OCCLUDED, "self_occluded"), (OCCLUDED, "occluded"))
 _SEPARATED = 1.0  # deviations between scores of good keypoints and misses from which mixtures can be separated
@@ -62,6 +65,7 @@ def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> 
         else:
             result |= _occlusion_factors(n, k, share)
             result["keypoints.border"] = _border(sums)
+        result["keypoints.inversion_reach"] = _inversion_reach(sums)
         scatter = sums.scatter
         shown, square = scatter.n - scatter.hidden_n, scatter.square - scatter.hidden_square
         _put_by_kind(result, "keypoints.scatter", _sigma(square / shown))
@@ -115,7 +119,7 @@ def _occlusion_factors(n: dict[str, Floats], k: dict[str, Floats], share: dict[s
 
 
 def _factors(observed: Floats, expected: Floats) -> Floats:
-    """Return by which factors errors are more frequent than expected, by kind of joint, (..., 9), 1 or more.
+    """Return by which factors errors are more frequent than expected, by kind of joint, (..., 9).
 
     Kinds with few errors take from the others: each counts as _PRIOR_ERRORS more, at the factor of all.
 
@@ -124,8 +128,8 @@ def _factors(observed: Floats, expected: Floats) -> Floats:
         expected: errors that there would be, were those joints visible, (..., 9).
     """
     pooled = observed.sum(axis=-1, keepdims=True) / expected.sum(axis=-1, keepdims=True)
-    pooled = np.where(np.isfinite(pooled), np.maximum(pooled, 1.0), 1.0)
-    return np.asarray(np.maximum((observed + _PRIOR_ERRORS) / (expected + _PRIOR_ERRORS / pooled), 1.0))
+    pooled = np.where(np.isfinite(pooled), np.maximum(pooled, _LEAST_FACTOR), 1.0)
+    return np.asarray(np.maximum((observed + _PRIOR_ERRORS) / (expected + _PRIOR_ERRORS / pooled), _LEAST_FACTOR))
 
 
 def _guesses(n: dict[str, Floats], k: dict[str, Floats], sums: FrameSums) -> dict[str, Floats]:
@@ -205,6 +209,17 @@ def _border(sums: FrameSums) -> Floats:
     return np.where(below[:, -1] >= _MIN_OUTSIDE, reach, np.nan)
 
 
+def _inversion_reach(sums: FrameSums) -> Floats:
+    """Return the distance of the counterpart at which inversions are 1 / e as frequent, from their mean distance."""
+    n, k = sums.apart.n, sums.apart.k
+    far = (APART[1:] + APART[:-1]) / 2
+    weight = np.exp(-far / _REACHES[:, None])
+    means = (n @ (weight * far).T) / (n @ weight.T)  # rising with the reach, (R, 60)
+    mean = (k @ far) / k.sum(axis=1)
+    reach = np.array([np.interp(each, row, _REACHES) for each, row in zip(mean, means, strict=True)])
+    return np.where(k.sum(axis=1) >= _MIN_INVERTED, reach, np.nan)
+
+
 def _face(sums: FrameSums) -> dict[str, Floats]:
     """Return the shares of joints of the face that are not reported, by kind and bearing (R, 12).
 
@@ -245,14 +260,16 @@ def _shared_scatter(sums: FrameSums) -> Floats:
     """Return the share of the variance of scatter that all views have in common.
 
     The views agree on such an error, so that residuals do not show it; but it changes the lengths of bones. What the
-    variance of the lengths over time has beyond the noise of single views is due to it.
+    variance of the lengths over time has beyond the noise of single views is due to it; below 0 where it has less.
     """
     limbs = list(LIMB_KINDS)
     single = (sums.scatter.square[:, limbs].sum(axis=1) / sums.scatter.n[:, limbs].sum(axis=1)) / 2
     n = np.maximum(sums.bones.n, 1.0)
     spread = (sums.bones.square - sums.bones.length**2 / n).sum(axis=(1, 2))
-    shared = np.maximum(spread - single * sums.bones.noise, 0.0) / sums.bones.scale
-    return np.clip(shared / (shared + single), 0.0, 1.0)
+    # Joints that a bone joins err alike, by which its length changes less.
+    near = np.clip(sums.scatter.near / sums.scatter.near_square, 0.0, 0.95)
+    shared = (spread - single * (1 - near) * sums.bones.noise) / sums.bones.scale
+    return shared / (np.abs(shared) + single)
 
 
 def _score_parameters(sums: FrameSums) -> dict[str, Floats]:

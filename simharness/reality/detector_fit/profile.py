@@ -9,10 +9,20 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.files.input_files import parse_toml
+from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.detector_measurement import MeasuredDetector
+from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.detector_section import KINDS, LARGEST_MULTIPLE, DetectorSection
 
 _FACE_DROPS = ("keypoints.drop.visible", "keypoints.drop.self_occluded")
+
+_PRIORS: Mapping[DetectorKind, str] = {"top-down": "topdown", "bottom-up": "typical"}
+"""Shipped profile of each kind of detector."""
+
+_OF_QUALITY = ("keypoints.jitter.", "keypoints.miss.", "keypoints.inversion.", "keypoints.swap.")
+
+_ESTIMATES = {"keypoints.inversion_reach": 0.3}
+"""Estimates of parameters that the shipped profiles leave out."""
 
 _MOST = {
     "keypoints.jitter": 1.0,
@@ -23,6 +33,7 @@ _MOST = {
     "keypoints.guess.scatter": 100.0,
     "keypoints.truncated": 100.0,
     "keypoints.small": 10.0,
+    "keypoints.inversion_reach": 3.0,
     "boxes.jitter": 0.5,
     "phantoms.rate": 20.0,
 }
@@ -55,6 +66,25 @@ def settings(measurement: MeasuredDetector, *, name: str, bias: Floats | None = 
         rows = np.round(bias, 4) + 0.0  # no minus zero
         result["bias"] = {kind: row.tolist() for kind, row in zip(KINDS, rows, strict=True)}
     return DetectorSection.model_validate(result).model_dump(mode="json", exclude_unset=True)
+
+
+def prior_of(kind: DetectorKind) -> dict[str, float]:
+    """Return the parameters of the shipped profile of a kind of detector by dotted key, before any measurement."""
+    profile = read_profile(_PRIORS[kind])
+    quality, result = profile.keypoints.quality, dict(_ESTIMATES)
+    for key, value in _numbers(profile.model_dump(), ""):
+        if value or key not in result:
+            result[key] = quality * value if key.startswith(_OF_QUALITY) else value
+    return result
+
+
+def _numbers(tree: Mapping[str, Any], path: str) -> Iterator[tuple[str, float]]:
+    """Yield the dotted keys and the values of the numbers in nested tables."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _numbers(value, f"{path}{key}.")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            yield f"{path}{key}", float(value)
 
 
 def as_toml(
@@ -117,7 +147,7 @@ def _comment(key: str, measurement: MeasuredDetector) -> str:
     if measured is None or not measured.known:
         return "# not measured"
     span = f"{measured.low:.3g} to {measured.high:.3g}; " if np.isfinite(measured.low) else ""
-    return f"# {span}n = {measured.count}"
+    return f"# {span}n = {measured.count}{'; mostly the prior' if measured.by_prior else ''}"
 
 
 def _put(tree: dict[str, Any], key: str, value: Any) -> None:
@@ -129,9 +159,12 @@ def _put(tree: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _rounded(key: str, value: float) -> float:
-    """Round to four decimal places, finer than any interval; values that the calibration raised too far are bounded."""
+    """Round to four decimal places, finer than any interval.
+
+    Correlations below 0, and values that the inference raised too far are bounded.
+    """
     bound = next((most for start, most in _MOST.items() if key.startswith(start)), float("inf"))
-    return round(float(min(value, bound)), 4)
+    return round(float(min(max(value, 0.0), bound)), 4)
 
 
 def _wrapped(text: str) -> list[str]:

@@ -12,7 +12,9 @@ from scipy.special import ndtr, ndtri
 
 from mvpose.arrays import Floats
 
-_ANGLES = np.linspace(0.0, np.arcsin(0.9995), 81)  # rho = sin(angle), in which the density is smooth
+# rho = sin(angle), in which the density is smooth. Measured correlations may be below 0 by chance.
+_ANGLES = np.concatenate([np.linspace(-np.arcsin(0.6), 0.0, 21)[:-1], np.linspace(0.0, np.arcsin(0.9995), 81)])
+_NONE = 20  # index of the angle 0
 _LIVES = np.geomspace(0.2, 4000.0, 240)  # frames
 
 
@@ -29,16 +31,17 @@ def joint_probability(p: ArrayLike, q: ArrayLike) -> Floats:
         density = np.exp(-(h * h + k * k - 2 * h * k * sin) / (2 * cos**2)) / (2 * np.pi)
     steps = np.diff(_ANGLES) * (density[..., 1:] + density[..., :-1]) / 2
     integral = np.concatenate([np.zeros((*p.shape, 1)), np.cumsum(steps, axis=-1)], axis=-1)
-    return ndtr(h) * ndtr(k) + integral
+    return np.maximum(ndtr(h) * ndtr(k) + integral - integral[..., _NONE, None], 0.0)
 
 
 def correlation_grid() -> Floats:
-    """Return the correlations of :func:`joint_probability`, (G,): 0 to almost 1."""
+    """Return the correlations of :func:`joint_probability`, (G,): -0.6 to almost 1."""
     return np.sin(_ANGLES)
 
 
 def tetrachoric_correlation(both: Floats, expected: Floats) -> Floats:
-    """Return the correlation, 0 to 1, of the latent numbers behind pairs of events, (R,); NaN if no pair is expected.
+    """Return the correlation, -0.6 to 1, of the latent numbers behind pairs of events, (R,); NaN if no pair is
+    expected.
 
     Args:
         both: observed number of pairs in which both events occurred, (R,).

@@ -181,6 +181,11 @@ class KeypointsSection(Section):
         "factors on inversion where the camera is 0, 30, ..., 180 degrees from straight ahead of the head, "
         "with linear interpolation; absent: alike from all sides",
     )
+    inversion_reach: Factor = key(
+        0.0,
+        "distance of the left-right counterpart at which inversions are 1 / e of those at no distance, heights of the "
+        "box; 0: equally frequent at all distances",
+    )
     swap: Shares = Shares()  # at the same joint of another person whose box overlaps
     swap_crowded: Shares | None = None  # the same in a crowd (PoseFix); absent: as swap
     swap_reach: Factor = key(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from worlds import find, standing, within, world
 
-from simharness.detector.circumstances import inversion_factors, swap_factors
+from simharness.detector.circumstances import distance_factors, inversion_factors
 from simharness.types.truth import KeypointError
 
 LEGS = slice(13, 17)  # knees and ankles: left and right are apart from all sides
@@ -32,7 +32,7 @@ def test_factors_of_one_change_no_draw():
 def test_swaps_are_as_frequent_as_their_distance_says(reach):
     where = world(frames=1000, views=2, together=True)
     target, neighbour = where.views.pixels[:, :, 0], where.views.pixels[:, :, 1]
-    share = 0.5 * swap_factors(target, neighbour, where.views.boxes[:, :, 0, 3], reach)
+    share = 0.5 * distance_factors(target, neighbour, where.views.boxes[:, :, 0, 3], reach)
     far = np.linalg.norm(target - neighbour, axis=-1) / 300.0
     np.testing.assert_allclose(share, 0.5 * np.exp(-far / reach))
     near, usual = (find(where, swap=0.5, swap_reach=each).error[:, :, 0] == KeypointError.SWAP for each in (reach, 0.0))

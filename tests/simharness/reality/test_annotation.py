@@ -7,7 +7,7 @@ import pytest
 
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.viewing_conditions import SIDE, body_axes
-from simharness.reality.annotation_errors import AnnotationModel, fit_annotation
+from simharness.reality.annotation_errors import AnnotationModel, annotation_offsets, fit_annotation
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.sample import sample_of
@@ -53,8 +53,14 @@ def known(filmed):
 
 
 @pytest.fixture(scope="module")
-def fitted(known):
-    return fitted_annotation(known[0])
+def exact(filmed):
+    """The same detector with other draws, and an exact truth."""
+    return [filmed.recording(seed=2, **NOISY)]
+
+
+@pytest.fixture(scope="module")
+def fitted(known, exact):
+    return fitted_annotation(known[0], exact)
 
 
 BIAS = np.zeros((9, 3))
@@ -118,11 +124,15 @@ class TestDrawn:
         assert (AnnotationModel.drawn(config, 200, seed=2).shift != drawn.shift).all()
 
 
-def fitted_annotation(recording, *, scatter=0.3):
-    """Return the annotation fitted to a recording whose detector has a known scatter, units."""
+def offsets(recording):
+    """Return the offsets of the truth of a recording from its tracks."""
     people = track_people(recording)
-    consensus = label_joints(sample_of(recording, people)).consensus
-    return fit_annotation(recording.truth, people, consensus, recording.time, sigma=np.full(17, scatter))
+    return annotation_offsets(recording.truth, people, label_joints(sample_of(recording, people)).consensus)
+
+
+def fitted_annotation(recording, exact):
+    """Return the annotation fitted to a recording, given recordings of the same detector with an exact truth."""
+    return fit_annotation(offsets(recording), [offsets(each) for each in exact], recording.time)
 
 
 def offset_in_body(annotation, bias):
@@ -168,15 +178,18 @@ class TestFitted:
         assert annotation.noise == pytest.approx(0.2, abs=0.15)
 
     def test_an_exact_truth_has_small_errors(self, filmed):
-        fitted = fitted_annotation(filmed.recording(keypoints={"scatter": 0.3}))
+        recordings = [filmed.recording(seed=seed, keypoints={"scatter": 0.3}) for seed in (1, 2)]
+        fitted = fitted_annotation(recordings[0], recordings[1:])
         assert np.abs(fitted.annotation.shift[:, LIMBS]).max() < 0.01
         assert fitted.annotation.deviation[:, LIMBS].mean() < 0.008
 
-    def test_actors_who_are_never_annotated_have_the_usual_errors(self, known):
-        recording, _ = known
-        recording = recording.during(np.arange(80))
-        truth = np.concatenate([recording.truth, np.full((80, 1, 14, 3), np.nan)], axis=1)
-        fitted = fitted_annotation(replace(recording, truth=truth))
+    def test_actors_who_are_never_annotated_have_the_usual_errors(self, known, exact):
+        def with_another(recording):
+            recording = recording.during(np.arange(80))
+            truth = np.concatenate([recording.truth, np.full((80, 1, 14, 3), np.nan)], axis=1)
+            return replace(recording, truth=truth)
+
+        fitted = fitted_annotation(with_another(known[0]), [with_another(each) for each in exact])
         assert fitted.compared.shape == (4, 14)
         assert (fitted.compared[3] == 0).all()
         np.testing.assert_allclose(fitted.annotation.shift[3, 12:], 0.0)
@@ -186,7 +199,7 @@ class TestFitted:
     def test_an_unannotated_recording_has_an_exact_annotation(self, filmed):
         recording = filmed.recording().during(np.arange(60))
         recording = replace(recording, truth=np.full(recording.truth.shape, np.nan))
-        fitted = fitted_annotation(recording)
+        fitted = fitted_annotation(recording, [recording])
         assert (fitted.annotation.shift == 0).all()
         assert (fitted.annotation.deviation == 0).all()
         assert (fitted.bias == 0).all()

@@ -1,0 +1,113 @@
+"""Inference of parameters from measured values, of simulations whose measurement is known in closed form."""
+
+import numpy as np
+import pytest
+
+from simharness.reality.detector_fit.detector_measurement import MeasuredValue
+from simharness.reality.detector_fit.inference import infer
+from simharness.scenario.sections.detector_section import KINDS
+
+LIMBS = KINDS[3:]
+SCATTER = {f"keypoints.scatter.{kind}": 0.2 + 0.05 * index for index, kind in enumerate(LIMBS)}
+JITTER = {f"keypoints.jitter.{kind}": 0.03 + 0.01 * index for index, kind in enumerate(LIMBS)}
+TRUE = {**SCATTER, **JITTER, "correlation.limb": 0.4, "phantoms.rate": 0.5}
+PRIOR = {**dict.fromkeys(SCATTER, 0.4), **dict.fromkeys(JITTER, 0.04), "correlation.limb": 0.3, "phantoms.rate": 0.3}
+NOISE = {"keypoints.scatter": 0.04, "keypoints.jitter": 0.1, "correlation.limb": 0.05, "phantoms.rate": 0.1}
+
+
+def measure(values, rng):
+    """Return measured values: scatter is measured too small, jitters are in part those of scatter, limb at half."""
+
+    def noisy(key):
+        scale = next(each for start, each in NOISE.items() if key.startswith(start))
+        return scale * rng.standard_normal()
+
+    result = {}
+    for kind in LIMBS:
+        sigma, share = values[f"keypoints.scatter.{kind}"], values[f"keypoints.jitter.{kind}"]
+        key, other = f"keypoints.scatter.{kind}", f"keypoints.jitter.{kind}"
+        result[key] = 0.7 * sigma**0.8 * np.exp(noisy(key))
+        result[other] = (0.5 * share + 0.05 * sigma) * np.exp(noisy(other))
+    result["correlation.limb"] = 0.5 * values["correlation.limb"] - 0.1 + noisy("correlation.limb")
+    result["phantoms.rate"] = values["phantoms.rate"] * np.exp(noisy("phantoms.rate"))
+    return result
+
+
+def recording(seed):
+    """Return the measured values of a recording, with intervals of their noise."""
+    found = {}
+    for key, value in measure(TRUE, np.random.default_rng([7, seed])).items():
+        reach = 1.96 * next(each for start, each in NOISE.items() if key.startswith(start))
+        ends = (value - reach, value + reach) if key == "correlation.limb" else value * np.exp([-reach, reach])
+        found[key] = MeasuredValue(value, float(ends[0]), float(ends[1]), 100_000)
+    return found
+
+
+def simulate(values, draw):
+    return measure(values, np.random.default_rng([11, draw]))
+
+
+@pytest.fixture(scope="module")
+def inferred():
+    return [infer(recording(seed), simulate, PRIOR) for seed in range(40)]
+
+
+def test_bias_of_the_measurement_is_removed(inferred):
+    for key, true in TRUE.items():
+        found = np.array([each[key].value for each in inferred])
+        raw = np.mean([recording(seed)[key].value for seed in range(40)])
+        error, before = abs(found.mean() / true - 1), abs(raw / true - 1)
+        assert error < max(0.1, 0.5 * before), (key, error, before)
+    scatter = np.array([[each[key].value / true for key, true in SCATTER.items()] for each in inferred])
+    np.testing.assert_allclose(scatter.mean(axis=0), 1.0, atol=0.05)
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say(inferred):
+    inside = [[each[key].low <= true <= each[key].high for key, true in TRUE.items()] for each in inferred]
+    assert 0.9 < np.mean(inside) < 0.995
+    widths = [np.log(each["keypoints.scatter.hips"].high / each["keypoints.scatter.hips"].low) for each in inferred]
+    # The noise of the recording over the slope of 0.8, and a little of that of the simulations.
+    assert np.mean(widths) == pytest.approx(2 * 1.96 * 0.04 / 0.8, rel=0.35)
+
+
+def test_what_cannot_be_seen_is_the_prior(inferred):
+    key = "phantoms.rate"
+
+    def without(values, draw):
+        return {**simulate(values, draw), key: 0.8 + 0.1 * np.random.default_rng([13, draw]).random()}
+
+    found = infer(recording(0), without, PRIOR)[key]
+    assert found.by_prior
+    assert found.value == pytest.approx(PRIOR[key], rel=0.35)
+    assert found.low < 0.5 * PRIOR[key] < 2 * PRIOR[key] < found.high
+    assert not inferred[0][key].by_prior
+
+
+def test_unknown_values_are_the_priors_and_others_stay():
+    measured = recording(0)
+    measured["phantoms.rate"] = MeasuredValue(np.nan, np.nan, np.nan, 0)
+    measured["scores.inversion"] = MeasuredValue(np.nan, np.nan, np.nan, 0)  # neither known nor in the prior
+    measured["boxes.duplicates"] = MeasuredValue(0.1, 0.05, 0.2, 50)  # not inferred
+    found = infer(measured, simulate, PRIOR)
+    assert found["phantoms.rate"].value == pytest.approx(PRIOR["phantoms.rate"])
+    assert found["phantoms.rate"].by_prior
+    assert found["boxes.duplicates"] == measured["boxes.duplicates"]
+    assert not found["scores.inversion"].known
+
+
+def test_events_that_never_happened_are_rare():
+    """No event in a thousand trials, where the prior expects forty."""
+    key = "keypoints.jitter.hips"
+    never = {key: MeasuredValue(0.0, 0.0, 0.003, 1000)}
+
+    def count(values, draw):
+        return {key: np.random.default_rng([17, draw]).binomial(1000, values[key]) / 1000}
+
+    found = infer(never, count, {key: 0.04})[key]
+    assert 0 < found.value < 0.006
+    assert found.high < 0.02
+
+
+def test_without_rounds_nothing_changes():
+    measured = recording(0)
+    assert infer(measured, simulate, PRIOR, rounds=0) == measured
