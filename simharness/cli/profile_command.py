@@ -72,7 +72,7 @@ def profile_network(
         from mvpose.commands.progress import reporter
         from simharness.outputs.network_profile.page import render_profile
         from simharness.reality.network_profile.profile_check import check_profile
-        from simharness.reality.network_profile.profile_fit import ROUNDS, fit_network
+        from simharness.reality.network_profile.profile_fit import SIMULATIONS, fit_network
         from simharness.reality.network_profile.profiled_scenes import read_scenes
         from simharness.scenario.load import load
         from simharness.study.trial_store import Store
@@ -88,7 +88,7 @@ def profile_network(
         with reporter() as bars:
             with bars.stage("read pictures", designed.trials) as advance:
                 read = read_scenes(designed, **where, progress=advance)
-            with failing(), bars.stage("fit", ROUNDS) as advance:
+            with failing(), bars.stage("fit", SIMULATIONS) as advance:
                 profile = fit_network(read, name=stem, command=f"simharness profile-network {stem}", progress=advance)
             write_text(profile.text, place / f"{stem}.toml")
             checked = None

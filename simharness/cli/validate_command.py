@@ -175,6 +175,12 @@ def fit_detector(
     figure: Path | None = option(
         None, "Plot the measured errors and those of a simulated twin (PNG).", metavar="FILE", dir_okay=False
     ),
+    halves: bool = option(
+        False,
+        "Also fit to each half of the recording, and say whether that predicts the other half better than the shipped "
+        "profile does.",
+        "--halves",
+    ),
     json_file: Path | None = option(None, "Write all numbers to this file.", "--json", metavar="FILE", dir_okay=False),
 ) -> None:
     """Measure the errors of the detector of a recording, and write a detector profile with them."""
@@ -189,6 +195,7 @@ def fit_detector(
             print_agreement,
             print_annotation,
             print_measurement,
+            print_priors,
         )
         from simharness.reality.recording_file import read_recording
         from simharness.reality.twin import TwinModel, simulate_twins
@@ -202,7 +209,19 @@ def fit_detector(
         console = Console()
         print_measurement(fitted.real, console)
         print_annotation(fitted.annotation, console)
-        summary = {"real": fitted.real.summary(), "annotation": fitted.annotation.summary()}
+        print_priors(fitted.calibrated, console)
+        summary: dict[str, Any] = {
+            "real": fitted.real.summary(),
+            "inferred": fitted.calibrated.summary(),
+            "annotation": fitted.annotation.summary(),
+        }
+        if halves:
+            from simharness.reality.detector_fit.half_check import check_halves
+
+            with failing(), reporter() as bars, bars.stage("halves", 1):
+                check = check_halves(recorded)
+            console.print(str(check), highlight=False)
+            summary["halves"] = check.summary()
         if figure is not None:
             with failing(), reporter() as bars:
                 (twin,) = simulate_twins(TwinModel.of_fit(recorded, fitted), count=1, reporter=bars)

@@ -13,6 +13,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
+from scipy.special import ndtri
 
 from mvpose import SHELF14, Rig
 from mvpose.arrays import Floats
@@ -59,6 +60,11 @@ class AnnotationModel:
     """Correlation time of the random part, seconds."""
     noise: float
     """Share of the variance of the random part that is drawn anew in every frame."""
+    gross: Floats | float = 0.0
+    """Share of the frames in which each joint is annotated grossly wrong, (A, 14) or one for all; with the memory of
+    the random part."""
+    gross_deviation: float = 0.0
+    """Standard deviation of gross errors along each axis, metres; they come on top."""
 
     @classmethod
     def drawn(cls, config: AnnotationSection, actors: int, *, seed: int) -> Self:
@@ -92,13 +98,17 @@ class AnnotationModel:
         # The memory runs on a regular clock, so that gaps between frames count as they last.
         ticks = np.round((time - time[0]) / step).astype(int) if len(time) > 1 else np.zeros(1, int)
         shape = (ticks[-1] + 1, actors, len(SHELF14), 3)
-        slow = stream(seed, "annotation", "slow").standard_normal(shape)
-        fast = stream(seed, "annotation", "fast").standard_normal(shape)
         kept = np.exp(-step / self.life) if self.life > 0 and len(time) > 1 else 0.0
-        slow[1:] *= np.sqrt(1 - kept**2)
-        slow = lfilter([1.0], [1.0, -kept], slow, axis=0)
-        drawn = np.sqrt(1 - self.noise) * slow + np.sqrt(self.noise) * fast
-        return np.asarray(drawn[ticks] * self.deviation[..., None])
+
+        def lasting(name: str, shape: tuple[int, ...]) -> Floats:
+            drawn = stream(seed, "annotation", name).standard_normal(shape)
+            drawn[1:] *= np.sqrt(1 - kept**2)
+            return np.asarray(lfilter([1.0], [1.0, -kept], drawn, axis=0))[ticks]
+
+        fast = stream(seed, "annotation", "fast").standard_normal(shape)[ticks]
+        drawn = np.sqrt(1 - self.noise) * lasting("slow", shape) + np.sqrt(self.noise) * fast
+        wrong = lasting("gross", shape[:-1]) < ndtri(self.gross)
+        return drawn * self.deviation[..., None] + self.gross_deviation * wrong[..., None] * lasting("place", shape)
 
 
 def annotate_simulation(scenario: Scenario, sequence: PoseSequence, rig: Rig) -> Floats:
@@ -148,6 +158,8 @@ class AnnotationFit:
             "deviation": self.annotation.deviation.tolist(),
             "life": self.annotation.life,
             "noise": self.annotation.noise,
+            "gross": np.broadcast_to(self.annotation.gross, self.compared.shape).tolist(),
+            "gross_deviation": self.annotation.gross_deviation,
             "bias": self.bias.tolist(),
             "compared": self.compared.tolist(),
         }
@@ -203,7 +215,26 @@ def fit_annotation(away: Floats, of_tracks: Sequence[Floats], time: Floats) -> A
     freedom = independent / (1 + 1 / len(others))
     freedom = np.where((compared >= _FEWEST) & np.isfinite(total) & np.isfinite(expected), freedom, 0.0)
     deviation = _deviations(np.nan_to_num(total), np.nan_to_num(expected), freedom)
-    return AnnotationFit(AnnotationModel(shift + _per_joint(bias), deviation, life, white), bias, compared)
+    gross = _gross_errors(away, of_tracks)
+    return AnnotationFit(AnnotationModel(shift + _per_joint(bias), deviation, life, white, *gross), bias, compared)
+
+
+def _gross_errors(away: Floats, of_tracks: Sequence[Floats]) -> tuple[Floats, float]:
+    """Return the share of gross errors of each joint beyond those of the tracks, (A, 14), and their deviation, metres.
+
+    Joints in few frames take from the others: each counts as _FEWEST frames more, at the share of all.
+    """
+    known = np.isfinite(away[..., 0])
+    wrong, others = known & ~np.isfinite(_rest(away)[..., 0]), []
+    for each in of_tracks:
+        seen = np.isfinite(each[..., 0])
+        others.append((seen & ~np.isfinite(_rest(each)[..., 0])).sum() / max(seen.sum(), 1))
+    count = known.sum(axis=0)
+    excess = np.maximum(wrong.sum(axis=0) - np.mean(others) * count, 0.0)
+    if not excess.any():
+        return np.zeros(count.shape), 0.0
+    far = ((away - _robust_mean(away)) ** 2).sum(axis=-1)
+    return (excess + _FEWEST * excess.sum() / count.sum()) / (count + _FEWEST), float(np.sqrt(far[wrong].mean() / 3))
 
 
 def _shifts(away: Floats) -> tuple[Floats, Floats]:

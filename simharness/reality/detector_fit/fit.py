@@ -1,17 +1,16 @@
-"""Fit of a detector profile, and of the annotation, to a recording; it is calibrated by simulation.
+"""Fit of a detector profile, and of the annotation, to a recording.
 
-Calibration: the consensus of the other views is not the true place of a joint: it has noise, and errors of other views
-in it, so that measured scatter and rates of errors are larger than the parameters behind them. Indirect inference
-(Gourieroux, Monfort & Renault, Journal of Applied Econometrics 1993) removes this without a formula for each value:
-twins are simulated with the current parameters and measured in the same way as the recording, and each parameter moves
-by the difference of the two measurements.
+The consensus of the other views is not the true place of a joint: it has noise, and errors of other views in it, so
+that measured scatter and rates of errors are not the parameters behind them. These are inferred by simulation
+(:mod:`simharness.reality.detector_fit.inference`): twins are measured in the same way as the recording. So is what the
+errors of the detector leave in the tracks that the annotation is compared with.
 
 Face: data sets do not annotate it. The bodies that re-enact a recording have faces, turned as the detected ones; what
 is left between the two, on average, is how the detector's joints of the face differ from the landmarks of the bodies.
 """
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -39,25 +38,6 @@ from simharness.reality.people_tracks import LIMB_JOINTS, track_people
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, DetectorSection
 
 _FILMS = 2
-_FEWEST = 100  # joints behind a value that is calibrated: Shelf has 130 reported shoulders that others hide
-ROUNDS = 3
-
-SHARES = (
-    "keypoints.jitter",
-    "keypoints.miss",
-    "keypoints.face",
-    "keypoints.guess.self_occluded",
-    "keypoints.guess.occluded",
-    "correlation.scatter_near",
-)
-"""Calibrated shares, by the beginning of their keys."""
-
-FACTORS = ("keypoints.scatter", "keypoints.self_occluded", "keypoints.occluded", "correlation.scatter_life")
-"""Calibrated amounts, by the beginning of their keys."""
-
-_LEAST = 2e-4  # of a share; counts of a recording say nothing below it
-_STEP = 1.0  # largest change of a logit or a logarithm in a round
-_FARTHEST = 1.6  # largest change of a logit or a logarithm in all: what is measured is near the parameter
 
 
 @dataclass(frozen=True)
@@ -154,44 +134,6 @@ def write_profile(fitted: DetectorFit, path: str | Path) -> None:
         raise ValueError(f"--out {path}: cannot be written: {error.strerror}") from None
 
 
-def calibrate(
-    real: Mapping[str, float],
-    simulate: Callable[[Mapping[str, float]], Sequence[Mapping[str, float]]],
-    *,
-    rounds: int = ROUNDS,
-    shares: tuple[str, ...] = SHARES,
-    factors: tuple[str, ...] = FACTORS,
-    farthest: float = _FARTHEST,
-    damped: bool = False,
-) -> dict[str, float]:
-    """Return the parameters at which simulated detections measure as the real ones.
-
-    Args:
-        real: measured values by key; those that are neither shares nor factors, or are NaN, stay.
-        simulate: function from parameters to the measured values of simulated detections, one for each draw.
-        rounds: number of rounds.
-        shares: calibrated shares, by the beginning of their keys.
-        factors: calibrated amounts, likewise.
-        farthest: largest change of a logit or a logarithm in all.
-        damped: steps of later rounds are smaller (Robbins & Monro 1951), so that the noise of the draws averages out.
-    """
-    moved = {
-        key: 0.0
-        for key, value in real.items()
-        if (key.startswith(shares) and value > _LEAST) or (key.startswith(factors) and value > 0)
-    }
-    for number in range(rounds):
-        gain = 2 / (number + 2) if damped else 1.0
-        measured = simulate(_at(real, moved, shares))
-        for key, before in moved.items():
-            twins = np.array([each.get(key, np.nan) for each in measured])
-            if np.isfinite(twins).any():
-                scale = _logit if key.startswith(shares) else _log
-                step = np.clip(scale(real[key]) - scale(float(np.nanmean(twins))), -_STEP, _STEP)
-                moved[key] = float(np.clip(before + gain * step, -farthest, farthest))
-    return _at(real, moved, shares)
-
-
 def face_bias(tracked: Floats, staged: Floats) -> Floats:
     """Return the offset of the tracked joints of the face from the staged ones, (3, 3) metres: forward, outward, up.
 
@@ -210,21 +152,3 @@ def face_bias(tracked: Floats, staged: Floats) -> Floats:
         # Each person counts alike: one with more frames says no more about the next one.
         of_person = np.nanmedian(offset, axis=0)
         return np.nan_to_num(np.stack([np.nanmean(of_person[:, kinds == kind], axis=(0, 1)) for kind in range(3)]))
-
-
-def _at(real: Mapping[str, float], moved: Mapping[str, float], shares: tuple[str, ...]) -> dict[str, float]:
-    """Return the values, moved on the scale of each: logit for shares, logarithm for amounts."""
-    result = dict(real)
-    for key, change in moved.items():
-        share = key.startswith(shares)
-        result[key] = float(1 / (1 + np.exp(-_logit(real[key]) - change)) if share else real[key] * np.exp(change))
-    return result
-
-
-def _logit(share: float) -> float:
-    share = min(max(share, _LEAST), 1 - _LEAST)
-    return float(np.log(share / (1 - share)))
-
-
-def _log(amount: float) -> float:
-    return float(np.log(max(amount, 1e-3)))

@@ -60,6 +60,14 @@ def print_measurement(measurement: MeasuredDetector, console: Console) -> None:
     console.print(Group(*(Padding(block, (0, 0, 1, 0)) for block in [*blocks, notes])))
 
 
+def print_priors(inferred: MeasuredDetector, console: Console) -> None:
+    """Print the parameters about which the recording says little."""
+    keys = [key for key, each in inferred.values.items() if each.by_prior]
+    shown = ", ".join(keys) or "none"
+    text = f"Parameters that stay near the shipped profile, because the recording says little about them: {shown}.\n"
+    console.print(text, style="dim", highlight=False)
+
+
 def print_annotation(fitted: AnnotationFit, console: Console) -> None:
     """Print the errors of the truth: shift and random part of each actor, and what all actors share."""
     annotation = fitted.annotation

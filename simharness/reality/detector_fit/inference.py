@@ -22,14 +22,17 @@ from simharness.reality.detector_fit.detector_measurement import MeasuredValue
 from simharness.scenario.sections.detector_section import KINDS
 from simharness.types.random_streams import stream
 
-ROUNDS = 10
+ROUNDS = 7
+"""Pairs of simulations, and single ones after them."""
 
 Scale = Literal["logit", "log", "fisher"]
 
-_SCALES: Mapping[Scale, tuple[str, ...]] = {
+Scales = Mapping[Scale, tuple[str, ...]]
+
+SCALES: Scales = {
     "logit": (
         *("keypoints.jitter", "keypoints.miss", "keypoints.inversion.", "keypoints.swap", "keypoints.stray"),
-        *("keypoints.guess.self_occluded", "keypoints.guess.occluded", "keypoints.face", "correlation.scatter_noise"),
+        *("keypoints.guess.self_occluded", "keypoints.guess.occluded", "correlation.scatter_noise"),
         *("scores.good", "scores.jitter", "scores.miss", "scores.inversion", "scores.swap", "scores.hidden"),
         *("scores.guess", "scores.overconfident", "scores.underconfident"),
     ),
@@ -42,11 +45,11 @@ _SCALES: Mapping[Scale, tuple[str, ...]] = {
         *("correlation.scatter_views", "boxes.missed_views"),
     ),
 }
-"""Inferred parameters by their scale and the beginning of their keys: shares, amounts, and correlations, which are on
-the inverse hyperbolic tangent; measured ones may be below 0."""
+"""Inferred parameters of a recording by their scale and the beginning of their keys: shares, amounts, and correlations,
+which are on the inverse hyperbolic tangent; measured ones may be below 0."""
 
 _WIDTH = 0.7
-_WIDTHS = {"keypoints.self_occluded": 1.5, "keypoints.occluded": 1.5, **dict.fromkeys(_SCALES["fisher"], 0.35)}
+_WIDTHS = {"keypoints.self_occluded": 1.5, "keypoints.occluded": 1.5, **dict.fromkeys(SCALES["fisher"], 0.5)}
 """Standard deviation of the prior on the scale, and other ones by the beginning of the keys."""
 
 _COMMON = {
@@ -58,6 +61,7 @@ _COMMON_USUAL = 0.3
 beginning of the keys, and of the others: a detector may have fewer errors than the shipped one in all kinds alike."""
 
 _PERTURBATIONS: Mapping[Scale, float] = {"logit": 0.5, "log": 0.3, "fisher": 0.15}
+_OF_PAIR = 1e-3  # weight of the levels of a pair
 _STEP = 1.0  # largest change in a round, on the scale
 _NORMAL = 1.96  # deviations from the mean to the ends of a 95 % interval
 _ONE_SIDED = 1.645  # deviations to the one end of a 95 % interval
@@ -72,6 +76,11 @@ _OTHER_SPREAD, _KIND_SPREAD, _SAME = 0.15, 0.2, 1e-3
 """Spread of slopes by other parameters; of the slopes of one kind of joint about those of all, by the parameter and by
 others."""
 
+_MOST = 9.0
+"""Largest square of a difference in standard deviations that counts."""
+
+_SLIGHT = 0.12  # slope by another parameter, below which it is noise
+
 
 def infer(
     measured: Mapping[str, MeasuredValue],
@@ -79,6 +88,7 @@ def infer(
     prior: Mapping[str, float],
     *,
     rounds: int = ROUNDS,
+    scales: Scales = SCALES,
 ) -> dict[str, MeasuredValue]:
     """Return the parameters at which simulated detections measure as the real ones, with their 95 % intervals.
 
@@ -87,17 +97,21 @@ def infer(
             prior's.
         simulate: function from parameters and the number of a draw to the measured values of simulated detections.
         prior: most likely values before the measurement, by key; keys without one have no prior.
-        rounds: number of pairs of simulations.
+        rounds: number of pairs of simulations, and of single ones after them.
+        scales: inferred parameters.
     """
-    parameters = [each for key, value in measured.items() if (each := _parameter(key, value, prior.get(key, 0.0)))]
+    found = (_parameter(key, value, prior.get(key, 0.0), scales) for key, value in measured.items())
+    parameters = [each for each in found if each is not None]
     if not parameters or not rounds:
         return dict(measured)
     state = _Inference(tuple(parameters))
     fixed = {key: each.value for key, each in measured.items()}
     for number in range(rounds):
         moves = np.array([each.step * stream(number, "inference", each.tie).choice([-1.0, 1.0]) for each in parameters])
-        pair = [simulate({**fixed, **state.values(side * moves)}, number) for side in (1.0, -1.0)]
-        state.add(moves, *pair)
+        state.keep_inside()
+        state.add(moves, *(simulate({**fixed, **state.values(side * moves)}, number) for side in (1.0, -1.0)))
+    for number in range(rounds, 2 * rounds):
+        state.add(np.zeros(len(parameters)), simulate({**fixed, **state.values()}, number))
     deviation = state.posterior()[1]
     ends = [state.values(side * _NORMAL * deviation) for side in (-1.0, 0.0, 1.0)]
     result = dict(measured)
@@ -105,6 +119,20 @@ def infer(
         low, value, high = (end[each.key] for end in ends)
         result[each.key] = replace(measured[each.key], value=value, low=low, high=high, by_prior=bool(unsure))
     return result
+
+
+def misfit(measured: Mapping[str, MeasuredValue], simulated: Mapping[str, float]) -> float:
+    """Return the mean squared difference of simulated from measured values in standard deviations of their difference.
+
+    Over the parameters of :data:`SCALES`; each counts :data:`_MOST` at most, so that no single one decides.
+    """
+    squares = []
+    for key, each in measured.items():
+        parameter = _parameter(key, each, 0.5, SCALES)
+        if parameter is not None and np.isfinite(parameter.observed) and np.isfinite(simulated.get(key, np.nan)):
+            away = (parameter.scaled(simulated[key]) - parameter.observed) / (np.sqrt(2) * parameter.deviation)
+            squares.append(min(away**2, _MOST))
+    return float(np.mean(squares)) if squares else np.nan
 
 
 @dataclass(frozen=True)
@@ -161,9 +189,9 @@ class _Parameter:
         return float(np.exp(place) if self.scale == "log" else expit(place))
 
 
-def _parameter(key: str, measured: MeasuredValue, prior: float) -> _Parameter | None:
+def _parameter(key: str, measured: MeasuredValue, prior: float, scales: Scales) -> _Parameter | None:
     """Return the parameter of a key; None if it is not inferred, or if nothing is known of it."""
-    scale = next((scale for scale, starts in _SCALES.items() if key.startswith(starts)), None)
+    scale = next((scale for scale, starts in scales.items() if key.startswith(starts)), None)
     if scale is None:
         return None
     n = measured.count
@@ -185,17 +213,17 @@ def _parameter(key: str, measured: MeasuredValue, prior: float) -> _Parameter | 
 
 @dataclass
 class _Inference:
-    """Present parameters, and all pairs of simulations so far, N parameters."""
+    """Present parameters, and all rounds of one or two simulations so far, N parameters."""
 
     parameters: tuple[_Parameter, ...]
     places: list[Floats] = field(default_factory=list)
-    """Parameters in the middle of each pair, (N,)."""
+    """Parameters in each round, (N,)."""
     moves: list[Floats] = field(default_factory=list)
-    """Perturbations of each pair, (N,)."""
+    """Perturbations in each round, (N,); 0 in those of one simulation."""
     levels: list[Floats] = field(default_factory=list)
-    """Mean measured values of each pair, (N,); NaN where unknown."""
+    """Mean measured values of each round, (N,); NaN where unknown."""
     changes: list[Floats] = field(default_factory=list)
-    """Half differences of the measured values of each pair, (N,)."""
+    """Half differences of the measured values of each pair, (N,); 0 in rounds of one simulation."""
 
     def __post_init__(self) -> None:
         self.prior = np.array([each.prior for each in self.parameters])
@@ -215,19 +243,23 @@ class _Inference:
         result[np.ix_(index, index)], deviation[index] = np.linalg.inv(covariance), np.sqrt(np.diag(covariance))
         return result, deviation
 
-    def values(self, change: Floats) -> dict[str, float]:
-        """Return the parameters at a distance from the present ones, (N,) on their scales, by key."""
+    def keep_inside(self) -> None:
+        """Move correlations so far from 0 that both perturbations of a pair act."""
+        for index, each in enumerate(self.parameters):
+            if each.scale == "fisher":
+                self.at[index] = max(self.at[index], each.step)
+
+    def values(self, change: Floats | float = 0.0) -> dict[str, float]:
+        """Return the present parameters, or those at a distance, (N,) on their scales, by key."""
         return {each.key: each.value(place) for each, place in zip(self.parameters, self.at + change, strict=True)}
 
-    def add(self, moves: Floats, one: Mapping[str, float], other: Mapping[str, float]) -> None:
-        """Add the measured values of a pair of simulations, and move towards the mean of the posterior."""
-        measured = np.array(
-            [[each.scaled(of.get(each.key, np.nan)) for each in self.parameters] for of in (one, other)]
-        )
+    def add(self, moves: Floats, *simulated: Mapping[str, float]) -> None:
+        """Add the measured values of one or two simulations, and move towards the mean of the posterior."""
+        measured = np.array([[each.scaled(of.get(each.key, np.nan)) for each in self.parameters] for of in simulated])
         self.places.append(self.at.copy())
         self.moves.append(moves)
         self.levels.append(measured.mean(axis=0))
-        self.changes.append((measured[0] - measured[1]) / 2)
+        self.changes.append((measured[0] - measured[-1]) / 2)
         self.at = self.at + np.clip(self.posterior()[0] - self.at, -_STEP, _STEP)
         fisher = np.array([each.scale == "fisher" for each in self.parameters])
         self.at[fisher] = np.maximum(self.at[fisher], 0.0)
@@ -236,9 +268,9 @@ class _Inference:
         """Return mean and standard deviation of the parameters, (N,) each."""
         slopes = self._slopes()
         levels = np.array(self.levels) - np.array(self.places) @ slopes.T
-        # Pairs near the end count more: there the other parameters were nearer to theirs.
-        weight = np.broadcast_to((np.arange(len(levels)) + 1.0)[:, None] ** 2, levels.shape)
-        weight = np.where(np.isfinite(levels), weight, 0.0)
+        # Rounds near the end count more, where all parameters were near to theirs; pairs, which are perturbed, hardly.
+        weight = (np.arange(len(levels)) + 1.0) ** 2 * np.where(np.any(self.moves, axis=1), _OF_PAIR, 1.0)
+        weight = np.where(np.isfinite(levels), weight[:, None], 0.0)
         weight = weight / np.maximum(weight.sum(axis=0), 1e-9)
         level = (weight * np.nan_to_num(levels)).sum(axis=0)
         # Resamples of a recording without an event do not vary; simulations do.
@@ -279,6 +311,7 @@ class _Inference:
             for row, cell in zip(rows, cells, strict=True):
                 slopes = _ridge(padded[:, cell], changes[:, row], pooled, np.where(own, _KIND_SPREAD, _SAME))
                 slopes[own] = np.clip(slopes[own], 0.0, _STEEPEST)
+                slopes[~own & (np.abs(slopes) < _SLIGHT)] = 0.0
                 shown = np.array(cell) >= 0
                 result[row, np.array(cell)[shown]] = slopes[shown]
         return result

@@ -16,12 +16,12 @@ from simharness.scenario.sections.detector_section import KINDS, LARGEST_MULTIPL
 
 _FACE_DROPS = ("keypoints.drop.visible", "keypoints.drop.self_occluded")
 
-_PRIORS: Mapping[DetectorKind, str] = {"top-down": "topdown", "bottom-up": "typical"}
+PRIORS: Mapping[DetectorKind, str] = {"top-down": "topdown", "bottom-up": "typical"}
 """Shipped profile of each kind of detector."""
 
 _OF_QUALITY = ("keypoints.jitter.", "keypoints.miss.", "keypoints.inversion.", "keypoints.swap.")
 
-_ESTIMATES = {"keypoints.inversion_reach": 0.3}
+_ESTIMATES = {"keypoints.inversion_reach": 0.3, **{f"keypoints.stray.{kind}": 0.3 for kind in KINDS[3:]}}
 """Estimates of parameters that the shipped profiles leave out."""
 
 _MOST = {
@@ -70,7 +70,7 @@ def settings(measurement: MeasuredDetector, *, name: str, bias: Floats | None = 
 
 def prior_of(kind: DetectorKind) -> dict[str, float]:
     """Return the parameters of the shipped profile of a kind of detector by dotted key, before any measurement."""
-    profile = read_profile(_PRIORS[kind])
+    profile = read_profile(PRIORS[kind])
     quality, result = profile.keypoints.quality, dict(_ESTIMATES)
     for key, value in _numbers(profile.model_dump(), ""):
         if value or key not in result:

@@ -1,13 +1,13 @@
-"""Fit of a detector profile to a network on rendered scenes: measured against exact truth, calibrated by simulation.
+"""Fit of a detector profile to a network on rendered scenes, whose truth is exact.
 
 The sums and the parameters are those of a fit to a recording. Their values are where a simulated detector in the same
-scenes is measured as the network is (indirect inference, see :mod:`simharness.reality.detector_fit.fit`): a share of
+scenes is measured as the network is (:mod:`simharness.reality.detector_fit.inference`): a share of
 errors among hidden joints, for example, follows from guesses, whose errors depend on the pose.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import count, islice, pairwise
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from simharness.reality.detector_fit.detector_measurement import (
     label_estimates,
     measure_labels,
 )
-from simharness.reality.detector_fit.fit import FACTORS, SHARES, calibrate
+from simharness.reality.detector_fit.inference import SCALES, Scales, infer
 from simharness.reality.detector_fit.joint_labels import LabelledJoints
 from simharness.reality.detector_fit.profile import as_toml, settings
 from simharness.reality.network_profile.error_curves import error_curves, neighbour_distance
@@ -40,30 +40,28 @@ from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOIN
 from simharness.types.random_streams import stream
 from simharness.types.truth import MISS_FROM, KeypointError
 
-ROUNDS = 8
-DRAWS = 2
-"""Rounds of the calibration, and simulated detections of all scenes in each of them."""
+ROUNDS = 6
+"""Pairs of simulations of all scenes by which the parameters are inferred, and single ones after them."""
+
+SIMULATIONS = 3 * ROUNDS
 
 _FEWEST = 60  # joints or people behind a value that is calibrated
-_FARTHEST = 2.0  # of a logit or a logarithm: guesses are right where misses are counted
 _RESAMPLES = 200
 _PRIOR = 100.0  # joints of each bearing that count as usual
 _WITHIN = 0.9  # share of misses that are not stray
 _SMALL = 64.0  # pixels, sqrt(area) of a person, as in the error model
-_SHARES = (
-    *SHARES,  # "keypoints.miss" with its means
-    *("keypoints.swap.", "keypoints.inversion.", "keypoints.drop", "keypoints.stray"),
-    *("correlation.views", "correlation.gross_views", "correlation.limb", "correlation.scatter_views"),
-    *("boxes.missed", "boxes.duplicates", "boxes.score", "decoys.share", "decoys.consistent"),
-    *("scores.good", "scores.jitter", "scores.miss", "scores.inversion", "scores.swap", "scores.guess"),
-    "scores.hidden",
-)
-_FACTORS = (
-    *FACTORS,
-    *("correlation.life", "boxes.life", "boxes.jitter", "phantoms.rate", "phantoms.life"),
-    *("keypoints.truncated", "keypoints.small", "keypoints.guess.scatter"),
-    *("keypoints.inversion_bearing", "keypoints.swap_reach", "scores.deviation", "scores.slope"),
-)
+_SCALES: Scales = {
+    "logit": (
+        *(*SCALES["logit"], "keypoints.drop", "correlation.views", "correlation.gross_views", "correlation.limb"),
+        *("correlation.scatter_near", "correlation.scatter_views", "boxes.missed", "boxes.duplicates", "boxes.score"),
+        *("decoys.share", "decoys.consistent"),
+    ),
+    "log": (
+        *(*SCALES["log"], "boxes.jitter", "phantoms.life", "keypoints.truncated", "keypoints.small", "scores.slope"),
+        *("keypoints.guess.scatter", "keypoints.inversion_bearing", "keypoints.swap_reach"),
+    ),
+}
+"""Inferred parameters; correlations are measured without a consensus, and are shares."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ def fit_network(
     name: str,
     command: str = "",
     rounds: int = ROUNDS,
-    progress: Callable[[int], None] = lambda rounds: None,
+    progress: Callable[[int], None] = lambda simulations: None,
 ) -> NetworkProfile:
     """Fit a profile to what a network finds in scenes.
 
@@ -107,8 +105,8 @@ def fit_network(
         scenes: the scenes.
         name: name of the profile.
         command: command that made the profile, to be written into its file.
-        rounds: rounds of the calibration.
-        progress: called with the number of finished rounds.
+        rounds: pairs of simulations, and single ones after them.
+        progress: called with 1 after each simulation.
 
     Raises:
         ValueError: the network finds nobody, or the scenes have different numbers of cameras.
@@ -126,26 +124,24 @@ def fit_network(
     }
     measured = replace(measured, values={**measured.values, **more})
 
-    draws = count()
-
-    def measure(values: Mapping[str, float]) -> list[dict[str, float]]:
+    def measure(values: Mapping[str, float], draw: int) -> dict[str, float]:
         detector = DetectorSection.model_validate(settings(measured.with_values(values), name=name, bias=bias))
-        results = [_simulated_values(scenes, detector, draw, kind=kind, bias=bias) for draw in islice(draws, DRAWS)]
+        found = _simulated_values(scenes, detector, draw, kind=kind, bias=bias)
         progress(1)
-        return results
+        return found
 
-    known = {key: each.value for key, each in measured.values.items() if each.count >= _FEWEST}
-    rare = {key: each.value for key, each in measured.values.items() if key not in known}
-    fitted = calibrate(
+    known = {key: each for key, each in measured.values.items() if each.count >= _FEWEST}
+    rare = {key: each for key, each in measured.values.items() if key not in known}
+    others = {key: each.value for key, each in rare.items()}
+    # The truth is exact: what is measured is near the parameter.
+    fitted = infer(
         known,
-        lambda values: measure({**values, **rare}),
+        lambda values, draw: measure({**values, **others}, draw),
+        {key: each.value for key, each in known.items()},
         rounds=rounds,
-        shares=_SHARES,
-        factors=_FACTORS,
-        farthest=_FARTHEST,
-        damped=True,
+        scales=_SCALES,
     )
-    calibrated = measured.with_values({**fitted, **rare})
+    calibrated = replace(measured, values={**fitted, **rare})
     detector = DetectorSection.model_validate(settings(calibrated, name=name, bias=bias))
     text = as_toml(calibrated, name=name, bias=bias, command=command, notes="network", of="people whose truth is exact")
     simulated = label_scenes(scenes, [scene.simulated(detector) for scene in scenes], kind=kind, bias=bias)

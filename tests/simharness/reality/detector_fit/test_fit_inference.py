@@ -1,5 +1,7 @@
 """Inference of parameters from measured values, of simulations whose measurement is known in closed form."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -43,13 +45,13 @@ def recording(seed):
     return found
 
 
-def simulate(values, draw):
-    return measure(values, np.random.default_rng([11, draw]))
+def simulate(values, draw, seed=0):
+    return measure(values, np.random.default_rng([11, seed, draw]))
 
 
 @pytest.fixture(scope="module")
 def inferred():
-    return [infer(recording(seed), simulate, PRIOR) for seed in range(40)]
+    return [infer(recording(seed), partial(simulate, seed=seed), PRIOR) for seed in range(40)]
 
 
 def test_bias_of_the_measurement_is_removed(inferred):
