@@ -138,7 +138,9 @@ ROWS = {
         "out": RESULT["out"],
     },
     "merge": {"into": Row("--into {out}/other")},
-    "fit-detector": JSON | {"out": Row("--out {out}/profile.toml"), "figure": Row("--figure {out}/errors.png")},
+    "fit-detector": JSON
+    | {"out": Row("--out {out}/profile.toml"), "figure": Row("--figure {out}/errors.png")}
+    | {"halves": Row("--halves")},
     "validate": WORKERS
     | JSON
     | {

@@ -49,16 +49,16 @@ SCALES: Scales = {
 which are on the inverse hyperbolic tangent; measured ones may be below 0."""
 
 _WIDTH = 0.7
-_WIDTHS = {"keypoints.self_occluded": 1.5, "keypoints.occluded": 1.5, **dict.fromkeys(SCALES["fisher"], 0.5)}
+_WIDTHS = {"keypoints.guess": 1.2, **dict.fromkeys(SCALES["fisher"], 0.35)}
 """Standard deviation of the prior on the scale, and other ones by the beginning of the keys."""
 
-_COMMON = {
-    **dict.fromkeys(("keypoints.jitter.", "keypoints.miss.", "keypoints.inversion.", "keypoints.swap."), 1.0),
-    **dict.fromkeys(("keypoints.scatter.", "keypoints.self_occluded.", "keypoints.occluded."), 0.7),
-}
-_COMMON_USUAL = 0.3
-"""Standard deviation, on the scale, of what a parameter of all kinds of joints has in common beside its prior, by the
-beginning of the keys, and of the others: a detector may have fewer errors than the shipped one in all kinds alike."""
+_ALIKE = (
+    *("keypoints.jitter.", "keypoints.miss.", "keypoints.inversion.", "keypoints.swap.", "keypoints.scatter."),
+    *("keypoints.self_occluded.", "keypoints.occluded."),
+)
+_COMMON, _COMMON_USUAL = 1.0, 0.3
+"""Standard deviation, on the scale, of what a parameter of all kinds of joints has in common beside its prior, of those
+that begin so and of the others: a detector may have fewer errors than the shipped one in all kinds alike."""
 
 _PERTURBATIONS: Mapping[Scale, float] = {"logit": 0.5, "log": 0.3, "fisher": 0.15}
 _OF_PAIR = 1e-3  # weight of the levels of a pair
@@ -235,9 +235,10 @@ class _Inference:
         """Return the inverse covariance of the prior, (N, N), and its deviations, (N,); without a prior 0, infinite."""
         index = np.flatnonzero(np.isfinite(self.prior))
         known = [self.parameters[each] for each in index]
-        covariance = np.diag([_of_key(_WIDTHS, each.key, _WIDTH) ** 2 for each in known])
+        widths = [next((w for start, w in _WIDTHS.items() if each.key.startswith(start)), _WIDTH) for each in known]
+        covariance = np.diag(np.square(widths))
         for row, one in enumerate(known):
-            common = _of_key(_COMMON, one.key, _COMMON_USUAL) if one.group != one.key else 0.0
+            common = (_COMMON if one.key.startswith(_ALIKE) else _COMMON_USUAL) if one.group != one.key else 0.0
             covariance[row] += [common**2 * (one.group == other.group) for other in known]
         result, deviation = np.zeros((len(self.parameters),) * 2), np.full(len(self.parameters), np.inf)
         result[np.ix_(index, index)], deviation[index] = np.linalg.inv(covariance), np.sqrt(np.diag(covariance))
@@ -324,8 +325,3 @@ def _ridge(design: Floats, change: Floats, usual: Floats, spread: Floats) -> Flo
     noise = float(np.mean((change - design @ usual) ** 2)) + 1e-6 if len(change) else 1.0
     left = design.T @ design / noise + np.diag(spread**-2)
     return np.asarray(np.linalg.solve(left, design.T @ change / noise + usual / spread**2))
-
-
-def _of_key(values: Mapping[str, float], key: str, usual: float) -> float:
-    """Return the value whose name the key begins with, or the usual one."""
-    return next((each for start, each in values.items() if key.startswith(start)), usual)
