@@ -63,8 +63,9 @@ class AnnotationModel:
     gross: Floats | float = 0.0
     """Share of the frames in which each joint is annotated grossly wrong, (A, 14) or one for all; with the memory of
     the random part."""
-    gross_deviation: float = 0.0
-    """Standard deviation of gross errors along each axis, metres; they come on top."""
+    gross_deviation: Floats | float = 0.0
+    """Standard deviation of gross errors of each joint along each axis, (A, 14) or one for all, metres; they come on
+    top."""
 
     @classmethod
     def drawn(cls, config: AnnotationSection, actors: int, *, seed: int) -> Self:
@@ -108,7 +109,8 @@ class AnnotationModel:
         fast = stream(seed, "annotation", "fast").standard_normal(shape)[ticks]
         drawn = np.sqrt(1 - self.noise) * lasting("slow", shape) + np.sqrt(self.noise) * fast
         wrong = lasting("gross", shape[:-1]) < ndtri(self.gross)
-        return drawn * self.deviation[..., None] + self.gross_deviation * wrong[..., None] * lasting("place", shape)
+        away = (self.gross_deviation * wrong)[..., None] * lasting("place", shape)
+        return drawn * self.deviation[..., None] + away
 
 
 def annotate_simulation(scenario: Scenario, sequence: PoseSequence, rig: Rig) -> Floats:
@@ -159,7 +161,7 @@ class AnnotationFit:
             "life": self.annotation.life,
             "noise": self.annotation.noise,
             "gross": np.broadcast_to(self.annotation.gross, self.compared.shape).tolist(),
-            "gross_deviation": self.annotation.gross_deviation,
+            "gross_deviation": np.broadcast_to(self.annotation.gross_deviation, self.compared.shape).tolist(),
             "bias": self.bias.tolist(),
             "compared": self.compared.tolist(),
         }
@@ -219,10 +221,10 @@ def fit_annotation(away: Floats, of_tracks: Sequence[Floats], time: Floats) -> A
     return AnnotationFit(AnnotationModel(shift + _per_joint(bias), deviation, life, white, *gross), bias, compared)
 
 
-def _gross_errors(away: Floats, of_tracks: Sequence[Floats]) -> tuple[Floats, float]:
-    """Return the share of gross errors of each joint beyond those of the tracks, (A, 14), and their deviation, metres.
+def _gross_errors(away: Floats, of_tracks: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Return the share of gross errors of each joint beyond those of the tracks, and their deviation, metres, (A, 14).
 
-    Joints in few frames take from the others: each counts as _FEWEST frames more, at the share of all.
+    Joints in few frames take from the others: each counts as _FEWEST frames more, at the share and deviation of all.
     """
     known = np.isfinite(away[..., 0])
     wrong, others = known & ~np.isfinite(_rest(away)[..., 0]), []
@@ -232,9 +234,11 @@ def _gross_errors(away: Floats, of_tracks: Sequence[Floats]) -> tuple[Floats, fl
     count = known.sum(axis=0)
     excess = np.maximum(wrong.sum(axis=0) - np.mean(others) * count, 0.0)
     if not excess.any():
-        return np.zeros(count.shape), 0.0
-    far = ((away - _robust_mean(away)) ** 2).sum(axis=-1)
-    return (excess + _FEWEST * excess.sum() / count.sum()) / (count + _FEWEST), float(np.sqrt(far[wrong].mean() / 3))
+        return np.zeros(count.shape), np.zeros(count.shape)
+    far = np.where(wrong, ((away - _robust_mean(away)) ** 2).sum(axis=-1), 0.0).sum(axis=0) / 3
+    number = wrong.sum(axis=0)
+    variance = (far + _FEWEST * far.sum() / number.sum()) / (number + _FEWEST)
+    return (excess + _FEWEST * excess.sum() / count.sum()) / (count + _FEWEST), np.sqrt(variance)
 
 
 def _shifts(away: Floats) -> tuple[Floats, Floats]:
@@ -276,7 +280,7 @@ def _deviations(total: Floats, expected: Floats, freedom: Floats) -> Floats:
         for spread in _SPREADS:
             prior = np.exp(-(((grid - mean) / spread) ** 2) / 2)
             prior /= prior.sum()
-            likelihood = np.log(np.exp(fit) @ prior)[freedom > 0].sum()
+            likelihood = np.log(np.exp(fit) @ prior + 1e-300)[freedom > 0].sum()
             likelihood -= ((mean - np.log(_PUBLISHED)) / _PUBLISHED_SPREAD) ** 2 / 2
             if likelihood > best:
                 best, priors = likelihood, prior

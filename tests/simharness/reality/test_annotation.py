@@ -219,3 +219,53 @@ def test_the_detector_is_not_blamed_for_the_annotation(known):
     assert np.sqrt((away**2).mean()) < 0.008
     hips = fitted.annotation.bias[KINDS.index("hips")]
     assert fitted.profile.bias.hips == pytest.approx(hips, abs=1e-4)
+
+
+class TestRandomPart:
+    """Offsets whose variance is known: of the annotation, and of the tracks that it is compared with."""
+
+    ACTORS, FRAMES = 3, 600
+
+    def offsets(self, deviation, tracks, *, seed):
+        """Draw offsets (F, A, 14, 3) of an annotation and of tracks, both independent in all frames."""
+        rng = np.random.default_rng(seed)
+        shape = (self.FRAMES, self.ACTORS, 14, 3)
+        return deviation * rng.standard_normal(shape) + tracks * rng.standard_normal(shape)
+
+    def fitted(self, deviation, tracks):
+        exact = [self.offsets(0.0, tracks, seed=seed) for seed in (1, 2)]
+        return fit_annotation(self.offsets(deviation, tracks, seed=0), exact, STEP * np.arange(self.FRAMES)).annotation
+
+    @pytest.mark.parametrize("tracks", [0.005, 0.02])
+    def test_the_variance_of_the_tracks_is_taken_away(self, tracks):
+        deviation = np.array(self.fitted(0.02, tracks).deviation)
+        np.testing.assert_allclose(deviation, 0.02, rtol=0.15)
+
+    def test_no_joint_is_exact_by_chance(self):
+        """Behind tracks that are three times as far off, a third of the joints have less variance than their tracks."""
+        away, exact = (self.offsets(each, 0.03, seed=seed) for each, seed in ((0.005, 3), (0.0, 4)))
+        less = (away**2).sum(axis=(0, 3)) < (exact**2).sum(axis=(0, 3))
+        assert 0.1 < less.mean() < 0.5
+        found = fit_annotation(away, [exact], STEP * np.arange(self.FRAMES)).annotation.deviation
+        assert found.min() > 0.002
+        assert np.median(found) == pytest.approx(0.005, rel=0.6)
+
+    def test_joints_that_are_annotated_worse_stay_worse(self):
+        deviation = np.full((14, 1), 0.01)
+        deviation[5] = 0.04
+        found = self.fitted(deviation, 0.005).deviation
+        np.testing.assert_allclose(found[:, 5], 0.04, rtol=0.15)
+        np.testing.assert_allclose(np.delete(found, 5, axis=1), 0.01, rtol=0.25)
+
+    def test_gross_errors_are_told_from_the_random_part(self, filmed):
+        """One joint is off by 10 cm along each axis in a tenth of the frames."""
+        gross, still = np.zeros((self.ACTORS, 14)), np.broadcast_to(filmed.sequence.joints[0], (self.FRAMES, 3, 17, 3))
+        gross[:, 3] = 0.1
+        known = replace(model(shift=0.0, deviation=0.01, life=0.05), gross=gross, gross_deviation=0.1)
+        away = errors(known, still, STEP * np.arange(self.FRAMES))
+        exact = self.offsets(0.0, 0.002, seed=5)
+        found = fit_annotation(away, [exact], STEP * np.arange(self.FRAMES)).annotation
+        np.testing.assert_allclose(found.deviation, 0.01, rtol=0.3)
+        assert found.gross[:, 3].mean() == pytest.approx(0.1, abs=0.04)
+        assert np.delete(found.gross, 3, axis=1).max() < 0.02
+        assert found.gross_deviation[:, 3].mean() == pytest.approx(0.1, rel=0.35)
