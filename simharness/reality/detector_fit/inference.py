@@ -49,7 +49,7 @@ SCALES: Scales = {
 which are on the inverse hyperbolic tangent; measured ones may be below 0."""
 
 _WIDTH = 0.7
-_WIDTHS = {"keypoints.guess": 1.2, **dict.fromkeys(SCALES["fisher"], 0.35)}
+_WIDTHS = {"keypoints.guess": 1.2, "scores.hidden": 0.4, **dict.fromkeys(SCALES["fisher"], 0.35)}
 """Standard deviation of the prior on the scale, and other ones by the beginning of the keys."""
 
 _ALIKE = (

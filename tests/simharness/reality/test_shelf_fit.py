@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simharness.detector.draws import PARENT
-from simharness.reality.annotation_errors import fit_annotation
+from simharness.reality.annotation_errors import annotation_offsets, fit_annotation
 from simharness.reality.detector_fit.detector_measurement import point_estimates
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.sample import sample_of
@@ -130,7 +130,10 @@ def test_ears_are_reported_by_bearing(sample, labels):
 
 
 def test_hips_of_the_detector_are_above_the_annotated_ones(shelf, people, labels):
-    fitted = fit_annotation(shelf.truth, people, labels.consensus, shelf.time, sigma=np.full(17, 0.35))
+    away = annotation_offsets(shelf.truth, people, labels.consensus)
+    # Tracks of twins of Shelf are off by some 8 mm along each axis.
+    of_tracks = np.where(np.isfinite(away), 0.008 * np.random.default_rng(0).standard_normal(away.shape), np.nan)
+    fitted = fit_annotation(away, [of_tracks], shelf.time)
     assert 0.03 < fitted.bias[KINDS.index("hips"), 2] < 0.06
     others = np.delete(fitted.bias, KINDS.index("hips"), axis=0)
     assert np.abs(others).max() < 0.03
