@@ -92,15 +92,8 @@ class MeasuredDetector:
     """Measured values by key of ``[detector]``; also ``share.`` and ``size.``."""
 
     def with_values(self, values: Mapping[str, float]) -> "MeasuredDetector":
-        """Return the measurement with calibrated values; intervals keep their distances from them as ratios."""
-
-        def moved(measured: MeasuredValue, value: float) -> MeasuredValue:
-            if not (measured.known and measured.value > 0):
-                return replace(measured, value=value, low=min(measured.low, value), high=max(measured.high, value))
-            factor = value / measured.value
-            return replace(measured, value=value, low=factor * measured.low, high=factor * measured.high)
-
-        return replace(self, values={key: moved(each, values[key]) for key, each in self.values.items()})
+        """Return the measurement with other values, in the same intervals."""
+        return replace(self, values={key: replace(each, value=values[key]) for key, each in self.values.items()})
 
     def __getitem__(self, key: str) -> MeasuredValue:
         """Return the measured value of a key."""
