@@ -260,8 +260,8 @@ def _stand_ins(study):
     scores = Measurement("ci", "", "", "", {TrialKey("base", 0, "full"): {}})
     measured = SimpleNamespace(failed=(), measurement=lambda suite: scores)
     figures = SimpleNamespace(summary=dict)
-    fitted = SimpleNamespace(real=figures, annotation=figures)
-    printed = ("plot_comparison", "print_agreement", "print_annotation", "print_measurement")
+    fitted = SimpleNamespace(real=figures, calibrated=figures, annotation=figures)
+    printed = ("plot_comparison", "print_agreement", "print_annotation", "print_measurement", "print_priors")
     profile = SimpleNamespace(text="", measured=figures, bias=np.zeros(1), detector=None, kind="")
     checked_profile = SimpleNamespace(summary=dict, scenes=(), detectors=(), variants=(), verdicts={})
     compared = SimpleNamespace(summary=dict, seeds=(), real={})
@@ -279,6 +279,7 @@ def _stand_ins(study):
         "simharness.outputs.study.skeleton_view_3d": {"replay": ()},
         "simharness.reality.detector_fit.fit": {"fit": fitted, "write_profile": ()},
         "simharness.reality.detector_fit.fit_table": dict.fromkeys(printed, ()),
+        "simharness.reality.detector_fit.half_check": {"check_halves": figures},
         "simharness.reality.twin": {"TwinModel.of_fit": (), "simulate_twins": ((),), "compare": compared},
         "simharness.cli.score_tables": {"print_twin_comparison": ()},
         "simharness.reality.validation.validation": {
