@@ -14,14 +14,9 @@ _UNITS = {
     "mm": "mm", "cm": "cm", "factor": "", "frames": "frames", "pictures": "pictures", "share": "",
 }  # fmt: skip
 _NAMES = {
-    "degrees": "angle",
-    "metres": "distance",
-    "mm": "distance",
-    "ms": "time",
-    "s": "time",
-    "px": "distance",
+    "degrees": "angle", "metres": "distance", "mm": "distance", "ms": "time", "s": "time", "px": "distance",
     "percent": "share",
-}
+}  # fmt: skip
 _DECIMALS = {"°": 2, "m": 2, "cm": 1, "mm": 0, "ms": 1, "s": 1, "px": 1, "%": 1, "frames": 0, "pictures": 0}
 
 

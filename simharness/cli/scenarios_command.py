@@ -84,13 +84,14 @@ def schema(
     """Print the JSON schema of scenario files, with which editors complete and validate them."""
     with PROGRAM.exit_on_error():
         from mvpose.commands.output_files import check_place, write_text
-        from simharness.scenario.schema import dumps
+        from simharness.scenario.shipped import shipped_folder
 
+        text = (shipped_folder() / "schema.json").read_text(encoding="utf-8")
         if out is None:
-            typer.echo(dumps(), nl=False)
+            typer.echo(text, nl=False)
             return
         check_place(out, option="--out", mark=b'"$schema"')
-        write_text(dumps(), out)
+        write_text(text, out)
 
 
 @grouped()

@@ -17,17 +17,9 @@ ALPHA = 0.5
 """Largest mean error of the two ends of a correct part, as a share of the part's true length."""
 
 PARTS = (
-    "right_lower_leg",
-    "right_upper_leg",
-    "left_upper_leg",
-    "left_lower_leg",
-    "right_lower_arm",
-    "right_upper_arm",
-    "left_upper_arm",
-    "left_lower_arm",
-    "head",
-    "torso",
-)
+    "right_lower_leg", "right_upper_leg", "left_upper_leg", "left_lower_leg",
+    "right_lower_arm", "right_upper_arm", "left_upper_arm", "left_lower_arm", "head", "torso",
+)  # fmt: skip
 """Names of the ten parts, in the published order."""
 
 GROUPS: dict[str, tuple[int, ...]] = {

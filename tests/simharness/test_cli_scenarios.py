@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from simharness.cli import app
 from simharness.scenario.load import load, read_plan
-from simharness.scenario.schema import dumps
+from tools.scenario_schema import dumps
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 STUDY = """

@@ -40,15 +40,6 @@ HEADS_OVER_TIME = ("hota", "assa", "idf1", "pcp_tracked", "switches_per_minute",
 COMPARED = ("pcp", "map", "ghosts")
 """Scores of all variants at every value of a factor."""
 
-_STAGE_MEANINGS = {
-    "detection": "perfect detections of the same pictures repair it; joints that are hidden from the real detector "
-    "count here, too",
-    "matching": "perfect detections do not repair it, but together with the true matching they do",
-    "reconstruction": "neither repairs it: the cause is the reconstruction, or its other inputs (a wrong calibration, "
-    "late pictures, too few views)",
-    "method": "perfect detections do not repair it, and the user-defined estimator takes and returns no labels",
-}
-
 SCORED = tuple(dict.fromkeys(HEADS + PRINTED))
 _OVER_TIME = tuple(dict.fromkeys((*HEADS_OVER_TIME, *tables.OVER_TIME)))  # where a variant tracks people
 
@@ -267,7 +258,7 @@ def markdown(digest: Mapping[str, Any]) -> str:
         printed=PRINTED,
         breaking=breaking,
         kinds={kind.replace("_", " "): SCORES[f"failures_{kind}"].about for kind in kinds},
-        stages={stage: _STAGE_MEANINGS[stage] for stage in stages},
+        stages=stages,
         head=_head,
         short=short,
         interval=_interval,

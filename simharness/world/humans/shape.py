@@ -12,10 +12,7 @@ LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
         "weight": (-0.5, 2.5),
         "height": (0.0, 1.0),
         "proportions": (0.0, 1.0),
-        "upper_arm": (0.6, 1.6),
-        "forearm": (0.6, 1.6),
-        "thigh": (0.6, 1.6),
-        "shank": (0.6, 1.6),
+        **dict.fromkeys(("upper_arm", "forearm", "thigh", "shank"), (0.6, 1.6)),
     }
 )
 """Least and greatest value of every shape parameter."""

@@ -134,6 +134,7 @@ SHIPPED = {
     "simharness/trial/kernel_compilation.py", "mvpose/formats/joint_names.py", "mvpose/networks/catalogue/published.py",
     "mvpose/calibration/file_mistakes.py", "mvpose/networks/catalogue/fetch.py", "mvpose/public_names.py",
     "mvpose/skeleton.py", "simharness/outputs/benchmark/layout.py", "simharness/scoring/score_registry.py",
+    "simharness/cli/scenarios_command.py",
     "simharness/world/humans/face_colors.py", "simharness/world/humans/wardrobe.py",
 }  # fmt: skip
 CALLS = re.compile(

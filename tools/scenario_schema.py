@@ -1,10 +1,13 @@
-"""JSON schema of scenario files, for editors: completion, descriptions of keys, and validation while typing.
+"""JSON schema of scenario files, for editors: ``python -m tools.scenario_schema`` writes ``scenarios/schema.json``.
+
+With it editors complete keys, describe them, and validate files while typing.
 
 It is derived from the models. Rules that a schema cannot express (keys that belong together, presets that exist) are
 checked by :func:`simharness.scenario.load.load` alone.
 """
 
 import json
+from pathlib import Path
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema
@@ -112,3 +115,7 @@ def _without_tables(schema: Any) -> Any:
         return schema
     kept = {key: value for key, value in schema.items() if key != "default" or not isinstance(value, dict)}
     return {key: _without_tables(value) for key, value in kept.items()}
+
+
+if __name__ == "__main__":
+    (Path(__file__).parents[1] / "scenarios" / "schema.json").write_text(dumps(), encoding="utf-8")
