@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from mvpose.arrays import Floats
-from mvpose.calibration.findings import ALARM, Diagnosis, Finding, camera_names
+from mvpose.calibration.findings import ALARM, Diagnosis, camera_names
 from mvpose.calibration.repair import Repair
 from mvpose.calibration.sightings import Sightings, gather
 from mvpose.camera import Rig
@@ -81,7 +81,10 @@ def write_doctor_page(
         sentence=sentence(diagnosis),
         evidence=diagnosis.evidence[:_EVIDENCE],
         more_evidence=diagnosis.evidence[_EVIDENCE:],
-        findings=[_finding(each, command or _plain_command) for each in diagnosis.findings],
+        findings=diagnosis.findings,
+        sentence_of=sentence_of,
+        quantities=quantities,
+        command=command or _plain_command,
         refused=None if repair is None else repair.refused,
         repaired=case.after is not None,
         above=_above(case),
@@ -143,20 +146,6 @@ class DoctorCase:
 
 def _plain_command(options: tuple[str, ...]) -> str:
     return " ".join(["mvpose repair CALIBRATION DETECTIONS", *options, "--out NEW"]) if options else ""
-
-
-def _finding(finding: Finding, command: Callable[[tuple[str, ...]], str]) -> dict[str, Any]:
-    return {
-        "kind": finding.kind.replace("-", " "),
-        "camera": finding.camera,
-        "severity": finding.severity,
-        "text": sentence_of(finding),
-        "probability": f"{100 * finding.probability:.0f} %",
-        "quantities": quantities(finding),
-        "cost": f"{1000 * finding.cost:.0f} mm" if finding.cost >= 0.0005 else "",
-        "mend": finding.mend,
-        "command": command(finding.repair) if finding.severity != "note" else "",
-    }
 
 
 def _above(case: DoctorCase) -> dict[str, Any]:
