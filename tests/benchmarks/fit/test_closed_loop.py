@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+
 from benchmarks.fit.__main__ import main
 from benchmarks.fit.loop import truth_bones
 from benchmarks.fit.recordings import ANNOTATION, DETECTOR, RIGS, known_recording
@@ -21,7 +22,7 @@ def loop(tmp_path_factory):
 
 @pytest.mark.slow
 def test_what_is_fitted_is_what_is_true(loop):
-    """Scatter within a quarter, most parameters inside of their intervals, and bones of the twin as the recorded ones."""
+    """Scatter within an eighth, most parameters inside of their intervals, bones of the twin as the recorded ones."""
     (file,) = loop[0].glob("*.json")
     found = json.loads(file.read_text())
     scatter = [each for key, each in found["values"].items() if key.startswith("keypoints.scatter.")]
