@@ -1,3 +1,5 @@
+import pytest
+
 from mvpose import COCO17
 from simharness.scoring.catalogue import AP_MM, HEADLINE, PCK_MM, SCORES
 from simharness.scoring.failure_classes import FailureKind
@@ -21,6 +23,11 @@ def test_keys_end_in_the_unit():
         assert key.endswith("_mm") == (info.unit == "mm"), key
         assert key.endswith("_ms") == (info.unit == "ms"), key
         assert key.endswith("_px") == (info.unit == "px"), key
+
+
+@pytest.mark.parametrize("unit", ["%", "mm", "mm/s", "px", "ms", "per frame", "/min"])
+def test_scores_that_are_read_beside_each_other_have_as_many_digits(unit):
+    (_,) = {info.digits for info in SCORES.values() if info.unit == unit}
 
 
 def test_higher_is_better_for_percentages_alone():

@@ -43,6 +43,14 @@ def test_without_identities_only_motion_is_scored():
     assert assess(recording, [*tracked[:-1], plain[-1]]).scores["hota"] is None
 
 
+@pytest.mark.parametrize("frames", [1, 2, 4])
+def test_motion_is_scored_where_frames_are_in_a_row(frames):
+    recording = record(frames)
+    summary = tracking_summary(truth_of(recording), perfect_estimates(recording, noise=0.01), recording.time)
+    assert (summary["velocity_mm_s"] is None) == (frames < 2)
+    assert (summary["jerk_m_s3"]["truth"] is None) == (summary["jerk_m_s3"]["estimate"] is None) == (frames < 4)
+
+
 def test_identities_that_are_exchanged_cost_identity_scores_alone():
     recording = record(10, 3)
     right = perfect_estimates(recording, noise=0.01)
