@@ -122,7 +122,12 @@ def _print_skill(validation: "Validation", name: str, console: Console) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    from simharness.outputs.validation.tables import cancelling_parts, distance_sentence, skill_rows
+    from simharness.outputs.validation.tables import (
+        cancelling_parts,
+        correction_sentence,
+        distance_sentence,
+        skill_rows,
+    )
 
     rivals, rows = skill_rows(validation)
     table = Table(
@@ -140,7 +145,8 @@ def _print_skill(validation: "Validation", name: str, console: Console) -> None:
         table.add_row(row.title, f"{row.error[0]}\n[dim]{row.error[1]}[/]", *skills)
     if rows:
         console.print(table, highlight=False)
-    for sentence in (distance_sentence(validation.distance), *cancelling_parts(validation)):
+    corrected = [correction_sentence(validation.corrections)] if validation.corrections else []
+    for sentence in (*corrected, distance_sentence(validation.distance), *cancelling_parts(validation)):
         console.print(sentence, soft_wrap=True, highlight=False, markup=False)
 
 

@@ -306,6 +306,7 @@ class _Validated:
     """Validation without verdicts."""
 
     distance: None = None
+    corrections: None = None
     verdicts: tuple = ()
     failed: tuple = ()
 

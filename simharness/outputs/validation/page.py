@@ -52,6 +52,7 @@ def render_validation(validation: Validation, *, provenance: Mapping[str, Any], 
         apart=[
             (key.replace("_", " "), fixed(each, 1)) for key, each in list(validation.distance.groups.items())[:_APART]
         ],
+        corrected="" if validation.corrections is None else tables.correction_sentence(validation.corrections),
         cancelling=tables.cancelling_parts(validation),
         rivals=rivals,
         skill=skill,

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mvpose.files.input_files import parse_toml
+from simharness.reality.validation.corrected_forecast import CorrectionStudy
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.twin_distance import TwinDistance
@@ -251,6 +252,17 @@ def cancelling_parts(validation: Validation) -> list[str]:
                 f"body ({total}) does not show"
             )
     return sentences
+
+
+def correction_sentence(study: CorrectionStudy) -> str:
+    """Return what a few labelled frames make of the forecasts."""
+    errors = {key: fixed(each, 1) for key, each in study.errors.items()}
+    return (
+        f"with {study.labelled} labelled frames of {study.frames}, forecasts are off by {errors['corrected']} points "
+        f"(twins alone {errors['simulated']}, these frames alone {errors['labelled']}), and intervals are "
+        f"{fixed(study.width, 2)} times as wide as those of these frames alone; {100 * study.coverage:.0f} % of them "
+        "hold the mean over all frames (90 % stated)"
+    )
 
 
 def distance_sentence(distance: TwinDistance) -> str:

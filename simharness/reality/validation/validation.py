@@ -15,6 +15,7 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.twin import TwinModel, detected_twin, simulate_twins
 from simharness.reality.validation import variant_comparison
+from simharness.reality.validation.corrected_forecast import CorrectionStudy, study_corrections
 from simharness.reality.validation.evidence import Evidence
 from simharness.reality.validation.input_checks import check_recording
 from simharness.reality.validation.passes import (
@@ -91,6 +92,8 @@ class Validation:
     """Error over these conditions, and skill against rivals."""
     agreements: Sequence[RankAgreement]
     """Correlations and rank violations over all conditions, by variant."""
+    corrections: CorrectionStudy | None
+    """Forecasts corrected by a few real frames; None for a recording with too few."""
     distance: TwinDistance
     """Distance of the recording from the twins over all figures at once."""
     verdicts: Sequence[BoundVerdict] = field(default=())
@@ -162,6 +165,9 @@ def validate(
         forecasts=forecasts,
         skills=skills(forecasts),
         agreements=agreements(subsets, responses, plan.variants),
+        corrections=study_corrections(
+            passes[0], passes[1 + len(rivals) :], np.flatnonzero(np.isin(real.frames, thinned[0].frames)).tolist()
+        ),
         distance=compared.distance,
         verdicts=[
             *compared.verdicts(real.kind, bounds),

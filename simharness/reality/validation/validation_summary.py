@@ -39,6 +39,7 @@ def summarize_validation(validation: Validation) -> dict[str, Any]:
         "verdicts": [_verdict(each) for each in validation.verdicts],
         "skill": [each.summary() for each in validation.skills],
         "agreement": {each.variant: each.summary() for each in validation.agreements},
+        "corrected": None if validation.corrections is None else validation.corrections.summary(),
         "distance": validation.distance.summary(),
         "variants": {name: _variant(validation, name) for name in validation.whole.variants},
         "contrasts": {
