@@ -63,9 +63,10 @@ def _exact_annotation(model: TwinModel) -> TwinModel:
 
 
 def _exchanged(twin: AnnotatedRecording, seed: int) -> AnnotatedRecording:
-    """Return a twin in which the first camera and the last, with all that they see, have each other's number."""
+    """Return a twin in which the first camera and the last have each other's detections."""
     last = len(twin.rig) - 1
-    return twin.subset([last, *range(1, last), 0])
+    exchanged = twin.subset([last, *range(1, last), 0])
+    return replace(exchanged, rig=twin.rig)
 
 
 WRONG: Mapping[str, WrongTwin] = {

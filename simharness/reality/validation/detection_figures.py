@@ -58,9 +58,9 @@ class DetectionFigures:
     an affinity above 0.5), ``affinity.same`` (share of pairs of one person below 0.5), ``behind`` (share of limb joints
     of annotated people in the pictures that another person hides), ``ears`` (share of ears that fewer than two views
     report), ``tree.CHILD|PARENT`` (share of missing children where the parent is missing), ``missing.KIND`` (share of
-    joints in the picture that detections of annotated people do not report), ``detected`` and ``detected.VIEW`` (share
-    of people in a picture who are detected, in all views and in one, numbered from 1), ``phantoms`` (detections of
-    nobody, per view and frame), ``others`` (people who are not annotated, per frame), and those of
+    joints in the picture that detections of annotated people do not report), ``detected`` and ``detected_views.VIEW``
+    (share of people in a picture who are detected, in all views and in one, numbered from 1), ``phantoms`` (detections
+    of nobody, per view and frame), ``others`` (people who are not annotated, per frame), and those of
     :func:`.view_disagreement`."""
     bones: Floats
     """Length of every bone of every actor, (F, A, 2 sides, 4), mm, from joints triangulated from all detections; NaN
@@ -238,7 +238,8 @@ def _people(shown: ShownPeople) -> dict[str, Ratio]:
     others = np.any(np.isfinite(shown.association.unannotated), axis=(2, 3))
     found = expected & shown.association.detected
     by_view = {
-        f"detected.{view + 1}": Ratio(by_frame(found[:, view]), by_frame(expected[:, view])) for view in range(views)
+        f"detected_views.{view + 1}": Ratio(by_frame(found[:, view]), by_frame(expected[:, view]))
+        for view in range(views)
     }
     return {
         "detected": Ratio(by_frame(found), by_frame(expected)),

@@ -2,9 +2,10 @@
 
 Each figure is standardised by the twins: the recording is a draw of the same distribution if the twins are right, so
 that its deviation has Student's t, which is turned into a normal deviate. The distance is the mean square of these
-deviates. What it is for right twins shows each twin against the others. The logarithm of a mean of squares is nearly
-normal (Wilson and Hilferty), whatever the correlations of the figures are, so that the p-value is that of one further
-draw: Student's t again. Twins that share a fault of their model with no trace in the figures are not noticed.
+deviates, over groups of figures that measure the same, each of which counts once. What it is for right twins shows each
+twin against the others. The logarithm of a mean of squares is nearly normal (Wilson and Hilferty), whatever the
+correlations of the figures are, so that the p-value is that of one further draw: Student's t again. Twins that share a
+fault of their model with no trace in the figures are not noticed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,13 +32,14 @@ class TwinDistance:
     figures: int
     """Number of figures."""
     value: float
-    """Mean squared deviate; NaN with fewer than four twins."""
+    """Mean over groups of the mean squared deviate of their figures; NaN with fewer than four twins."""
     usual: float
     """The same for each twin against the others, geometric mean."""
     p_value: float
     """Probability of such a distance if the recording were one more twin; NaN with fewer than four twins."""
     groups: Mapping[str, float]
-    """Mean squared deviate of each group of figures, the first word of their keys, largest first."""
+    """Mean squared deviate of each group of figures that measure the same, the first word of their keys, largest
+    first."""
 
     @property
     def noticed(self) -> bool:
@@ -71,16 +73,19 @@ def measure_distance(figures: Mapping[str, Compared]) -> TwinDistance:
     nan = float("nan")
     if len(twins) < _FEWEST or not known:
         return TwinDistance(len(known), nan, nan, nan, {})
-    deviates = _deviates(real, twins, least)
-    usual = [np.mean(_deviates(each, np.delete(twins, index, axis=0), least) ** 2) for index, each in enumerate(twins)]
-    logs, value = np.log(np.maximum(usual, 1e-9)), float(np.mean(deviates**2))
+    names = np.array([key.partition(".")[0] for key in known])
+    groups = np.array([(names == name) / (names == name).sum() for name in dict.fromkeys(names)])  # (G, K)
+    means = groups @ _deviates(real, twins, least) ** 2
+    value = float(means.mean())
+    usual = [
+        (groups @ _deviates(each, np.delete(twins, index, axis=0), least) ** 2).mean()
+        for index, each in enumerate(twins)
+    ]
+    logs = np.log(np.maximum(usual, 1e-9))
     spread = max(float(logs.std(ddof=1)), 1e-9) * np.sqrt(1 + 1 / len(logs))
     chance = float(t.sf((np.log(max(value, 1e-9)) - logs.mean()) / spread, len(logs) - 1))
-    by_group: dict[str, list[float]] = {}
-    for key, each in zip(known, deviates**2, strict=True):
-        by_group.setdefault(key.partition(".")[0], []).append(float(each))
-    means = sorted(((key, float(np.mean(of))) for key, of in by_group.items()), key=lambda item: -item[1])
-    return TwinDistance(len(known), value, float(np.exp(logs.mean())), chance, dict(means))
+    order = sorted(zip(dict.fromkeys(names), means.tolist(), strict=True), key=lambda item: -item[1])
+    return TwinDistance(len(known), value, float(np.exp(logs.mean())), chance, {str(key): each for key, each in order})
 
 
 def _deviates(figures: Floats, others: Floats, least: Floats) -> Floats:

@@ -64,7 +64,7 @@ class ValidationPlan:
     """Number of processes."""
 
 
-QUICK = ValidationPlan(every=3, twin_every=6, draws=4, detection_draws=2)
+QUICK = ValidationPlan(every=3, twin_every=6, draws=3, detection_draws=1)
 """Plan for a first look: a third of the frames."""
 
 

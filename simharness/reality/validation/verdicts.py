@@ -233,9 +233,9 @@ def judge_responses(responses: Sequence[DoseResponse], bounds: Bounds) -> Iterat
 def judge_measurements(measured: Mapping[str, Compared], kind: DetectorKind, bounds: Bounds) -> Iterator[BoundVerdict]:
     """Yield the verdicts on measurements of the detections; what a recording cannot show has none."""
     limits = {
-        "detected": bounds.detected,
+        **dict.fromkeys(("detected", "detected_views"), bounds.detected),
         "missing": bounds.missing,
-        "gross": bounds.gross,
+        **dict.fromkeys(("gross", "gross_joints"), bounds.gross),
         "offset": bounds.offset,
         "memory": bounds.memory,
         "tree": bounds.tree if kind == "bottom-up" else np.nan,
@@ -250,7 +250,7 @@ def judge_measurements(measured: Mapping[str, Compared], kind: DetectorKind, bou
         if key in shares or group in ("residual", "epipolar", "annotation"):
             yield ratio(group, key, figure, *shares.get(key, bounds.spread))
         elif np.isfinite(limits.get(group, np.nan)):
-            yield near(group, key, figure, limits[group])
+            yield near(group.partition("_")[0], key, figure, limits[group])
         elif key == "affinity.different":
             yield near("ambiguous", "ambiguous", figure, bounds.ambiguous * figure.real.mean, text="± a third")
 

@@ -28,9 +28,9 @@ def view_disagreement(
     """Return the figures of F frames by key, of limb joints; views are numbered from 1.
 
     ``residual.VIEW`` (mean distance from the place where the other views put the joint, units), ``memory.VIEW``
-    (correlation of this offset from one frame to the next), ``gross.KIND`` (share beyond 2.35 units), ``epipolar.V-W``
-    and ``offset.V-W`` (mean distance of the viewing rays of two views, without and with its sign, mm), and
-    ``annotation.KIND`` (mean distance of the truth from the consensus of the views, mm).
+    (correlation of this offset from one frame to the next), ``gross`` and ``gross_joints.KIND`` (share beyond 2.35
+    units), ``epipolar.V-W`` and ``offset.V-W`` (mean distance of the viewing rays of two views, without and with its
+    sign, mm), and ``annotation.KIND`` (mean distance of the truth from the consensus of the views, mm).
 
     Args:
         rig: the V cameras.
@@ -51,11 +51,12 @@ def view_disagreement(
     for view in range(len(rig)):
         result[f"residual.{view + 1}"] = _mean(np.minimum(distance[:, view], _FARTHEST))
         result[f"memory.{view + 1}"] = _memory(away[:, view], following)
+    result["gross"] = _mean(np.where(np.isfinite(distance), distance > MISS_FROM, np.nan))
     kinds = np.array(KIND_OF_JOINT)
     for kind in dict.fromkeys(kinds[limbs]):
         of_kind = distance[..., kinds == kind]
         gross = np.where(np.isfinite(of_kind), of_kind > MISS_FROM, np.nan)
-        result[f"gross.{KINDS[kind]}"] = _mean(gross)
+        result[f"gross_joints.{KINDS[kind]}"] = _mean(gross)
         result[f"annotation.{KINDS[kind]}"] = _mean(np.minimum(to_truth[..., kinds == kind], _FARTHEST_TRUTH))
     return result | _rays(rig, np.where(limbs[:, None], keypoints, np.nan))
 
