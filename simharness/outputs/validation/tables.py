@@ -97,6 +97,8 @@ def _numbers(verdict: BoundVerdict) -> tuple[tuple[str, str], ...]:
     if not np.isfinite(verdict.real):
         return (NOTHING, ""), (fixed(verdict.twin, digits), ends), (NOTHING, ""), (verdict.bound, "")
     real, twin = (fixed(factor * value, digits) + after for value in (verdict.real, verdict.twin))
+    if verdict.group == "order":  # the interval is that of the twins
+        return (real, ""), (twin, ends), (NOTHING, ""), (verdict.bound, "")
     bound = verdict.bound
     if verdict.group in _PERCENT_BOUND:
         bound = f"± {100 * float(bound.removeprefix('± ')):g} %"

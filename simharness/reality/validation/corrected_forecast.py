@@ -26,7 +26,7 @@ LABELLED = 20
 _LEVEL = 0.9
 
 
-class Correction(NamedTuple):
+class CorrectedMeans(NamedTuple):
     """Estimates of the mean scores of C conditions over N frames, from few labelled ones."""
 
     value: Floats
@@ -64,7 +64,7 @@ class CorrectionStudy:
 
 def correct_forecast(
     simulated: Floats, real: Floats, labelled: Sequence[int], *, weight: float | None = None
-) -> Correction:
+) -> CorrectedMeans:
     """Return the mean real scores of conditions over all frames, from those of few frames and simulated ones of all.
 
     Args:
@@ -80,7 +80,7 @@ def correct_forecast(
     count, frames = rest.shape[1], simulated.shape[1]
     error = np.sqrt((1 - count / frames) * rest.var(axis=1, ddof=1) / count)
     half = float(t.isf((1 - _LEVEL) / 2, count - 1)) * error
-    return Correction(weight * simulated.mean(axis=1) + rest.mean(axis=1), half, weight)
+    return CorrectedMeans(weight * simulated.mean(axis=1) + rest.mean(axis=1), half, weight)
 
 
 def best_weight(simulated: Floats, real: Floats) -> float:
