@@ -40,6 +40,7 @@ _PUBLISHED, _PUBLISHED_SPREAD = 0.017, 1.0
 is off by 22 to 38 mm in space."""
 
 _DEVIATIONS = np.geomspace(0.0005, 0.15, 60)  # metres, that joints may have
+_TAIL = 3  # degrees of freedom of their distribution
 _SPREADS = (0.1, 0.2, 0.4, 0.7)  # of the logarithms of the joints of one recording
 
 # Left and right of each joint of SHELF14: 1 for left joints and the head, -1 for right ones.
@@ -262,7 +263,8 @@ def _variance(rest: Floats) -> Floats:
 def _deviations(total: Floats, expected: Floats, freedom: Floats) -> Floats:
     """Return the deviation of the random part of each joint, (A, 14) metres: the mean square of its posterior.
 
-    Logarithms of the deviations are normal; mean and spread of that prior are the most likely ones for all joints.
+    Logarithms of the deviations have Student's distribution, so that a joint that is annotated much worse stays so;
+    mean and spread of that prior are the most likely ones for all joints.
 
     Args:
         total: variance of the offsets, (A, 14) square metres.
@@ -278,7 +280,7 @@ def _deviations(total: Floats, expected: Floats, freedom: Floats) -> Floats:
     best, priors = -np.inf, np.zeros(len(grid))
     for mean in grid:
         for spread in _SPREADS:
-            prior = np.exp(-(((grid - mean) / spread) ** 2) / 2)
+            prior = (1 + ((grid - mean) / spread) ** 2 / _TAIL) ** (-(_TAIL + 1) / 2)
             prior /= prior.sum()
             likelihood = np.log(np.exp(fit) @ prior + 1e-300)[freedom > 0].sum()
             likelihood -= ((mean - np.log(_PUBLISHED)) / _PUBLISHED_SPREAD) ** 2 / 2
