@@ -49,7 +49,7 @@ def test_twins_in_which_something_never_happens_are_noticed():
     """Figures that are constant over twins are compared by the error of the recording's."""
     twins = np.zeros((10, 20))
     twins[:, 10:] = np.random.default_rng(0).normal(size=(10, 10))
-    same = np.append(np.zeros(10), 0.3 * np.ones(10))
+    same = 0.3 * np.ones(20)
     assert not measure_distance(figures(same, twins, error=1.0)).noticed
     assert measure_distance(figures(same + np.append(10 * np.ones(10), np.zeros(10)), twins, error=1.0)).noticed
 
