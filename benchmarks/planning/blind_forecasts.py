@@ -117,8 +117,8 @@ def fit_error(figures: Sequence[Floats]) -> ForecastError:
             total += float(np.mean(np.log(variance) + error**2 / variance))
         return total
 
-    best = minimize(cost, np.log([1.0, 0.3]), method="Nelder-Mead").x
-    return ForecastError(*(float(each) for each in np.exp(best)), len(figures))
+    least, share = np.exp(minimize(cost, np.log([1.0, 0.3]), method="Nelder-Mead").x)
+    return ForecastError(float(least), float(share), len(figures))
 
 
 def covered(error: ForecastError, figures: Floats) -> Floats:
