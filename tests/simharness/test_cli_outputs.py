@@ -61,8 +61,9 @@ ELSEWHERE = {"simharness report --digest"}
 """tests/simharness/outputs/test_digest.py."""
 
 READ = {
-    "calibration", "detections", "videos", "folder", "recording", "fit_on", "scenario", "suite", "file", "study",
-    "stores", "room", "scenes", "other_scenes", "poses", "pictures", "times", "detector", "pose", "skeleton", "package",
+    "calibration", "detections", "videos", "folder", "recording", "fit_on", "rival", "scenario", "suite", "file",
+    "study", "stores", "room", "scenes", "other_scenes", "poses", "pictures", "times", "detector", "pose", "skeleton",
+    "package",
 }  # fmt: skip
 """Parameters whose files are read alone."""
 
