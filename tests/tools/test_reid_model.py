@@ -160,7 +160,6 @@ def test_scores_on_newly_rendered_people(new_people):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="missed in the present rooms: 78.9 % of 133 pairs")
 def test_four_of_five_pairs_of_one_person_are_nearer_than_the_midpoint(new_people):
     session = Session(DEFAULT)
     pairs = _pairs(session, new_people)
