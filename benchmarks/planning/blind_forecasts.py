@@ -4,7 +4,7 @@
 
 FOLDER keeps what is finished. Ten rigs (``filmed_rigs.toml``) are rendered, and their pictures read by the network
 MoveNet (``mvpose networks get movenet``); where the data of Shelf are, its recording is the eleventh. The forecast of a
-rig knows the cameras, where people are and their number, as somebody would say them who plans it; of Shelf, only the
+rig knows the cameras, where people are and their number, as a planner of the rig does; of Shelf, only the
 calibration. Neither knows the network, and all have the same profile of a detector; with ``--detector movenet``, that
 of the network of the rendered rigs. PCP is that of ``full`` with missing joints of the head filled from the others, for
 all sets of two cameras and more.
@@ -45,7 +45,7 @@ from simharness.reality.validation.variant_comparison import FILLED, camera_subs
 from simharness.scenario.load import load_study
 from simharness.scenario.presets import read_profile
 from simharness.scoring.frame_scores import score_frames
-from simharness.scoring.pcp import Part
+from simharness.scoring.pcp import percent
 from simharness.trial.conditioned_trial import estimate_frames
 
 _RIGS = Path(__file__).with_name("filmed_rigs.toml")
@@ -56,7 +56,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class BlindForecast:
-    """Forecast of a rig, and what really came out."""
+    """Forecast of a rig, and its real scores."""
 
     name: str
     real: Scores
@@ -81,12 +81,12 @@ class BlindForecast:
                 values = [
                     side[whole][0] - value for side, value in zip((self.forecast, self.real), values, strict=True)
                 ]
-            said, came = values
-            real = came[0] if self.resampled else np.nanmean(came)
-            noise = np.nanstd(came[1:]) if self.resampled else _standard_error(came)
-            mean = float(np.nanmean(said))
+            forecast, real = values
+            outcome = real[0] if self.resampled else np.nanmean(real)
+            noise = np.nanstd(real[1:]) if self.resampled else _standard_error(real)
+            mean = float(np.nanmean(forecast))
             size = {"pcp": 100 - mean, "loss": abs(mean), "mm": mean}[kind]
-            rows.append((mean, size, real - mean, np.hypot(noise, _standard_error(said))))
+            rows.append((mean, size, outcome - mean, np.hypot(noise, _standard_error(forecast))))
         return np.array(rows)
 
     def subsets(self) -> SubsetFigures:
@@ -154,9 +154,8 @@ def network_scores(scenes: Sequence[ProfiledScene]) -> Scores:
             estimates = [each.joints for each in estimate_frames(preset("full"), part.rig, part.detections)]
             truth = coco17_to_shelf14(scene.sequence.joints, head=FILLED.mapping)
             scored = score_frames(truth, estimates, head=FILLED.mapping, filled=FILLED.filled)
-            share = (scored.parts == Part.CORRECT).sum() / (scored.parts != Part.UNDEFINED).sum()
             error = scored.error[scored.found].mean() if scored.found.any() else np.nan
-            values.append((100.0 * share, 1000.0 * error))
+            values.append((percent(scored.parts), 1000.0 * error))
         result[cameras] = np.array(values).T
     return result
 
@@ -177,7 +176,7 @@ def recorded_scores(recording: AnnotatedRecording) -> Scores:
 
 
 def main() -> None:
-    """Print the forecasts beside what came out, and the errors."""
+    """Print forecasts beside real scores, and their errors."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", type=Path, help="of what is finished")
     parser.add_argument("--shelf", type=Path, help="folder of the files of Shelf")
@@ -232,7 +231,9 @@ def main() -> None:
 
 def report(forecasts: Sequence[BlindForecast]) -> str:
     """Return a table of the rigs, and the errors of each kind of figure."""
-    lines = [f"{'rig':10} sets  mean difference  Spearman  lost by the chosen set  pairs: said, real  all: said, real"]
+    lines = [
+        f"{'rig':10} sets  mean difference  Spearman  PCP lost by choice  pairs: forecast, real  all: forecast, real"
+    ]
     for each in forecasts:
         sets = each.subsets()
         sizes = sorted({len(one) for one in sets.real})
@@ -240,8 +241,8 @@ def report(forecasts: Sequence[BlindForecast]) -> str:
         pairs = [np.mean([side[one] for one in side if len(one) == 2]) for side in (sets.predicted, sets.real)]
         whole = max(sets.real, key=len)
         lines.append(
-            f"{each.name:10} {len(sets.real):4}  {sets.mean_difference:15.1f}  {sets.rank():8.3f}  {lost:22.1f}  "
-            f"{pairs[0]:11.1f}, {pairs[1]:4.1f}  {sets.predicted[whole]:9.1f}, {sets.real[whole]:4.1f}"
+            f"{each.name:10} {len(sets.real):4}  {sets.mean_difference:15.1f}  {sets.rank():8.3f}  {lost:18.1f}  "
+            f"{pairs[0]:15.1f}, {pairs[1]:4.1f}  {sets.predicted[whole]:13.1f}, {sets.real[whole]:4.1f}"
         )
     for kind in ("pcp", "loss", "mm"):
         figures = [each.figures(kind) for each in forecasts]

@@ -5,7 +5,8 @@ recording, and other right twins in its place, of which it is known that nothing
 
 - on the recording, if it is farther from them than from right twins: a permutation of right and wrong twins says how
   probable the ratio of both distances is among right twins;
-- on twins in the place of the recording, if these can be told from them (:mod:`..twin_distance`), at 5 %.
+- on twins in the place of the recording, if these differ noticeably from them
+  (:mod:`simharness.reality.validation.twin_distance`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +20,7 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.twin import TwinModel, detected_twin
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.passes import VARIANTS, annotated
-from simharness.reality.validation.twin_distance import TwinDistance, measure_distance
+from simharness.reality.validation.twin_distance import NOTICED, TwinDistance, measure_distance
 from simharness.reality.validation.verdicts import BOUNDS, BoundVerdict, VerdictState
 from simharness.reality.validation.whole_comparison import MeasuredRecording, compare_whole, measure_recordings
 from simharness.statistics.intervals import Interval
@@ -41,13 +42,13 @@ class Noticed:
     """Distance of the recording from these twins over that from right ones."""
     p_value: float
     """Probability of such a ratio among right twins."""
-    told: Sequence[float]
+    swapped: Sequence[float]
     """p-values of the twins in the place of the recording."""
 
     @property
     def share(self) -> float:
-        """Share of the twins in the place of the recording that can be told from these."""
-        return float(np.mean(np.array(self.told) < 0.05))
+        """Share of the twins in the place of the recording that differ noticeably from these."""
+        return float(np.mean(np.array(self.swapped) < NOTICED))
 
 
 @dataclass(frozen=True)
@@ -68,14 +69,16 @@ class Power:
         rng, observed = np.random.default_rng(0), _ratio(figures, np.arange(2 * count))
         drawn = [_ratio(figures, rng.permutation(2 * count)) for _ in range(_PERMUTATIONS)]
         wrong = range(count, 2 * count)
-        told = [distance_from(figures, wrong, recording=2 * count + index).p_value for index in range(len(self.others))]
+        swapped = [
+            distance_from(figures, wrong, recording=2 * count + index).p_value for index in range(len(self.others))
+        ]
         return Noticed(
             fails=states.count(VerdictState.FAILS),
             holds=states.count(VerdictState.HOLDS),
             lost=sum(each.name in held and each.state != VerdictState.HOLDS for each in verdicts),
             ratio=observed,
             p_value=(1 + sum(each >= observed for each in drawn)) / (1 + len(drawn)),
-            told=told,
+            swapped=swapped,
         )
 
     def _verdicts(self, twins: Sequence[MeasuredRecording]) -> list[BoundVerdict]:
