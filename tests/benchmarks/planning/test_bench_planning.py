@@ -51,6 +51,6 @@ def test_the_loss_of_a_camera_is_that_of_the_whole_set_less_the_others():
     real = {(0, 1): np.array([[80.0, 60.0], [50.0, 50.0]]), (0, 1, 2): np.array([[95.0, 85.0], [30.0, 40.0]])}
     said = {each: values + [[1.0], [10.0]] for each, values in real.items()}
     loss = BlindForecast("rig", real, False, said).figures("loss")
-    assert loss[0, :3].tolist() == [20.0, 20.0, 0.0]
+    assert loss[:, :3].tolist() == [[20.0, 20.0, 0.0]]  # of sets without one camera alone
     millimetres = BlindForecast("rig", real, False, said).figures("mm")
     assert millimetres[:, 2].tolist() == [-10.0, -10.0]
