@@ -6,6 +6,7 @@ from rich.console import Console
 
 from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.output_files import check_place, write_json
+from mvpose.commands.progress import reporter
 from simharness.cli.program import PROGRAM, JsonFile, Overrides, ScenarioFile, Seed, Workers
 
 if TYPE_CHECKING:
@@ -36,7 +37,6 @@ def blame(
     """
     with PROGRAM.exit_on_error():
         check_place(json_file, option="--json", mark=b'"shares"')
-        from mvpose.commands.progress import reporter
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)

@@ -6,10 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.table import Table
+from rich.text import Text
 
 from mvpose.commands.errors import failing
 from mvpose.commands.option_groups import grouped, option
+from mvpose.commands.output_files import check_place, write_text
 from mvpose.commands.programs import BAD_INPUT, FOUND
+from mvpose.commands.progress import reporter
+from mvpose.commands.terminal import plain_table, say
 from simharness.cli.program import PROGRAM, Workers
 
 if TYPE_CHECKING:
@@ -59,7 +64,6 @@ def check(
     could not be run also fail the check.
     """
     with PROGRAM.exit_on_error():
-        from mvpose.commands.output_files import check_place
         from simharness.scenario.load import load_study
 
         reports = {option: path for option, path in (("--junit", junit), ("--summary", summary)) if path is not None}
@@ -76,7 +80,6 @@ def check(
         if update:
             _update(study, baseline, workers)
             return
-        from mvpose.commands.progress import reporter
         from simharness.gate.suite import baseline_of, kept_trials
         from simharness.gate.suite import check as check_suite
 
@@ -96,7 +99,6 @@ def check(
 
 def _write(result: "GateResult", reports: Mapping[str, Path]) -> bool:
     """Write the reports independently of each other; return whether one could not be written, after a message."""
-    from mvpose.commands.output_files import write_text
     from simharness.gate.gate_reports import junit, markdown
 
     unwritten = False
@@ -105,13 +107,12 @@ def _write(result: "GateResult", reports: Mapping[str, Path]) -> bool:
             write_text({"--junit": junit, "--summary": markdown}[flag](result), path, option=flag)
         except ValueError as error:
             unwritten = True
-            Console(stderr=True).print(f"error: {error}", soft_wrap=True, highlight=False, markup=False)
+            say(f"error: {error}", err=True)
     return unwritten
 
 
 def _update(study: "Study", path: Path, workers: int) -> None:
     """Measure a suite and write its scores as the baseline."""
-    from mvpose.commands.progress import reporter
     from simharness.gate.baseline import write_baseline
     from simharness.gate.score_tests import require_seeds
     from simharness.gate.suite import kept_trials, run_suite
@@ -121,80 +122,55 @@ def _update(study: "Study", path: Path, workers: int) -> None:
         with failing(), reporter() as bars:
             done = run_suite(study, workers=workers, reporter=bars, store=store)
         if done.failed:
-            message = f"{_list_failed(done.failed)}\n{path} was not written, because it would lack these trials"
-            Console(stderr=True).print(message, soft_wrap=True, highlight=False, markup=False)
+            say(f"{_list_failed(done.failed)}\n{path} was not written, because it would lack these trials", err=True)
             raise typer.Exit(FOUND)
         measured = done.measurement(study)
         write_baseline(measured, path)
-    Console().print(
-        f"{path}: {len(measured.scores)} results of the suite {measured.suite} ({measured.fingerprint})",
-        soft_wrap=True,
-        highlight=False,
-        markup=False,
-    )
+    say(f"{path}: {len(measured.scores)} results of the suite {measured.suite} ({measured.fingerprint})")
     _print_power(measured, study)
 
 
 def _print_power(measured: "Measurement", study: "Study") -> None:
     """Print which changes the suite can show, and how many seeds smaller or larger ones need."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
     from simharness.gate.power import POWER, WISHED, even_changes, power_of, power_rows
 
     title = f"Changes that {len(study.seeds)} seeds show in {100 * POWER:.0f} % of runs, if they vary as the score does"
-    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
-    for heading in ("score", "variant"):
-        table.add_column(heading)
-    for heading in ("whole\nsuite", "one\ncase", *(f"seeds for\n{wish} tolerances" for wish in WISHED)):
-        table.add_column(heading, justify="right", no_wrap=True)
+    columns = ("whole\nsuite", "one\ncase", *(f"seeds for\n{wish} tolerances" for wish in WISHED))
+    table = plain_table(title, ("score", "variant"), columns, padding=(0, 1, 0, 0))
     for row in power_rows(power_of(measured, study.gate)):
         table.add_row(*row)
     Console().print(table)
-    Console().print(even_changes(measured, study.gate), soft_wrap=True, highlight=False)
+    say(even_changes(measured, study.gate))
 
 
 def _print(check: "GateResult", console: Console) -> None:
     """Print the result of a check."""
-    from rich.text import Text
-
     from simharness.gate.gate_reports import sentence
 
-    def write(text: str | Text) -> None:
-        console.print(text, soft_wrap=True, highlight=False, markup=False)
-
     verdict = Text(check.verdict, "bold green" if check.passed else "bold red")
-    write(Text.assemble((check.suite, "bold"), ": ", verdict, f", {check.trials} trials in {check.seconds:.0f} s"))
+    say(Text.assemble((check.suite, "bold"), ": ", verdict, f", {check.trials} trials in {check.seconds:.0f} s"))
     if check.failed:
-        write(_list_failed(check.failed))
+        say(_list_failed(check.failed))
     for kind, style in _STYLES.items():
         changes = check.comparison.with_verdict(kind)
         for change in changes[:_LISTED]:
-            write(Text.assemble((f"{kind:<6}", style), " ", sentence(change)))
+            say(Text.assemble((f"{kind:<6}", style), " ", sentence(change)))
         if len(changes) > _LISTED:
-            write(Text(f"{kind:<6} and {len(changes) - _LISTED} more", style))
+            say(Text(f"{kind:<6} and {len(changes) - _LISTED} more", style))
     if check.advice:
-        write(check.advice)
+        say(check.advice)
     for variant in check.variants:
         console.print()
         console.print(_table(check, variant))
-    write(f"\n{check.worst_description}\n  {check.command}")
+    say(f"\n{check.worst_description}\n  {check.command}")
 
 
-def _table(check: "GateResult", variant: str) -> "Table":
+def _table(check: "GateResult", variant: str) -> Table:
     """Return the scores of a variant over the whole suite."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-    from rich.text import Text
-
     from simharness.gate.gate_reports import allowed, difference, number, title
 
-    table = Table(
-        title=variant, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0)
-    )
-    table.add_column("score", no_wrap=True)
-    for column in ("now", "baseline", "difference\n(95 % interval)", "allowed"):
-        table.add_column(column, justify="right", no_wrap=True)
+    columns = ("now", "baseline", "difference\n(95 % interval)", "allowed")
+    table = plain_table(variant, ("score",), columns, padding=(0, 1, 0, 0))
     for change in check.comparison.changes_of(variant):
         name = Text(title(change.score))
         if change.verdict in _STYLES:

@@ -13,7 +13,8 @@ from typer.core import TyperGroup
 from mvpose.commands.errors import failing
 from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.output_files import PROVENANCE, check_place, write_json
-from simharness.cli.program import PROGRAM, JsonFile, Overrides, RecordingFile, RecordingFolder, ScenarioFile
+from mvpose.commands.progress import reporter
+from simharness.cli.program import PROGRAM, JsonFile, Overrides, RecordingFile, RecordingFolder, ScenarioFile, made_here
 
 if TYPE_CHECKING:
     from mvpose.estimators import Estimator
@@ -82,7 +83,6 @@ def evaluate_recording(
     with PROGRAM.exit_on_error():
         start = perf_counter()
         check_place(json_file, option="--json", mark=PROVENANCE)
-        from mvpose.commands.progress import reporter
         from mvpose.presets import NEED_DESCRIPTORS, without_repair
         from simharness.cli.score_tables import print_evaluation
         from simharness.reality.evaluation import evaluate
@@ -164,7 +164,6 @@ def twin(
     with PROGRAM.exit_on_error():
         start = perf_counter()
         check_place(json_file, option="--json", mark=PROVENANCE)
-        from mvpose.commands.progress import reporter
         from simharness.cli.score_tables import print_twin_comparison
         from simharness.reality.detector_fit.fit import fit
         from simharness.reality.recording_file import read_recording
@@ -192,7 +191,6 @@ def evaluate_seeds(
     with PROGRAM.exit_on_error():
         start = perf_counter()
         check_place(json_file, option="--json", mark=PROVENANCE)
-        from mvpose.commands.progress import reporter
         from simharness.cli.score_tables import print_seed_evaluation
         from simharness.reality.seed_evaluation import evaluate_seeds as evaluate_at_seeds
         from simharness.scenario.load import load
@@ -217,8 +215,4 @@ def _estimator(name: str, *, lag: float, period: float) -> "Estimator":
 
 def _write(summary: dict[str, Any], path: Path, *, seeds: Iterable[int], variants: Iterable[str], start: float) -> None:
     """Write a summary with its provenance; keys of the summary itself take precedence."""
-    from simharness.trial.identity import provenance
-
-    seconds = perf_counter() - start
-    made = provenance(command=PROGRAM.command_line(), seeds=seeds, variants=variants, seconds=seconds)
-    write_json({**made, **summary}, path)
+    write_json({**made_here(start, seeds=seeds, variants=variants), **summary}, path)

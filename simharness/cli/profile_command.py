@@ -12,7 +12,9 @@ from mvpose.commands.errors import failing
 from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
 from mvpose.commands.programs import note
-from simharness.cli.program import PROGRAM, Overrides, Workers
+from mvpose.commands.progress import reporter
+from mvpose.commands.terminal import plain_table, say
+from simharness.cli.program import PROGRAM, Overrides, Workers, made_here
 
 if TYPE_CHECKING:
     from simharness.reality.network_profile.profile_check import ProfileCheck
@@ -69,14 +71,12 @@ def profile_network(
         check_place(place / "profile.html", option="--out", mark=HTML)
         check_place(place / "profile.json", option="--out", mark=PROVENANCE)
         check_place(place / f"{stem}.toml", option="--out", mark=_TOML)
-        from mvpose.commands.progress import reporter
         from simharness.outputs.network_profile.page import render_profile
         from simharness.reality.network_profile.profile_check import check_profile
         from simharness.reality.network_profile.profile_fit import SIMULATIONS, fit_network
         from simharness.reality.network_profile.profiled_scenes import read_scenes
         from simharness.scenario.load import load
         from simharness.study.trial_store import Store
-        from simharness.trial.identity import provenance
         from simharness.trial.stages.networks import people_finder
 
         designed, other = _studies((scenes, other_scenes) if check else (scenes,), name, head, overrides, quick)
@@ -108,25 +108,15 @@ def profile_network(
                         progress=advance,
                     )
         seeds = [*designed.seeds, *(other.seeds if other is not None else ())]
-        variants = other.variants if other is not None else ()
-        made = provenance(
-            command=PROGRAM.command_line(), seeds=seeds, variants=variants, seconds=perf_counter() - start
-        )
+        made = made_here(start, seeds=seeds, variants=other.variants if other is not None else ())
         measured = {"measured": profile.measured.summary(), "bias": profile.bias.tolist()}
         write_json(
             {**made, **measured, "check": None if checked is None else checked.summary()}, place / "profile.json"
         )
         write_text(render_profile(profile, checked, provenance=made), place / "profile.html")
-    console = Console()
     if checked is not None:
-        _print_check(checked, console)
-    for file in (f"{stem}.toml", "profile.html"):
-        console.print(
-            f"{'profile' if file.endswith('toml') else 'report'}: {place / file}",
-            soft_wrap=True,
-            highlight=False,
-            markup=False,
-        )
+        _print_check(checked, Console())
+    say(f"profile: {place / f'{stem}.toml'}\nreport: {place / 'profile.html'}")
 
 
 def _studies(
@@ -155,19 +145,10 @@ def _study(scenes: Path, name: str, head: str | None, overrides: list[str] | Non
 
 def _print_check(check: "ProfileCheck", console: Console) -> None:
     """Print PCP of each variant with the network, and the differences of the simulated detectors from it."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
     from simharness.reality.validation.verdicts import VerdictState
 
-    table = Table(
-        title=f"PCP on {len(check.scenes)} other scenes, and differences of simulated detectors from it",
-        title_justify="left",
-        box=SIMPLE_HEAD,
-        pad_edge=False,
-    )
-    for column in ("variant", "network", *check.detectors):
-        table.add_column(column, justify="left" if column == "variant" else "right")
+    title = f"PCP on {len(check.scenes)} other scenes, and differences of simulated detectors from it"
+    table = plain_table(title, ("variant",), ("network", *check.detectors), pad_edge=False)
     for variant in check.variants:
         figures = [check.score(name, variant, "pcp") for name in check.detectors]
         differences = [each.difference for each in figures]

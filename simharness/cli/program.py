@@ -1,7 +1,9 @@
 """The program ``simharness``, and the arguments and options that several of its commands share."""
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from time import perf_counter
+from typing import Annotated, Any
 
 import typer
 
@@ -20,6 +22,14 @@ PROGRAM = Program(
     version=_version,
     tracebacks=True,
 )
+
+
+def made_here(start: float, *, seeds: Iterable[int], variants: Iterable[str]) -> dict[str, Any]:
+    """Return the provenance of the result of this command, which began at ``start`` by ``perf_counter``."""
+    from simharness.trial.identity import provenance
+
+    seconds = perf_counter() - start
+    return provenance(command=PROGRAM.command_line(), seeds=seeds, variants=variants, seconds=seconds)
 
 
 ScenarioFile = Annotated[

@@ -11,9 +11,11 @@ import typer
 from rich.console import Console
 
 from mvpose.commands.option_groups import given, grouped, option
-from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
+from mvpose.commands.output_files import HTML, PROVENANCE, check_place, check_writable, write_json, write_text
 from mvpose.commands.programs import note
-from simharness.cli.program import PROGRAM, AllWorkers, Workers
+from mvpose.commands.progress import reporter
+from mvpose.commands.terminal import plain_table, say
+from simharness.cli.program import PROGRAM, AllWorkers, Workers, made_here
 
 if TYPE_CHECKING:
     from mvpose import Rig
@@ -90,11 +92,9 @@ def rehearse(
     with PROGRAM.exit_on_error():
         start = perf_counter()
         from mvpose.cli.inputs import picture_size
-        from mvpose.commands.progress import reporter
         from simharness.outputs.planning.rehearsal_page import render_rehearsal
         from simharness.planning.rehearse_rig import RehearsalEffort, rehearse_rig
         from simharness.planning.rig_file import read_rig
-        from simharness.trial.identity import provenance
 
         room = _room(surroundings)
         corners = None if room is None else (*(2 * room.space.bounds[1]).tolist(), room.space.height)
@@ -116,18 +116,12 @@ def rehearse(
         )
         with reporter() as bars:
             rehearsal = rehearse_rig(rig, setup, subsets=subsets, seed=seed, effort=effort, name=name, reporter=bars)
-        made = provenance(
-            command=PROGRAM.command_line(),
-            seeds=range(seed, seed + scenes),
-            variants=("full",),
-            seconds=perf_counter() - start,
-        )
+        made = made_here(start, seeds=range(seed, seed + scenes), variants=("full",))
         write_text(render_rehearsal(rehearsal, provenance=made), place / "rehearsal.html")
         write_json({**made, **rehearsal.to_json()}, place / "rehearsal.json")
-    console = Console()
     for sentence in rehearsal.sentences:
-        console.print(sentence, highlight=False, markup=False)
-    console.print(f"report: {place / 'rehearsal.html'}", soft_wrap=True, highlight=False, markup=False)
+        Console().print(sentence, highlight=False, markup=False)
+    say(f"report: {place / 'rehearsal.html'}")
 
 
 def _room(given: Surroundings) -> "Room | None":
@@ -230,14 +224,11 @@ def plan(
     plan continues where it stopped.
     """
     with PROGRAM.exit_on_error():
-        from mvpose.commands.progress import reporter
+        from mvpose.files.atomic_files import open_manifest
         from simharness.planning.room_file import read_room
 
         loaded = read_room(room, changes=options.changes())
         folder = out / (Path(loaded.file).stem or loaded.name)
-        from mvpose.commands.output_files import check_writable
-        from mvpose.files.atomic_files import open_manifest
-
         check_writable(folder, _PLAN)
         open_manifest(folder, _PLAN)
         if preview:
@@ -271,21 +262,14 @@ def plan(
 
 def _show(planned: "RigPlan") -> None:
     """Print the sentences and the cameras of a plan."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
     from simharness.planning.plan_result import sentences
 
     console = Console()
     for sentence in sentences(planned):
         console.print(sentence, highlight=False, markup=False)
-    table = Table(box=SIMPLE_HEAD, show_edge=False)
-    for title in ("camera", "place", "x", "y", "z", "lens", "sure", "worth"):
-        table.add_column(title, justify="left" if title in ("camera", "place", "lens") else "right")
+    table = plain_table("", ("camera", "place", "lens"), ("x", "y", "z", "sure", "worth"))
     for camera, built in zip(planned.cameras, planned.rig, strict=True):
         sure = "" if camera.candidate is None else f"{100 * camera.sure:.0f} %"
-        table.add_row(
-            camera.name, camera.mount, *(f"{value:.2f}" for value in built.center), camera.lens, sure,
-            f"{camera.worth:.1f}",
-        )  # fmt: skip
+        numbers = (*(f"{value:.2f}" for value in built.center), sure, f"{camera.worth:.1f}")
+        table.add_row(camera.name, camera.mount, camera.lens, *numbers)
     console.print(table)

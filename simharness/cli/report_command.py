@@ -8,7 +8,9 @@ import typer
 
 from mvpose.commands.errors import failing
 from mvpose.commands.option_groups import grouped, option
+from mvpose.commands.output_files import HTML, check_place
 from mvpose.commands.programs import note
+from mvpose.commands.progress import reporter
 from simharness.cli.program import PROGRAM, BlameSeeds
 
 if TYPE_CHECKING:
@@ -62,24 +64,17 @@ def report(
         ):
             if wrong:
                 raise ValueError(f"{text}; give one of them")
-        from mvpose.commands.output_files import HTML, check_place
-
         check_place(out, option="--out", mark=HTML)
         check_place(rerun, option="--rerun", mark=b"RRF2")
         thresholds = _thresholds(threshold or [])
         from simharness.study.study_folder import read_study
         from simharness.trial.run_folder import is_run
 
-        if is_run(study):
-            _write_rerun_of_run(study, trial, rerun)
+        results = None if is_run(study) else read_study(study)
+        if results is None or rerun is not None:
+            _write_rerun(study, results, trial, rerun)
             typer.echo(f"recording: {rerun}")
             return
-        results = read_study(study)
-        if rerun is not None:
-            _write_rerun(results, trial, rerun)
-            typer.echo(f"recording: {rerun}")
-            return
-        from mvpose.commands.progress import reporter
         from simharness.outputs.study.page import check_thresholds, write_report
         from simharness.outputs.study.worst_frames import SHOWN
         from simharness.study.factors import THRESHOLDS, factors_by_case
@@ -117,34 +112,28 @@ def _thresholds(given: list[str]) -> dict[str, float]:
     return thresholds
 
 
-def _write_rerun(results: "Results", trial: str | None, path: Path) -> None:
-    """Write the recording of a trial of a study, which is run again."""
-    from simharness.outputs.study.rerun_recording import require_sdk, write_rerun
-    from simharness.outputs.study.skeleton_view_3d import replay
-
-    require_sdk()
-    frame = _choose_frame(results, trial)
-    scenario = results.scenario_of(frame.trial)
-    with failing():
-        again = replay(scenario, frame.variant)
-    write_rerun(again, path)
-
-
-def _write_rerun_of_run(folder: Path, trial: str | None, path: Path | None) -> None:
-    """Write the recording of a run, from its result folder."""
+def _write_rerun(folder: Path, results: "Results | None", trial: str | None, path: Path | None) -> None:
+    """Write the recording of a trial of a study, which is run again, or of a run from its result folder."""
     if path is None:
         raise ValueError(
             f"{folder}: this is the result folder of a run, whose report is {folder / 'report.html'}; give the "
             "folder of a study, or add --rerun FILE"
         )
-    if trial is not None:
+    if trial is not None and results is None:
         raise ValueError(f"--trial {trial}: {folder} is the folder of a run, which has one trial; remove --trial")
     from simharness.outputs.study.rerun_recording import require_sdk, write_rerun
-    from simharness.outputs.study.skeleton_view_3d import replay_run
+    from simharness.outputs.study.skeleton_view_3d import replay, replay_run
     from simharness.trial.run_folder import read_run
 
     require_sdk()
-    write_rerun(replay_run(read_run(folder)), path)
+    if results is None:
+        again = replay_run(read_run(folder))
+    else:
+        frame = _choose_frame(results, trial)
+        scenario = results.scenario_of(frame.trial)
+        with failing():
+            again = replay(scenario, frame.variant)
+    write_rerun(again, path)
 
 
 def _choose_frame(results: "Results", trial: str | None) -> "WorstFrame":

@@ -9,6 +9,8 @@ import typer
 from rich.console import Console
 
 from mvpose.commands.option_groups import grouped, option
+from mvpose.commands.progress import reporter
+from mvpose.commands.terminal import say
 from simharness.cli.program import PROGRAM, BlameSeeds, Overrides, ScenarioFile, Seed, Workers
 
 if TYPE_CHECKING:
@@ -33,12 +35,10 @@ def run(
     browser. Files for programs are beside it.
     """
     with PROGRAM.exit_on_error():
-        from mvpose.commands.progress import reporter
         from simharness.scenario.load import load
 
-        loaded = load(
-            scenario, overrides=overrides or (), seed=seed
-        )  # before slow imports: mistakes are reported at once
+        loaded = load(scenario, overrides=overrides or (), seed=seed)
+        # After slow imports, mistakes would not be reported at once.
         from simharness.outputs.run.result_folder import run as run_scenario
 
         command = PROGRAM.command_line()
@@ -54,7 +54,7 @@ def run(
 
         if found := read_blame(folder):
             print_blame(found, console)
-    console.print(f"report: {folder / 'report.html'}", soft_wrap=True, highlight=False, markup=False)
+    say(f"report: {folder / 'report.html'}")
 
 
 @grouped()
@@ -81,7 +81,6 @@ def render(
     or CAMERA.mp4, and a mosaic of all cameras.
     """
     with PROGRAM.exit_on_error():
-        from mvpose.commands.progress import reporter
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)
@@ -139,7 +138,6 @@ def export(
     it is complete, and replaces an earlier export; manifest.json describes it.
     """
     with PROGRAM.exit_on_error():
-        from mvpose.commands.progress import reporter
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)

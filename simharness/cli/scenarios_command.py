@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
+from rich.table import Table
+from rich.text import Text
 
 from mvpose.commands.option_groups import grouped, option
+from mvpose.commands.output_files import check_place, check_writable, write_text
+from mvpose.commands.terminal import plain_table, say
 from simharness.cli.program import PROGRAM, Overrides, ScenarioFile, Seed
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from simharness.scenario.load import ScenarioPlan
 
 
@@ -40,7 +42,7 @@ def scenarios() -> None:
     for kind, table in presets.items():
         console.print()
         console.print(_table(f'[{kind.section}] {kind.key} = "NAME"', table, width))
-    console.print(f"\nFiles: {_relative(folder)}", soft_wrap=True, highlight=False, markup=False)
+    say(f"\nFiles: {_relative(folder)}")
 
 
 def show(scenario: ScenarioFile, overrides: Overrides = None, seed: Seed = None) -> None:
@@ -83,7 +85,6 @@ def schema(
 ) -> None:
     """Print the JSON schema of scenario files, with which editors complete and validate them."""
     with PROGRAM.exit_on_error():
-        from mvpose.commands.output_files import check_place, write_text
         from simharness.scenario.shipped import shipped_folder
 
         text = (shipped_folder() / "schema.json").read_text(encoding="utf-8")
@@ -111,7 +112,6 @@ def mjcf(
     MuJoCo's viewer opens it: python -m mujoco.viewer --mjcf=FOLDER/NAME/scene.xml
     """
     with PROGRAM.exit_on_error():
-        from mvpose.commands.output_files import check_writable
         from simharness.outputs.benchmark.mjcf_scene import MJCF, write_mjcf
         from simharness.scenario.load import load
         from simharness.trial.stages.build_trial import true_rig
@@ -124,17 +124,9 @@ def mjcf(
     typer.echo(f"python -m mujoco.viewer --mjcf={file}")
 
 
-def _table(title: str, rows: Sequence[tuple[str, str, str]], width: int, *, trials: bool = False) -> "Table":
+def _table(title: str, rows: Sequence[tuple[str, str, str]], width: int, *, trials: bool = False) -> Table:
     """Return a table of names, ``width`` columns wide, descriptions and, if requested, numbers of trials."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(title=Text(title), title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False)
-    table.add_column("name", min_width=width, no_wrap=True)
-    table.add_column("")
-    if trials:
-        table.add_column("trials", justify="right", no_wrap=True)
+    table = plain_table(title, ("name".ljust(width), ""), ("trials",) if trials else ())
     for name, description, count in rows:
         table.add_row(name, Text(description), *([count] if trials else []))
     return table

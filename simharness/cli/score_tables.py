@@ -13,6 +13,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from mvpose.commands.terminal import plain_table
 from simharness.scoring.pcp import GROUPS
 from simharness.scoring.score_summary import STAGES
 from simharness.scoring.tracking.identity_figures import DISTANCE
@@ -56,15 +57,8 @@ class ScoreTable:
 
     def _part(self, start: int, end: int) -> Table:
         """Return the table with the scores from ``start`` up to ``end``."""
-        table = Table(
-            title=Text(f"{self.title}, continued" if start else self.title),
-            title_justify="left",
-            title_style="bold",
-            box=SIMPLE_HEAD,
-            show_edge=False,
-            pad_edge=False,
-            padding=(0, 1, 0, 0),
-        )
+        title = f"{self.title}, continued" if start else self.title
+        table = plain_table(title, (), (), pad_edge=False, padding=(0, 1, 0, 0))
         for label in self.labels:
             table.add_column(Text(label), overflow="fold")
         for score in self.scores[start:end]:
@@ -245,7 +239,7 @@ _RULES = Box("    \n    \n ── \n    \n ── \n ── \n    \n    \n")  # 
 
 
 def _table(title: str, first: str, columns: Sequence[str], *, box: Box = _RULES) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold", box=box, show_edge=False, pad_edge=False)
+    table = plain_table(title, (), (), box=box, pad_edge=False)
     table.add_column(first, min_width=8, no_wrap=True)
     for column in columns:
         table.add_column(column, justify="right", no_wrap=True, style="bold" if column == "total" else "")

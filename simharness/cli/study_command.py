@@ -14,6 +14,8 @@ from rich.text import Text
 from mvpose.commands.errors import failing
 from mvpose.commands.option_groups import given, grouped, option
 from mvpose.commands.programs import FAILED, note
+from mvpose.commands.progress import reporter
+from mvpose.commands.terminal import say
 from simharness.cli.program import PROGRAM, BlameSeeds, Overrides, ScenarioFile, Workers
 
 if TYPE_CHECKING:
@@ -88,7 +90,6 @@ def study(
             )
         if running.scheduler is not None and given("workers") and not blame:
             raise ValueError("--workers: the cluster of --scheduler has its own; give one of them")
-        from mvpose.commands.progress import reporter
         from simharness.study.study_run import run_shard, run_study
 
         where: dict[str, Any] = {"workers": running.workers, "scheduler": running.scheduler}
@@ -97,9 +98,9 @@ def study(
             with reporter() as bars:
                 tally = run_shard(loaded, part, store=kept_in, **where, reporter=bars)
             info: dict[str, Any] = {**vars(tally), "failed": [vars(each) for each in tally.failed]}
-            _write(_counts(info, f"part {running.shard}"))
-            _write(f"store: {kept_in}")
-            _write("after all parts: simharness merge STORE... --into STORE, then the same study without --shard")
+            say(_counts(info, f"part {running.shard}"))
+            say(f"store: {kept_in}")
+            say("after all parts: simharness merge STORE... --into STORE, then the same study without --shard")
         else:
             command = PROGRAM.command_line()
             with reporter() as bars:
@@ -110,7 +111,7 @@ def study(
             if len(results.trials):
                 for table in _tables(results):
                     table.print_to(Console())
-            _write(_counts(info, loaded.name))
+            say(_counts(info, loaded.name))
             _report(results, blame=blame, workers=running.workers)
     if info["failed"]:
         raise typer.Exit(FAILED)
@@ -125,11 +126,11 @@ def merge(
         from simharness.study.trial_store import merge as merge_stores
 
         merged = merge_stores(stores, into)
-        _write(f"{merged.copied} entries copied into {into}, {merged.present} were already there")
+        say(f"{merged.copied} entries copied into {into}, {merged.present} were already there")
         if merged.damaged:
-            _write(f"{len(merged.damaged)} are damaged and were skipped:", err=True)
+            say(f"{len(merged.damaged)} are damaged and were skipped:", err=True)
             for damaged in merged.damaged[:_LISTED]:
-                _write(f"  {damaged}", err=True)
+                say(f"  {damaged}", err=True)
 
 
 @contextlib.contextmanager
@@ -283,18 +284,16 @@ def _report(results: "Results", *, blame: int, workers: int) -> None:
         return
     if blame:
         blame_results(results, seeds=blame, workers=workers)
-    from mvpose.commands.progress import reporter
     from simharness.outputs.study.page import write_report
     from simharness.outputs.study.worst_frames import SHOWN
 
     with failing(), reporter() as bars, bars.stage("report", SHOWN) as advance:
         page = write_report(results, progress=advance)
-    _write(f"report: {page}")
+    say(f"report: {page}")
 
 
 def blame_results(results: "Results", *, seeds: int, workers: int = 1) -> None:
     """Find what cost a study its score, write it into its folder, and print it."""
-    from mvpose.commands.progress import reporter
     from simharness.cli.blame_command import print_blame
     from simharness.outputs.study.curves import blame_study
     from simharness.study.causes.blame_text import write_blame
@@ -303,7 +302,3 @@ def blame_results(results: "Results", *, seeds: int, workers: int = 1) -> None:
         found = blame_study(results, seeds=seeds, workers=workers, reporter=bars)
     write_blame(found, results.folder)
     print_blame(found, Console())
-
-
-def _write(text: str, *, err: bool = False) -> None:
-    Console(stderr=err).print(text, soft_wrap=True, highlight=False, markup=False)

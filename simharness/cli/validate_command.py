@@ -13,7 +13,9 @@ from mvpose.commands.errors import failing
 from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.output_files import HTML, PROVENANCE, check_place, write_json, write_text
 from mvpose.commands.programs import FOUND
-from simharness.cli.program import PROGRAM, AllWorkers, JsonFile, RecordingFile, RecordingFolder
+from mvpose.commands.progress import reporter
+from mvpose.commands.terminal import plain_table, say
+from simharness.cli.program import PROGRAM, AllWorkers, JsonFile, RecordingFile, RecordingFolder, made_here
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,7 +65,6 @@ def validate(
         check_place(json_file, option="--json", mark=PROVENANCE)
         if out is not None:  # before a recording is read
             _check(out)
-        from mvpose.commands.progress import reporter
         from simharness.reality.recording_file import read_recording
 
         recorded = read_recording(recording, folder)
@@ -75,7 +76,6 @@ def validate(
         from simharness.reality.validation.validation import QUICK, ValidationPlan, predict_halves, simulate_predictions
         from simharness.reality.validation.validation import validate as compare
         from simharness.reality.validation.validation_summary import summarize_halves, summarize_validation
-        from simharness.trial.identity import provenance
 
         others = None if rival is None else read_other_figures(rival)
         plan = replace(QUICK if quick else ValidationPlan(), workers=workers or os.cpu_count() or 1)
@@ -90,9 +90,7 @@ def validate(
         validation = replace(
             validation, verdicts=[*validation.verdicts, *(verdict for half in halves for verdict in half.verdicts)]
         )
-        made = provenance(
-            command=PROGRAM.command_line(), seeds=range(count), variants=plan.variants, seconds=perf_counter() - start
-        )
+        made = made_here(start, seeds=range(count), variants=plan.variants)
         summary: dict[str, Any] = {
             # The variants of the provenance are names; those of the summary are their scores.
             **made,
@@ -107,7 +105,7 @@ def validate(
     console = Console()
     _print_skill(validation, recorded.name, console)
     _print_verdicts(validation.verdicts, recorded.name, console)
-    console.print(f"report: {place / 'validation.html'}", soft_wrap=True, highlight=False, markup=False)
+    say(f"report: {place / 'validation.html'}")
     if validation.failed:
         raise typer.Exit(FOUND)
 
@@ -119,51 +117,28 @@ def _check(folder: Path) -> None:
 
 def _print_skill(validation: "Validation", name: str, console: Console) -> None:
     """Print the error of the forecasts, their skill, and whether the recording can be told from its twins."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
+    from simharness.outputs.validation import tables
 
-    from simharness.outputs.validation.tables import (
-        cancelling_parts,
-        correction_sentence,
-        distance_sentence,
-        skill_rows,
-    )
-
-    rivals, rows = skill_rows(validation)
-    table = Table(
-        title=f"{name}: mean error of the forecasts, points of PCP, and skill against rivals",
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        pad_edge=False,
-    )
-    table.add_column("forecasts")
-    for column in ("error", *rivals):
-        table.add_column(column, justify="right")
+    rivals, rows = tables.skill_rows(validation)
+    title = f"{name}: mean error of the forecasts, points of PCP, and skill against rivals"
+    table = plain_table(title, ("forecasts",), ("error", *rivals), pad_edge=False)
     for row in rows:
         skills = [f"{skill}\n[dim]{ends}[/]" for _, (skill, ends) in row.rivals]
         table.add_row(row.title, f"{row.error[0]}\n[dim]{row.error[1]}[/]", *skills)
     if rows:
         console.print(table, highlight=False)
-    corrected = [correction_sentence(validation.corrections)] if validation.corrections else []
-    for sentence in (*corrected, distance_sentence(validation.distance), *cancelling_parts(validation)):
-        console.print(sentence, soft_wrap=True, highlight=False, markup=False)
+    corrected = [tables.correction_sentence(validation.corrections)] if validation.corrections else []
+    for sentence in (*corrected, tables.distance_sentence(validation.distance), *tables.cancelling_parts(validation)):
+        say(sentence)
 
 
 def _print_verdicts(verdicts: "Sequence[BoundVerdict]", name: str, console: Console) -> None:
     """Print a row for each group of verdicts, with the figure that is worst."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
     from simharness.outputs.validation.tables import NOTHING, group_rows
 
     heading = f"{name}: simulated less measured; the worst figure of each group with its interval"
-    table = Table(
-        title=heading, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False, pad_edge=False
-    )
-    table.add_column("figures", min_width=20)
-    for column in ("hold", "cannot\ntell", "fail", "difference", "bound"):
-        table.add_column(column, justify="right", no_wrap=True)
+    columns = ("hold", "cannot\ntell", "fail", "difference", "bound")
+    table = plain_table(heading, ("figures".ljust(20),), columns, pad_edge=False)
     styles = {"holds": "green", "cannot tell": "yellow", "fails": "bold red"}
     for row in group_rows(verdicts):
         (held, _), (unknown, _), (failed, _), _, simulated, difference, (bound, _) = row.cells
@@ -194,15 +169,8 @@ def fit_detector(
         check_place(out, option="--out", mark=b"# Made by: simharness")
         check_place(figure, option="--figure", mark=b"Matplotlib")
         check_place(json_file, option="--json", mark=b'"annotation"')
-        from mvpose.commands.progress import reporter
+        from simharness.reality.detector_fit import fit_table
         from simharness.reality.detector_fit.fit import fit, write_profile
-        from simharness.reality.detector_fit.fit_table import (
-            plot_comparison,
-            print_agreement,
-            print_annotation,
-            print_measurement,
-            print_priors,
-        )
         from simharness.reality.recording_file import read_recording
         from simharness.reality.twin import TwinModel, simulate_twins
 
@@ -213,9 +181,9 @@ def fit_detector(
         if out is not None:
             write_profile(fitted, out)
         console = Console()
-        print_measurement(fitted.real, console)
-        print_annotation(fitted.annotation, console)
-        print_priors(fitted.calibrated, console)
+        fit_table.print_measurement(fitted.real, console)
+        fit_table.print_annotation(fitted.annotation, console)
+        fit_table.print_priors(fitted.calibrated, console)
         summary: dict[str, Any] = {
             "real": fitted.real.summary(),
             "inferred": fitted.calibrated.summary(),
@@ -232,8 +200,8 @@ def fit_detector(
             with failing(), reporter() as bars:
                 (twin,) = simulate_twins(TwinModel.of_fit(recorded, fitted), count=1, reporter=bars)
                 simulated = fit(twin).real
-            plot_comparison([fitted.real, simulated], figure)
-            print_agreement(fitted.real, simulated, console)
+            fit_table.plot_comparison([fitted.real, simulated], figure)
+            fit_table.print_agreement(fitted.real, simulated, console)
             summary["simulated"] = simulated.summary()
         if json_file is not None:
             write_json(summary, json_file)
