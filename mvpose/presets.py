@@ -7,8 +7,8 @@ from mvpose.estimators import Estimator
 from mvpose.matching import Matcher
 from mvpose.pipeline import Pipeline, UnmatchedPipeline
 from mvpose.reconstruction import Triangulation
+from mvpose.tracking.association import TrackingModel
 from mvpose.tracking.smoothing import TrackingPipeline
-from mvpose.tracking.tracking_model import TrackingModel
 
 PRESETS: dict[str, str] = {
     "full": "all cues (geometry, and appearance if descriptors are given), ADMM matching, 3DPS",

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mvpose.networks.catalogue.published import PACKAGE
+from mvpose.networks.catalogue.store import PACKAGE
 
 STORED = {"float32": "<f4", "float16": "<f2", "int32": "<i4", "uint8": "u1"}
 

@@ -13,7 +13,7 @@ from simharness.capture.filming import film
 from simharness.capture.ray_visibility import RayObserver
 from simharness.detector.detect import detect
 from simharness.scenario.sections.scenario import Scenario
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.rigs.faults import ExposureSchedule
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import Scene, build
 from simharness.world.scene.playback import Playback, simulate

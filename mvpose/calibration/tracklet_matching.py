@@ -341,9 +341,9 @@ def mean_looks(tracklets: Tracklets) -> tuple[Floats, Bools]:
 def evidence_of_looks(tracklets: Tracklets, apart: Bools, *, scale: AppearanceAffinity | None = None) -> Floats:
     """Return the log-likelihood ratio that two tracklets show one person or two, (n, n); 0 without descriptors.
 
-    As in tracking (:func:`mvpose.tracking.looks.evidence_of_looks`), looks speak for one person by as much as they are
-    more alike than those of people who are known to be others: in one uniform they are no evidence. They speak against
-    it where they are farther apart than those of one person.
+    As in tracking (:func:`mvpose.tracking.reappearance.evidence_of_looks`), looks speak for one person by as much as
+    they are more alike than those of people who are known to be others: in one uniform they are no evidence. They speak
+    against it where they are farther apart than those of one person.
 
     Args:
         tracklets: tracklets of all views.

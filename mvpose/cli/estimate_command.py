@@ -126,8 +126,7 @@ def estimate_into(
 
     wanted.check()
     from mvpose.cli.camera_pictures import assigned, for_frames, open_videos
-    from mvpose.cli.estimation import estimate_people, estimator
-    from mvpose.cli.examination import examine
+    from mvpose.cli.estimation import estimate_people, estimator, examine
     from mvpose.estimators import SequenceEstimator
     from mvpose.formats.people.outliers import within_limits
 

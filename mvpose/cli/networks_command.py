@@ -18,8 +18,7 @@ group = typer.Typer(help="List, fetch and show networks that find people in pict
 def list_networks() -> None:
     """List the networks that can be fetched and those on this machine, with their licences and sources."""
     with PROGRAM.exit_on_error():
-        from mvpose.networks.catalogue.published import PACKAGE, PUBLISHED
-        from mvpose.networks.catalogue.store import fetched, of_rtmlib
+        from mvpose.networks.catalogue.store import PACKAGE, PUBLISHED, fetched, of_rtmlib
 
         here = {each.name: each.path for each in fetched()}
         for network in PUBLISHED:
@@ -43,8 +42,7 @@ def get(
         from mvpose.commands.errors import RunError
         from mvpose.commands.programs import note
         from mvpose.networks.catalogue.fetch import FetchError, fetch
-        from mvpose.networks.catalogue.published import PACKAGE
-        from mvpose.networks.catalogue.store import published
+        from mvpose.networks.catalogue.store import PACKAGE, published
 
         network = published(name)
         if package is None:

@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 from mvpose.arrays import Floats
 from mvpose.calibration.sightings import Sightings
 from mvpose.camera import Camera, Rig
-from mvpose.report.limbs import limbs_of
 from mvpose.report.overlay import USUAL_HEIGHT
+from mvpose.report.palette import limbs_of
 from mvpose.report.rig_plots import camera_from_above, cone_from_above, fit_view, name_cameras
 from mvpose.report.svg_plots import FAINT, INK, VARIANT_COLORS, legend_above, svg_plot
 

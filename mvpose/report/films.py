@@ -18,9 +18,18 @@ from mvpose.camera import Camera
 from mvpose.files.message_text import one_line
 from mvpose.report.examined_recording import ExaminedRecording
 from mvpose.report.film_file import FilmFile, film_suffix
-from mvpose.report.limbs import SMALL_FACE, face_of, limbs_of, plain_face
 from mvpose.report.overlay import USUAL_HEIGHT, Overlay
-from mvpose.report.palette import INK, TRUTH, UNMATCHED, Color, identity_color
+from mvpose.report.palette import (
+    INK,
+    SMALL_FACE,
+    TRUTH,
+    UNMATCHED,
+    Color,
+    face_of,
+    identity_color,
+    limbs_of,
+    plain_face,
+)
 from mvpose.report.picture_drawings import jpeg_uri, near_picture
 
 Rgb = NDArray[np.uint8]

@@ -14,8 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mvpose.report.limbs import COCO17_LIMBS, Edges
-from mvpose.report.palette import INK, OUTLINE, PAPER, Color
+from mvpose.report.palette import COCO17_LIMBS, INK, OUTLINE, PAPER, Color, Edges
 
 if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont, ImageFont

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Camera
 from mvpose.detections import Detections
-from mvpose.report.limbs import SMALL_FACE, Edges, face_of, limbs_of, plain_face
 from mvpose.report.overlay import USUAL_HEIGHT
-from mvpose.report.palette import UNMATCHED, css
+from mvpose.report.palette import SMALL_FACE, UNMATCHED, Edges, css, face_of, limbs_of, plain_face
 from mvpose.skeleton import Skeleton
 
 Pictures = Callable[[int, int], NDArray[np.uint8] | None]

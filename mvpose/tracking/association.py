@@ -7,6 +7,8 @@ for it where several tracks claim one detection: a lost person does not take the
 matrix of all detections and tracks goes through the same matching, so that cycle consistency holds between the views
 and the past (Zhang et al., "4D Association Graph", CVPR 2020, and the journal version of the paper use predicted
 people alike).
+
+Settings of a tracker.
 """
 
 from dataclasses import dataclass
@@ -18,6 +20,11 @@ from mvpose.arrays import Floats, Integers
 from mvpose.checks import check_numbers
 from mvpose.kernels import njit
 from mvpose.rays import Rays
+from mvpose.reconstruction.likelihood import Noise
+from mvpose.tracking.drift_watch import DriftModel
+from mvpose.tracking.existence import Existence
+from mvpose.tracking.motion import MotionModel
+from mvpose.tracking.reappearance import Reappearance
 
 
 @dataclass(frozen=True)
@@ -110,3 +117,32 @@ def _join(affinity, view, origins, directions, weights, state, covariance, lead,
                 more = min(slope * (vagueness[t] - least_vague), 0.5 * midpoint)
                 joined[m + t, d] = joined[d, m + t] = scalar_sigmoid(cost[t] + more, midpoint, slope)
     return joined, views
+
+
+@dataclass(frozen=True)
+class TrackingModel:
+    """Settings of a tracker."""
+
+    motion: MotionModel = MotionModel()
+    """Motion of joints."""
+    affinity: TrackAffinity = TrackAffinity()
+    """Affinity between tracks and detections."""
+    existence: Existence = Existence()
+    """How often people come, and how often people and ghosts are found."""
+    reappearance: Reappearance = Reappearance()
+    """How people who were lost come back."""
+    noise: Noise = Noise()
+    """Error model of keypoints."""
+    drift: DriftModel = DriftModel()
+    """Watch over the cameras."""
+    correlation: float = 0.15
+    """Time over which the errors of poses are correlated, seconds: wrong keypoints last 0.2 to 0.3 s, others change
+    faster."""
+    period: float = 0.04
+    """Time between frames whose detections carry no time, seconds."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.correlation < np.inf:
+            raise ValueError(f"correlation must be 0 s or more and finite, got {self.correlation}")
+        if not 0.0 < self.period < np.inf:
+            raise ValueError(f"period must be above 0 s and finite, got {self.period}")

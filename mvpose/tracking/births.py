@@ -11,9 +11,8 @@ from mvpose.rays import Rays
 from mvpose.reconstruction.poses import Poses
 from mvpose.tracking.bones import BonePrior
 from mvpose.tracking.frame_kernels import repeats
-from mvpose.tracking.looks import learn_looks, scale_of
 from mvpose.tracking.motion import JointMotion, MotionModel
-from mvpose.tracking.reappearance import Population, Reappearance
+from mvpose.tracking.reappearance import Population, Reappearance, learn_looks, scale_of
 from mvpose.tracking.recent_pictures import RecentPictures
 from mvpose.tracking.tracks import Tracks
 

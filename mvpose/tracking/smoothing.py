@@ -18,11 +18,11 @@ from mvpose.detections import Detections
 from mvpose.estimate import Estimate
 from mvpose.kernels import njit
 from mvpose.pipeline import Pipeline
+from mvpose.tracking.association import TrackingModel
 from mvpose.tracking.existence import FLASH
 from mvpose.tracking.frame_kernels import vagueness_of
 from mvpose.tracking.motion import transition
 from mvpose.tracking.tracker import Tracker
-from mvpose.tracking.tracking_model import TrackingModel
 from mvpose.tracking.tracks import Moment
 
 _FASTEST = 1e3  # frames per second; more wait only for a clock that stands still

@@ -23,20 +23,19 @@ from mvpose.rays import Rays
 from mvpose.reconstruction.error_scale import SHARED
 from mvpose.reconstruction.poses import Poses
 from mvpose.skeleton import Skeleton
+from mvpose.tracking.association import TrackingModel
 from mvpose.tracking.births import Births
 from mvpose.tracking.bones import BonePrior, bone_prior
 from mvpose.tracking.drift_watch import CameraResiduals, Drift, DriftWatch
 from mvpose.tracking.existence import MeasuredClutter
 from mvpose.tracking.frame_kernels import judge_tracks, predict_tracks, report_tracks, update_tracks
-from mvpose.tracking.looks import learn_looks
 from mvpose.tracking.motion import JointMotion
 from mvpose.tracking.picture_shift import ExpectedPeople
 from mvpose.tracking.picture_times import FrameClock, FrameTimes, readouts, undo_rolling
 from mvpose.tracking.pose_update import MatchedRays, place_people, repetition
-from mvpose.tracking.reappearance import Population
+from mvpose.tracking.reappearance import Population, learn_looks
 from mvpose.tracking.recent_pictures import RecentPictures
 from mvpose.tracking.state import TrackerState, check_serves, layout, of_tracks
-from mvpose.tracking.tracking_model import TrackingModel
 from mvpose.tracking.tracks import Moment, Tracks
 
 _FORGETTING = 0.5  # seconds: time constant of the score of a joint that no view supports

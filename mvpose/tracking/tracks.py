@@ -68,7 +68,7 @@ class Tracks:
     """Seconds of detections with descriptors in this mean, (n,), 0 for none."""
     rival: Floats
     """Least distance to the descriptors of anybody else who was there at the same time, (n,), infinite where nobody is
-    known; see :mod:`mvpose.tracking.looks`."""
+    known; see :mod:`mvpose.tracking.reappearance`."""
 
     @classmethod
     def none(cls, *, joints: int, bones: int, cameras: int, dimensions: int = 0) -> Self:

@@ -22,7 +22,7 @@ from simharness.capture.picture import ScenePictures, meshes_at, stack_bands
 from simharness.capture.rendering.renderer import Image, Renderer
 from simharness.capture.sensor import band_cameras, band_times, joints_at_exposure
 from simharness.types.views import LookalikeViews, Views, Visibility
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.rigs.faults import ExposureSchedule
 from simharness.world.rigs.projection import project_to_image
 from simharness.world.scene.lookalikes import Lookalikes
 from simharness.world.scene.playback import Playback, PlaybackState

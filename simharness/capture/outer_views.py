@@ -29,7 +29,7 @@ from simharness.types.outer_joints import OuterViews
 from simharness.types.views import Visibility
 from simharness.world.humans.body import DATA as BODY_DATA
 from simharness.world.humans.body import Body, body_model
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.rigs.faults import ExposureSchedule
 from simharness.world.scene.playback import Playback, PlaybackState
 
 

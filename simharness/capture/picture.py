@@ -24,7 +24,7 @@ from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
 from simharness.world.motion.motion import transform_points
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.rigs.faults import ExposureSchedule
 from simharness.world.rigs.projection import viewing_rays
 from simharness.world.scene.build import Scene
 from simharness.world.scene.playback import Playback, PlaybackState

@@ -19,7 +19,6 @@ from scipy.special import ndtr, ndtri
 
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
-from simharness.detector.circumstances import distance_factors, inversion_factors
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import ErrorDraws, KeyedDraws, logistic
 from simharness.detector.error_classes import MIRROR, PAIRED, jitter_distance
@@ -33,7 +32,9 @@ from simharness.detector.viewing_conditions import (
     VISIBLE,
     Conditions,
     bearings,
+    distance_factors,
     image_axes,
+    inversion_factors,
     pixel_offsets,
 )
 from simharness.scenario.sections.detector_section import (

@@ -16,7 +16,7 @@ from simharness.trial.stages.capture import picture_source_of
 from simharness.types.random_streams import stream
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views, Visibility
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.rigs.faults import ExposureSchedule
 from simharness.world.scene.build import Scene
 from simharness.world.scene.playback import Playback
 

@@ -24,7 +24,7 @@ from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.trial.stages.estimation import track_frames
 from simharness.trial.stages.simulation import Simulation, detect_trial
 from simharness.types.views import Views, Visibility
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.rigs.faults import ExposureSchedule
 from simharness.world.scene.playback import simulate
 
 

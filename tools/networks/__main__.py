@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mvpose.networks.catalogue.fetch import filled, read_members
-from mvpose.networks.catalogue.published import PUBLISHED
+from mvpose.networks.catalogue.store import PUBLISHED
 from tools.networks.tfjs_conversion import convert
 from tools.networks.tfjs_graph import read_graph
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from mvpose.networks.catalogue.fetch import filled, probe_picture, read_members
-from mvpose.networks.catalogue.published import PUBLISHED, PublishedNetwork
+from mvpose.networks.catalogue.store import PUBLISHED, PublishedNetwork
 from mvpose.networks.movenet import Heads, decode
 from mvpose.networks.session import Session
 from tools.networks.__main__ import DATA, PARTS

@@ -22,8 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.arrays import Floats
 from mvpose.files.atomic_files import write_atomic
 from mvpose.report.documents import fill_template
-from mvpose.report.limbs import COCO17_BODY
-from mvpose.report.palette import TRUTH, css, person_color
+from mvpose.report.palette import COCO17_BODY, TRUTH, css, person_color
 from simharness.outputs.run.pictures import PagePicture
 from simharness.outputs.study.skeleton_view_3d import Replay
 from simharness.trial.run_folder import Record, read_run

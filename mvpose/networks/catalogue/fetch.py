@@ -19,8 +19,7 @@ import numpy as np
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.files.message_text import one_line
 from mvpose.networks.card import Card
-from mvpose.networks.catalogue.published import PACKAGE, PACKAGE_LICENCE, PublishedNetwork
-from mvpose.networks.catalogue.store import own_folder
+from mvpose.networks.catalogue.store import PACKAGE, PACKAGE_LICENCE, PublishedNetwork, own_folder
 from mvpose.networks.crops import Pixels
 from mvpose.networks.session import Session
 

@@ -33,7 +33,7 @@ from simharness.trial.stages.build_trial import Trial
 from simharness.types.views import Visibility
 from simharness.world.humans.population import is_child
 from simharness.world.motion.choreography import roles
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.rigs.faults import ExposureSchedule
 
 FORMAT = "simharness export"
 """Value of ``format`` in the manifest of an export."""

@@ -1,4 +1,7 @@
-"""Page of the profile of a network as one self-contained HTML file."""
+"""Page of the profile of a network as one self-contained HTML file.
+
+Plots of the errors of a network beside those of the simulated detector with its profile, as SVG.
+"""
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations
@@ -6,11 +9,15 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
+from scipy.stats import binomtest
 
+from mvpose.arrays import Floats
 from mvpose.report.documents import fill_template
+from mvpose.report.svg_plots import legend_above, svg_plot
 from simharness.outputs import TEMPLATES
-from simharness.outputs.network_profile.plots import compared_curves
-from simharness.reality.network_profile.error_curves import condition_curves, error_curves
+from simharness.outputs.validation.plots import REAL_COLOR, TWIN_COLOR
+from simharness.reality.detector_fit.detector_sums import Trials
+from simharness.reality.network_profile.error_curves import ErrorCurve, condition_curves, error_curves
 from simharness.reality.network_profile.profile_check import CheckedFigure, ProfileCheck
 from simharness.reality.network_profile.profile_fit import NetworkProfile
 from simharness.reality.validation.verdicts import VerdictState
@@ -18,6 +25,47 @@ from simharness.scenario.sections.detector_section import KINDS
 from simharness.scoring.catalogue import SCORES as CATALOGUE
 from simharness.scoring.pcp import GROUPS
 from simharness.trial.identity import provenance_sentence
+
+_SIZE = (3.6, 2.6)
+_FEWEST = 10  # trials behind a point that is drawn
+_TURNED = 24  # letters of all labels together from which they are turned
+
+
+def compared_curves(network: ErrorCurve, simulated: ErrorCurve, *, name: str) -> str:
+    """Plot shares of both by bin, percent: the network as bars with 95 % intervals, the simulated detector as a line.
+
+    The intervals are Wilson's (Journal of the American Statistical Association 1927), of independent trials.
+
+    Args:
+        network: of the network.
+        simulated: of the simulated detector, with the same bins.
+        name: different from the name of every other plot on the page.
+    """
+    at = np.arange(len(network.labels))
+    enough = network.counts.n >= _FEWEST
+    with svg_plot(name, size=_SIZE) as (axes, written):
+        share = np.where(enough, 100 * network.share, np.nan)
+        low, high = _intervals(network.counts)
+        axes.bar(at, share, color=REAL_COLOR, width=0.72, alpha=0.5, label="network")
+        if (network.counts.k <= network.counts.n).all():
+            axes.vlines(at[enough], low[enough], high[enough], color=REAL_COLOR, lw=1.6)
+        shares = np.where(simulated.counts.n >= _FEWEST, 100 * simulated.share, np.nan)
+        axes.plot(at, shares, "o--", color=TWIN_COLOR, ms=4, lw=1.2, label="profile")
+        turned = sum(map(len, network.labels)) > _TURNED
+        axes.set_xticks(at, network.labels, rotation=55 if turned else 0, ha="right" if turned else "center")
+        axes.set(xlabel=network.axis, ylabel="%")
+        axes.set_ylim(0, None)
+        axes.grid(axis="y")
+        legend_above(axes)
+    return written[0]
+
+
+def _intervals(counts: Trials) -> Floats:
+    """Return the ends of the 95 % interval (Wilson) of each share, (2, B), %; NaN without a trial."""
+    pairs = zip(counts.k.astype(int), counts.n.astype(int), strict=True)
+    ends = [binomtest(min(k, n), n).proportion_ci(method="wilson") if n else (np.nan, np.nan) for k, n in pairs]
+    return 100 * np.array(ends).T
+
 
 _SHOWN = ("pcp", "recall", "ghosts", "mpjpe_mm")
 

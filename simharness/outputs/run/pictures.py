@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from mvpose import Camera, Detections, Estimate
 from mvpose.report.film_file import FilmFile
-from mvpose.report.limbs import COCO17_BODY, SMALL_FACE, plain_face
 from mvpose.report.overlay import BoxTag, Mark, Overlay, legend, mosaic, rooms_in_grid
-from mvpose.report.palette import TRUTH, UNMATCHED, Color, person_color
+from mvpose.report.palette import COCO17_BODY, SMALL_FACE, TRUTH, UNMATCHED, Color, person_color, plain_face
 from mvpose.report.picture_drawings import jpeg_uri
 from simharness.capture.picture import ScenePictures, scaled
 from simharness.scenario.sections.scenario import Scenario
@@ -27,7 +26,7 @@ from simharness.trial.stages.build_trial import Trial
 from simharness.trial.stages.capture import picture_source_of
 from simharness.types.truth import Truth
 from simharness.world.motion.choreography import roles
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.rigs.faults import ExposureSchedule
 from simharness.world.rigs.projection import project_to_image
 from simharness.world.scene.build import Scene
 from simharness.world.scene.playback import Playback

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
-from mvpose.report.limbs import COCO17_LIMBS
-from mvpose.report.palette import TRUTH, Color, person_color
+from mvpose.report.palette import COCO17_LIMBS, TRUTH, Color, person_color
 from simharness.capture.picture import ScenePictures
 from simharness.outputs.study.skeleton_view_3d import Replay
 from simharness.trial.stages.capture import picture_source_of

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from mvpose import Detections, Estimate
 from mvpose.arrays import Floats
-from mvpose.report.limbs import COCO17_LIMBS
-from mvpose.report.palette import css, person_color
+from mvpose.report.palette import COCO17_LIMBS, css, person_color
 from mvpose.report.view_3d import PYRAMID, Piece3D, Scene3D, Shape3D, Style3D, View3D, camera_pyramid, view_3d
 from mvpose.skeleton import COCO17
 from simharness.scenario.sections.scenario import Scenario

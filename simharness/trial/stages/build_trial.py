@@ -14,8 +14,7 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.capture import renderer_of
 from simharness.trial.stages.estimators import estimators_of
 from simharness.trial.stages.networks import descriptor_settings, people_finder, pose_head, re_id
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
-from simharness.world.rigs.faults import camera_phases, schedule_exposures
+from simharness.world.rigs.faults import ExposureSchedule, camera_phases, schedule_exposures
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import Scene, build
 

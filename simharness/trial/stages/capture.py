@@ -14,7 +14,7 @@ from simharness.capture.rendering.renderer import Renderer
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.outer_joints import OuterViews
 from simharness.types.views import Views
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.rigs.faults import ExposureSchedule
 from simharness.world.scene.build import Scene
 from simharness.world.scene.playback import Playback
 

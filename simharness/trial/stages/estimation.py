@@ -2,12 +2,21 @@
 
 Variants without memory share the frames among all processes, in any order. A variant with memory
 (:class:`mvpose.estimators.SequenceEstimator`) gets all frames in order in one process, beside the others.
+
+Inputs of methods: cameras of their own for methods of users, and digests by which a change is noticed.
+
+All variants share the detections of a frame. NumPy protects them from writes in Python only, not from those of C code
+or of a tensor that shares their memory.
 """
 
 import contextlib
+import copy
+import hashlib
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from mvpose import Detections, Estimate, Rig
 from mvpose.commands.errors import MethodError, RunError, naming_frame
@@ -17,7 +26,28 @@ from mvpose.presets import PRESETS, READ_HEATMAPS, without_repair
 from simharness.detector.detect import Detected
 from simharness.runtime.frame_pool import chunks_of, map_jobs
 from simharness.trial.stages.detected_sequence import DetectedSequence
-from simharness.trial.stages.method_inputs import input_digest
+
+_copies: dict[str, tuple[Rig, Rig]] = {}  # by variant: the last rig, and the copy that the variant has of it
+
+
+def own_rig(variant: str, rig: Rig) -> Rig:
+    """Return a copy of the cameras that no other variant has; the same object in all frames of a rig."""
+    original, own = _copies.get(variant, (None, rig))
+    if original is not rig:
+        own = copy.deepcopy(rig)
+        _copies[variant] = (rig, own)
+    return own
+
+
+def input_digest(rig: Rig, detections: Detections) -> bytes:
+    """Return a digest of cameras and detections. Heat maps are left out: they are large, and drawn for each frame."""
+    digest = hashlib.blake2b(digest_size=16)
+    cameras = [array for camera in rig for array in (camera.K, camera.R, camera.t, camera.distortion)]
+    cameras += [rig.packed, rig.centers]  # kept by the rig, and read by kernels
+    found = (detections.view, detections.keypoints, detections.scores, detections.boxes, detections.box_scores)
+    for array in (*cameras, *found, detections.descriptors, detections.time):
+        digest.update(b"" if array is None else np.ascontiguousarray(array).data)
+    return digest.digest()
 
 
 @dataclass(frozen=True)

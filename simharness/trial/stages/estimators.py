@@ -47,8 +47,7 @@ from mvpose.estimators import Estimator
 from mvpose.files.message_text import prefixed
 from mvpose.skeleton import Skeleton
 from simharness.scenario.sections.method_section import MethodSection, module_file, wrong_variants
-from simharness.trial.stages.estimation import track_frames
-from simharness.trial.stages.method_inputs import own_rig
+from simharness.trial.stages.estimation import own_rig, track_frames
 
 _PROTOCOL = "estimate(rig, detections) -> mvpose.Estimate"
 _METHODS = ("estimate", "track")

@@ -21,7 +21,7 @@ from simharness.detector.network_truth import with_detections
 from simharness.detector.viewing_conditions import oks_units
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.capture import picture_source_of
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.rigs.faults import ExposureSchedule
 from simharness.world.scene.build import Scene
 from simharness.world.scene.playback import Playback
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 from simharness.world.humans.added_mesh import AddedMesh, add_mesh, attached, grid, hull, rigid, rounded
 from simharness.world.humans.body import Body, FacePart
-from simharness.world.humans.clothing_colors import Color
+from simharness.world.humans.face_colors import Color
 from simharness.world.humans.head_wear import glasses, hat, mask
 from simharness.world.humans.wardrobe import Look, mix
 

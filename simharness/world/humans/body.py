@@ -18,8 +18,7 @@ from mvpose.arrays import Floats, Integers
 from mvpose.skeleton import COCO17, Skeleton
 from simharness.types.sequence import LANDMARKS, of_skeleton
 from simharness.world.humans.anatomy import segments_of_faces
-from simharness.world.humans.limb_lengths import LIMBS, limb_stretches, stretch_vertices
-from simharness.world.humans.shape import Shape
+from simharness.world.humans.shape import LIMBS, Shape, limb_stretches, stretch_vertices
 from simharness.world.humans.skinning import Skirt, enclosed, mix, skin
 
 DATA = Path(__file__).parent / "data" / "anny.npz"

@@ -1,8 +1,72 @@
-"""Shape parameters of a human body."""
+"""Shape parameters of a human body.
 
-from collections.abc import Mapping
+Limb lengths: stretch a rest body along its limb bones, using the skinning weights.
+
+In anny the limb lengths follow from the other phenotypes, and the forearms of its women are too short. So limb
+lengths are separate parameters here.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.arrays import Floats
+from simharness.world.humans.skinning import skin
+
+# For every limb: its first bone, further bones that move its far half, and the bone at its end.
+_CHAINS: Mapping[str, tuple[str, tuple[str, ...], str]] = MappingProxyType(
+    {
+        "upper_arm": ("Arm", ("ArmTwist",), "ForeArm"),
+        "forearm": ("ForeArm", ("ForeArmTwist",), "Hand"),
+        "thigh": ("UpLeg", (), "Leg"),
+        "shank": ("Leg", (), "Foot"),
+    }
+)
+LIMBS: tuple[str, ...] = tuple(_CHAINS)
+"""Limbs with a length factor, which holds for both sides."""
+
+
+def limb_stretches(
+    heads: Floats, factors: Mapping[str, float], *, bones: Sequence[str], parents: Sequence[int]
+) -> tuple[NDArray[np.float32], Floats]:
+    """Return the affine map of every bone that scales the limb lengths, and the moved bone heads.
+
+    Args:
+        heads: start points of the bones, (B, 3) metres.
+        factors: length factor of every limb in ``LIMBS``.
+        bones: bone names, parents before children.
+        parents: index of the parent of every bone, -1 for the pelvis.
+
+    Returns:
+        Maps (B, 3, 4) float32 and heads (B, 3).
+    """
+    linear = np.tile(np.eye(3), (len(bones), 1, 1))
+    index = {bone: i for i, bone in enumerate(bones)}
+    for limb, (first, others, last) in _CHAINS.items():
+        for side in ("Left", "Right"):
+            axis = heads[index[side + last]] - heads[index[side + first]]
+            stretch = np.eye(3) + (factors[limb] - 1) * np.outer(axis, axis) / (axis @ axis)
+            for bone in (first, *others):
+                linear[index[side + bone]] = stretch
+    moved = heads.copy()
+    for child, parent in enumerate(parents):
+        if parent >= 0:
+            moved[child] = moved[parent] + linear[parent] @ (heads[child] - heads[parent])
+    shift = moved - np.einsum("brc,bc->br", linear, heads)
+    return np.concatenate([linear, shift[..., None]], axis=2).astype(np.float32), moved
+
+
+def stretch_vertices(
+    vertices: Floats, weight_bones: NDArray[np.uint8], weights: NDArray[np.float32], maps: NDArray[np.float32]
+) -> Floats:
+    """Apply affine bone maps (B, 3, 4) to vertices (n, 3) by linear blend skinning; bones and weights are (n, w)."""
+    out = np.empty((len(vertices), 3), np.float32)
+    skin(vertices.astype(np.float32), weight_bones, weights, maps, out)
+    return out.astype(float)
+
 
 LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
     {

@@ -20,8 +20,7 @@ import numpy as np
 
 from mvpose.files.input_files import parse_toml
 from simharness.types.random_streams import stream
-from simharness.world.humans.clothing_colors import Color, draw_color, palette
-from simharness.world.humans.face_colors import EXPRESSIONS
+from simharness.world.humans.face_colors import EXPRESSIONS, Color, draw_color, palette
 from simharness.world.humans.population import draw_sex
 
 GLASSES = ("none", "rectangular", "round", "sunglasses")
@@ -176,7 +175,7 @@ _BEARDS, _BALD, _CROPPED = 0.4, 0.25, 0.9  # shares of men, and of those with sh
 
 
 def draw_look(rng: np.random.Generator, *, female: bool = False, place: float | None = None) -> Look:
-    """Draw one look, with colours as clothes have them (:mod:`simharness.world.humans.clothing_colors`).
+    """Draw one look, with colours as clothes have them (:mod:`simharness.world.humans.face_colors`).
 
     Args:
         rng: random stream.

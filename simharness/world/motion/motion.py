@@ -209,7 +209,7 @@ PropKind = Literal["chair", "table", "box", "step", "bottle", "booth", "door"]
 
 @dataclass(frozen=True)
 class Prop:
-    """Object that an activity uses; ``simharness.world.scene.objects.props`` gives it a shape."""
+    """Object that an activity uses; ``simharness.world.scene.objects.laboratory`` gives it a shape."""
 
     kind: PropKind
     """Kind of object."""

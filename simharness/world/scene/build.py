@@ -31,7 +31,7 @@ from simharness.world.motion.mocap import load_people, recorded_shape
 from simharness.world.motion.motion import Motion, Presence, held, motion_clock
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.scene.dynamics.motion_servos import planned_push, track
-from simharness.world.scene.objects.props import make_prop
+from simharness.world.scene.objects.laboratory import make_prop
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.placement.clutter import place_clutter, place_decoys, place_furniture
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, FreeSpace, check_rig

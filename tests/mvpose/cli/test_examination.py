@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from mvpose import Detections
 from mvpose.calibration.findings import Diagnosis, Finding
-from mvpose.cli import examination
+from mvpose.cli import estimation
 from mvpose.cli.app import app
-from mvpose.cli.examination import examined_frames
+from mvpose.cli.estimation import examined_frames
 from mvpose.formats.calibration import pose2sim
 
 
@@ -93,5 +93,5 @@ class TestCommand:
         assert (lab / "out" / "recording.html").exists()
 
     def test_it_may_be_left_out(self, lab, monkeypatch):
-        monkeypatch.setattr(examination, "examine", None)
+        monkeypatch.setattr(estimation, "examine", None)
         assert verdicts(estimate(lab, "--no-doctor")) == []

@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 
 from mvpose.cli.app import app
 from mvpose.networks import Card, Session
-from mvpose.networks.catalogue import fetch, published, store
+from mvpose.networks.catalogue import fetch, store
 from mvpose.networks.catalogue.fetch import check_outputs, probe_picture
-from mvpose.networks.catalogue.published import PACKAGE_LICENCE, PUBLISHED, PublishedNetwork
+from mvpose.networks.catalogue.store import PACKAGE_LICENCE, PUBLISHED, PublishedNetwork
 from tools.networks.tfjs_conversion import convert
 from tools.networks.tfjs_graph import read_graph
 
@@ -72,8 +72,7 @@ def home(tmp_path, monkeypatch):
 
 
 def offer(monkeypatch, network):
-    for module in (published, store):
-        monkeypatch.setattr(module, "PUBLISHED", (network, *PUBLISHED))
+    monkeypatch.setattr(store, "PUBLISHED", (network, *PUBLISHED))
 
 
 @pytest.fixture
@@ -180,7 +179,7 @@ def npm(tmp_path, monkeypatch):
 
 
 def test_npm_packs_into_a_folder_of_its_own(archive, home, npm):
-    npm(f'[ "$1 $2" = "pack {published.PACKAGE}" ] || exit 9\ncp {archive} "$5"')
+    npm(f'[ "$1 $2" = "pack {store.PACKAGE}" ] || exit 9\ncp {archive} "$5"')
     assert call("networks", "get", "halves").exit_code == 0
     assert (home / "halves" / "halves.onnx").is_file()
 

@@ -124,18 +124,18 @@ AROUND = {
 SHIPPED = {
     "simharness/world/rigs/layouts.py", "simharness/world/humans/body.py", "simharness/detector/reported.py",
     "simharness/capture/outer_views.py", "simharness/world/scene/rooms/kinds.py",
-    "simharness/world/humans/clothing_colors.py", "simharness/world/humans/population.py",
+    "simharness/world/humans/face_colors.py", "simharness/world/humans/population.py",
     "simharness/world/humans/anatomy.py", "simharness/world/scene/rooms/fittings.py",
     "simharness/world/scene/rooms/textures.py", "mvpose/calibration/findings.py",
     "simharness/outputs/study/curves.py", "simharness/outputs/validation/tables.py",
     "simharness/reality/detector_fit/fit_table.py",
     "simharness/reality/detector_fit/profile.py", "simharness/study/causes/cause_catalogue.py",
     "simharness/world/scene/rooms/room_lighting.py", "simharness/reality/evaluation.py",
-    "simharness/trial/kernel_compilation.py", "mvpose/formats/joint_names.py", "mvpose/networks/catalogue/published.py",
+    "simharness/trial/kernel_compilation.py", "mvpose/formats/joint_names.py", "mvpose/networks/catalogue/store.py",
     "mvpose/calibration/file_mistakes.py", "mvpose/networks/catalogue/fetch.py", "mvpose/public_names.py",
     "mvpose/skeleton.py", "simharness/outputs/benchmark/layout.py", "simharness/scoring/score_registry.py",
     "simharness/cli/scenarios_command.py",
-    "simharness/world/humans/face_colors.py", "simharness/world/humans/wardrobe.py",
+    "simharness/world/humans/wardrobe.py",
 }  # fmt: skip
 CALLS = re.compile(
     r"(?:^|\.)(?:read_text|read_bytes|loadmat|read_parquet|scan_parquet|FileStorage|imread)$|^(?:np\.load|json\.loads?|"

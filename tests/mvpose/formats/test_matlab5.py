@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.io import loadmat, savemat
 
-from mvpose.formats.people.matlab5 import read_variable
+from mvpose.formats.people.actors_mat import read_variable
 
 NUMBERS = hnp.arrays(
     st.sampled_from([np.float64, np.float32, np.int16, np.uint8]),

@@ -10,7 +10,7 @@ from mvpose import Detections, preset
 from mvpose.formats.calibration.calibration_formats import read_calibration
 from mvpose.formats.pictures import open_pictures
 from mvpose.networks.catalogue.fetch import fetch
-from mvpose.networks.catalogue.published import PUBLISHED
+from mvpose.networks.catalogue.store import PUBLISHED
 from mvpose.networks.detector import detect_people
 from mvpose.networks.movenet import Heads, MoveNet, decode, peaks
 

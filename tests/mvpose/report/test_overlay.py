@@ -3,9 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mvpose.report.limbs import COCO17_LIMBS, plain_face
 from mvpose.report.overlay import BoxTag, Overlay, legend, mosaic, readable_on, rooms_in_grid, text_mask
-from mvpose.report.palette import INK, OUTLINE, PAPER, TRUTH, UNMATCHED, css, person_color
+from mvpose.report.palette import COCO17_LIMBS, INK, OUTLINE, PAPER, TRUTH, UNMATCHED, css, person_color, plain_face
 from mvpose.skeleton import COCO17
 
 BLACK = np.zeros((600, 800, 3), np.uint8)

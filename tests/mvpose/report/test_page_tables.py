@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mvpose import COCO17, PANOPTIC19, SHELF14
-from mvpose.report.limbs import COCO17_LIMBS, limbs_of
+from mvpose.report.palette import COCO17_LIMBS, limbs_of
 from mvpose.report.tables import NOTHING, joint_groups, number, residual_table
 from mvpose.wholebody import SKELETONS, skeleton_by_name
 

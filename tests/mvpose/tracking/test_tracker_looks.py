@@ -11,8 +11,7 @@ from people import STANDING, ring
 from mvpose import Detections, Pipeline, preset
 from mvpose.affinity import AppearanceAffinity, FusedAffinity
 from mvpose.tracking import Tracker, TrackerState, TrackingModel
-from mvpose.tracking.looks import learn_looks, look_distances
-from mvpose.tracking.reappearance import Reappearance
+from mvpose.tracking.reappearance import Reappearance, learn_looks, look_distances
 from mvpose.tracking.tracks import Tracks
 
 RIG = ring(5)

@@ -18,8 +18,7 @@ from simharness.capture.rendering.raster import RasterRenderer
 from simharness.scenario.sections.cameras_section import FaultsSection, SensorSection
 from simharness.types.lighting import Lighting
 from simharness.types.views import LookalikeViews, Views, Visibility
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
-from simharness.world.rigs.faults import schedule_exposures
+from simharness.world.rigs.faults import ExposureSchedule, schedule_exposures
 from simharness.world.scene.playback import PlaybackState
 
 RIG = Rig([camera_at(c, (0, 0, 1), size=(200, 150)) for c in ((3.5, 0, 1.8), (0, 3.5, 1.8), (-2.5, -2.5, 1.8))])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from worlds import find, standing, within, world
 
-from simharness.detector.circumstances import distance_factors, inversion_factors
+from simharness.detector.viewing_conditions import distance_factors, inversion_factors
 from simharness.types.truth import KeypointError
 
 LEGS = slice(13, 17)  # knees and ankles: left and right are apart from all sides

@@ -31,9 +31,8 @@ from simharness.scenario.sections.method_section import EstimatorsSection, Metho
 from simharness.study.study_run import run_study
 from simharness.trial.run_folder import read_run
 from simharness.trial.stages.build_trial import build_trial
-from simharness.trial.stages.estimation import EstimateFrames
+from simharness.trial.stages.estimation import EstimateFrames, input_digest, own_rig
 from simharness.trial.stages.estimators import UserEstimator, estimators_of, load_estimator, sources_of
-from simharness.trial.stages.method_inputs import input_digest, own_rig
 
 WRAPPED = Path(__file__).parent / "foreign" / "wrapped.py"
 CUSTOM = """

@@ -21,8 +21,7 @@ from mvpose.recording import People
 from mvpose.skeleton import COCO17
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.world.humans.body import body_model, make_body
-from simharness.world.humans.limb_lengths import LIMBS
-from simharness.world.humans.shape import LIMITS, Shape
+from simharness.world.humans.shape import LIMBS, LIMITS, Shape
 from simharness.world.motion.mocap.reenactment import follow
 from simharness.world.motion.poses.kinematics import Kinematics
 

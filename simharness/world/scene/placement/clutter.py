@@ -14,8 +14,7 @@ from simharness.scenario.sections.room_section import ClutterSection, DecoysSect
 from simharness.types.random_streams import stream
 from simharness.world.motion.motion import Trajectory
 from simharness.world.scene.objects.geoms import Box
-from simharness.world.scene.objects.laboratory import draw_box, draw_shelf
-from simharness.world.scene.objects.mannequin import draw_mannequin
+from simharness.world.scene.objects.laboratory import draw_box, draw_mannequin, draw_shelf
 from simharness.world.scene.objects.materials import draw_sheet
 from simharness.world.scene.objects.object_files import draw_shipped, load_object, load_shipped, variants
 from simharness.world.scene.objects.solids import ObjectModel, Solid, yaw_of

@@ -16,7 +16,7 @@ from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.lighting import AreaLight
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
-from simharness.world.humans.clothing_colors import Color
+from simharness.world.humans.face_colors import Color
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import outline, quad_mesh, ring_mesh
 from simharness.world.scene.objects.solids import Solid

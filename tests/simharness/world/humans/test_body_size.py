@@ -9,9 +9,8 @@ from mvpose.skeleton import COCO17
 from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
-from simharness.world.humans.limb_lengths import LIMBS
 from simharness.world.humans.population import draw_shape
-from simharness.world.humans.shape import LIMITS, Shape
+from simharness.world.humans.shape import LIMBS, LIMITS, Shape
 from simharness.world.motion.mocap.recorded_people import body_lengths, resize
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics

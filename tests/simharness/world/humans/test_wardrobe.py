@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simharness.types.random_streams import stream
-from simharness.world.humans.clothing_colors import name_at, palette
+from simharness.world.humans.face_colors import name_at, palette
 from simharness.world.humans.population import draw_sex, draw_shape
 from simharness.world.humans.wardrobe import (
     HAIR_STYLES,

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from simharness.scenario.sections.cameras_section import CamerasSection
-from simharness.world.rigs.exposure_schedule import ExposureSchedule, moved
+from simharness.world.rigs.faults import ExposureSchedule, moved
 from simharness.world.rigs.layouts import build_rig
 
 TIME = np.arange(4) / 10

@@ -6,8 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.camera import Rig
 from simharness.scenario.sections.cameras_section import CamerasSection, FaultsSection
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
-from simharness.world.rigs.faults import MAX_CLOCK_ERROR, schedule_exposures
+from simharness.world.rigs.faults import MAX_CLOCK_ERROR, ExposureSchedule, schedule_exposures
 from simharness.world.rigs.layouts import build_rig
 
 TIME = np.arange(40) / 10

@@ -6,7 +6,7 @@ from walkers import Rays, ring, space
 
 from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
 from simharness.types.random_streams import stream
-from simharness.world.scene.objects.mannequin import draw_mannequin
+from simharness.world.scene.objects.laboratory import draw_mannequin
 from simharness.world.scene.objects.object_files import load_shipped, variants
 from simharness.world.scene.placement.clutter import place_clutter, place_decoys
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH

@@ -19,8 +19,7 @@ from simharness.scenario.sections.cameras_section import FaultsSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.mirror import Mirror
 from simharness.types.views import Views
-from simharness.world.rigs.exposure_schedule import ExposureSchedule
-from simharness.world.rigs.faults import schedule_exposures
+from simharness.world.rigs.faults import ExposureSchedule, schedule_exposures
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build
 from simharness.world.scene.lookalikes import Lookalikes

@@ -3,7 +3,7 @@ import pytest
 from walkers import Rays
 
 from simharness.world.motion.motion import Prop, Trajectory
-from simharness.world.scene.objects.props import make_prop
+from simharness.world.scene.objects.laboratory import make_prop
 
 SIZES = {
     "chair": (0.45, 0.43, 0.46),
