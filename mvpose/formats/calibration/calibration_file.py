@@ -1,6 +1,6 @@
 """Calibration format: how the files of one program are recognised, read and written."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -74,13 +74,6 @@ class CalibrationFile:
         return self.content[:1024].lstrip(b"\xef\xbb\xbf \t\r\n")[:5]
 
 
-class Recognise(Protocol):
-    """Test of a file's content."""
-
-    def __call__(self, file: CalibrationFile) -> bool:
-        """Return whether the file is of the format."""
-
-
 class Read(Protocol):
     """Reader of a format."""
 
@@ -97,17 +90,6 @@ class Read(Protocol):
         """
 
 
-class Write(Protocol):
-    """Writer of a format."""
-
-    def __call__(self, path: Path, rig: Rig) -> None:
-        """Write a rig.
-
-        Raises:
-            ValueError: the format cannot hold the rig.
-        """
-
-
 @dataclass(frozen=True)
 class CalibrationFormat:
     """A calibration format."""
@@ -116,12 +98,12 @@ class CalibrationFormat:
     """Name in messages, with the kind of file: "VoxelPose (JSON)"."""
     expects: str
     """Content of a file, for the message about a file of no known format."""
-    recognises: Recognise
+    recognises: Callable[[CalibrationFile], bool]
     """Test of a file's content."""
     read: Read
     """Reader."""
-    write: Write | None = None
-    """Writer; None: the format is only read."""
+    write: Callable[[Path, Rig], None] | None = None
+    """Writer, which raises a ValueError where the format cannot hold the rig; None: the format is only read."""
 
 
 def _keys(entries: dict[str, Any]) -> str:

@@ -5,7 +5,6 @@ For each camera NAME of the list ``names``: ``K_NAME`` (3x3), ``dist_NAME`` (k1 
 ``x_cam = Rot X + T``, metres, z up.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose import Camera, Rig
 from mvpose.files.message_text import prefixed
-from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.calibration_file import CalibrationFormat
 from mvpose.formats.calibration.camera_entry import camera, check_names, image_size
 from mvpose.formats.calibration.file_storage import matrix, missing_half, read_beside, write_storage
 
@@ -68,19 +67,13 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
     write_storage(folder / "extri.yml", outer)
 
 
-def _recognises(file: CalibrationFile) -> bool:
-    return isinstance((file.storage or {}).get("names"), list)
-
-
-def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
-    return read_calibration(path, size=size)
-
-
-def _write(path: Path, rig: Rig) -> None:
-    write_calibration(path.parent, rig)
-
-
-FORMAT = CalibrationFormat("EasyMocap (YAML)", _EXPECTS, _recognises, _read, _write)
+FORMAT = CalibrationFormat(
+    "EasyMocap (YAML)",
+    _EXPECTS,
+    lambda file: isinstance((file.storage or {}).get("names"), list),
+    lambda path, *, size, only: read_calibration(path, size=size),
+    lambda path, rig: write_calibration(path.parent, rig),
+)
 
 
 def _camera(name: str, values: dict[str, Any], size: tuple[int, int], path: Path) -> Camera:

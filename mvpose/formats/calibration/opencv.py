@@ -11,7 +11,6 @@ OpenCV prescribes no layout for many cameras. The reader accepts:
 The writer uses the first layout.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -102,15 +101,13 @@ def values_of(file: CalibrationFile) -> dict[str, Any]:
     return file_storage.read_storage(file.path, what=_WHAT) if plain is None else plain
 
 
-def _recognises(file: CalibrationFile) -> bool:
-    return file.storage is not None or bool(_entries(file.json or file.toml or {}))
-
-
-def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
-    return read_calibration(path, size=size)
-
-
-FORMAT = CalibrationFormat("OpenCV (YAML, XML, JSON)", _EXPECTS, _recognises, _read, write_calibration)
+FORMAT = CalibrationFormat(
+    "OpenCV (YAML, XML, JSON)",
+    _EXPECTS,
+    lambda file: file.storage is not None or bool(_entries(file.json or file.toml or {})),
+    lambda path, *, size, only: read_calibration(path, size=size),
+    write_calibration,
+)
 
 
 def _entries(values: dict[str, Any]) -> dict[str, dict[str, Any]]:

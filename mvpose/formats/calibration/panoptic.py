@@ -5,7 +5,7 @@ k1 k2 p1 p2 k3. The file's world has y down; ours is (x, y, z) = (X, Z, -Y) / 10
 """
 
 import json
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -88,11 +88,13 @@ def _recognises(file: CalibrationFile) -> bool:
     return not any(map(is_camera, entries)) or any(isinstance(each, dict) and ours & each.keys() for each in entries)
 
 
-def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
-    return read_calibration(path, types=() if only else ("hd",))
-
-
-FORMAT = CalibrationFormat("Panoptic (JSON)", _EXPECTS, _recognises, _read, write_calibration)
+FORMAT = CalibrationFormat(
+    "Panoptic (JSON)",
+    _EXPECTS,
+    _recognises,
+    lambda path, *, size, only: read_calibration(path, types=() if only else ("hd",)),
+    write_calibration,
+)
 
 
 def _camera(index: int, entry: Any) -> Camera:

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from mvpose import Camera, Rig
 from mvpose.files.input_files import CALIBRATION, parse_toml, read_bytes
 from mvpose.files.message_text import one_line, prefixed, shown
-from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.calibration_file import CalibrationFormat
 from mvpose.formats.calibration.camera_entry import camera, check_names, image_size
 
 _KEYS = ("size", "matrix", "distortions", "rotation", "translation")
@@ -74,15 +74,17 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
     )
 
 
-def _recognises(file: CalibrationFile) -> bool:
-    return any(isinstance(entry, dict) and "matrix" in entry for entry in (file.toml or {}).values())
-
-
 def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
     return read_calibration(path)
 
 
-FORMAT = CalibrationFormat("Pose2Sim (TOML)", _EXPECTS, _recognises, _read, write_calibration)
+FORMAT = CalibrationFormat(
+    "Pose2Sim (TOML)",
+    _EXPECTS,
+    lambda file: any(isinstance(entry, dict) and "matrix" in entry for entry in (file.toml or {}).values()),
+    _read,
+    write_calibration,
+)
 
 
 def _quoted(text: str) -> str:

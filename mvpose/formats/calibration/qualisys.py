@@ -13,7 +13,7 @@ import numpy as np
 from mvpose import Camera, Rig
 from mvpose.files.input_files import CALIBRATION, read_bytes
 from mvpose.files.message_text import one_line
-from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.calibration_file import CalibrationFormat
 from mvpose.formats.calibration.camera_entry import camera
 
 _EXPECTS = "<calibration> with <cameras>, each with fov_video, transform and intrinsic"
@@ -82,12 +82,13 @@ def _values(entry: ElementTree.Element, name: str, part: str, keys: tuple[str, .
         raise ValueError(f"camera {name!r}: <{part}>: {error}") from None
 
 
-def _recognises(file: CalibrationFile) -> bool:
-    return file.content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and b"<fov_video" in file.content
-
-
 def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
     return read_calibration(path)
 
 
-FORMAT = CalibrationFormat("Qualisys (XML)", _EXPECTS, _recognises, _read)
+FORMAT = CalibrationFormat(
+    "Qualisys (XML)",
+    _EXPECTS,
+    lambda file: file.content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and b"<fov_video" in file.content,
+    _read,
+)

@@ -5,7 +5,6 @@ One JSON object with a key for each camera, with ``fx fy cx cy`` (pixels), ``R``
 """
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from mvpose import Camera, Rig
 from mvpose.checks import as_array
 from mvpose.files.input_files import CALIBRATION, read_json_object
 from mvpose.files.message_text import prefixed
-from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.calibration_file import CalibrationFormat
 from mvpose.formats.calibration.camera_entry import check_names
 
 _KEYS = ("fx", "fy", "cx", "cy", "R", "T", "k", "p")
@@ -78,15 +77,13 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
     Path(path).write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
 
 
-def _recognises(file: CalibrationFile) -> bool:
-    return any(isinstance(entry, dict) and "fx" in entry for entry in (file.json or {}).values())
-
-
-def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
-    return read_calibration(path, size=size)
-
-
-FORMAT = CalibrationFormat("VoxelPose (JSON)", _EXPECTS, _recognises, _read, write_calibration)
+FORMAT = CalibrationFormat(
+    "VoxelPose (JSON)",
+    _EXPECTS,
+    lambda file: any(isinstance(entry, dict) and "fx" in entry for entry in (file.json or {}).values()),
+    lambda path, *, size, only: read_calibration(path, size=size),
+    write_calibration,
+)
 
 
 def _center(name: str, entry: Any) -> np.ndarray:
