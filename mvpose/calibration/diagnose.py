@@ -104,10 +104,8 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
     findings += of_world + [
         turn_finding(rig, after, result.covariance[view], view, names) for view in sorted(files.turned - useless)
     ]
-    different = any(
-        sufficiency.DIFFERENT in each.text for each in missing
-    )  # then neither files nor clocks can be compared
-    if not different:
+    different = any(sufficiency.DIFFERENT in each.text for each in missing)
+    if not different:  # otherwise neither files nor clocks can be compared
         clocks = estimate_clocks(_with_found_faults(mended, reading, result), sightings, period=period)
         findings += [each for each in clocks.findings() if each.view not in useless]
     if undetermined:

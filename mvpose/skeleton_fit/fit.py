@@ -123,7 +123,7 @@ def _limb(start: str, end: str) -> tuple[tuple[tuple[str, ...], tuple[str, ...]]
     return tuple(((f"{side}_{start}",), (f"{side}_{end}",)) for side in _SIDES)
 
 
-_SPANS = {
+_SPANS = {  # from the middle of some joints to that of others, one or two times in the body
     "trunk": ((_both("hip"), _both("shoulder")),),
     "hip": ((("right_hip",), ("left_hip",)),),
     "shoulder": ((("right_shoulder",), ("left_shoulder",)),),
@@ -131,7 +131,7 @@ _SPANS = {
     "forearm": _limb("elbow", "wrist"),
     "thigh": _limb("hip", "knee"),
     "shank": _limb("knee", "ankle"),
-}  # from the middle of some joints to that of others, one or two times in the body
+}
 _HALVES = ("hip", "shoulder")  # whose span is twice the length
 
 

@@ -12,12 +12,7 @@ from mvpose.formats.detections.detection_file import DetectionFile
 from mvpose.formats.detections.detection_formats import FORMATS, suffixes
 from mvpose.formats.pose2sim_project import folder_names
 
-_INSIDE = (
-    "pose-sync",
-    "pose",
-    "pose-2d",
-    "predictions",
-)  # folders of Pose2Sim's and MMPose's layouts that hold the detections
+_INSIDE = ("pose-sync", "pose", "pose-2d", "predictions")  # folders of Pose2Sim and MMPose that hold detections
 _AFFIXES = re.compile(r"^(alphapose-results_|results_)|(_json|_keypoints|_predictions|_results|_detections)$")
 _SETTINGS = MIB  # bytes
 _KINDS = "OpenPose folders, COCO or AlphaPose results, MMPose predictions or RTMLib arrays (*.json, *.npz)"

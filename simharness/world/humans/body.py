@@ -5,7 +5,7 @@ body stands in an A pose on z = 0 with the pelvis over the origin, facing +x, it
 bone (3, 4) maps points of the rest body to the world.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cache, cached_property
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mvpose.arrays import Floats, Integers
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.skeleton import COCO17, Skeleton
 from simharness.types.sequence import LANDMARKS, of_skeleton
 from simharness.world.humans.anatomy import segments_of_faces
@@ -310,6 +310,11 @@ class Body:
     def _columns(self) -> Floats:
         """``keypoints`` as a matrix (4 B, L)."""
         return np.ascontiguousarray(self.keypoints.reshape(len(self.keypoints), -1).T)
+
+    def skin_of(self, bones: Iterable[str]) -> Bools:
+        """Return which vertices, (n,), move most with one of some bones."""
+        most = self.weight_bones[np.arange(len(self.vertices)), self.weights.argmax(axis=1)]
+        return np.isin(most, [self.index(bone) for bone in bones])
 
     def skin(self, transforms: ArrayLike) -> NDArray[np.float32]:
         """Return the vertices (n, 3) float32 in the world from the bone transforms of one pose (B, 3, 4)."""

@@ -19,11 +19,8 @@ _RIM, _LENS_CORNERS = 0.0035, 12  # width of the rims of glasses, metres; corner
 _LENS = {"rectangular": (0.026, 0.017, 4.0), "round": (0.0225, 0.021, 2.0), "sunglasses": (0.027, 0.0195, 3.0)}
 _COLUMNS, _ROWS = 20, 6  # of the shell of a hat
 _GAP = 0.004  # between a hat or mask and what is below it, metres
-_EDGE = {
-    "cap": (0.46, 0.0),
-    "beanie": (0.44, -0.2),
-    "brimmed": (0.46, 0.0),
-}  # of a hat above the eyes, in front, behind
+# Of a hat above the eyes, in front, behind.
+_EDGE = {"cap": (0.46, 0.0), "beanie": (0.44, -0.2), "brimmed": (0.46, 0.0)}
 _VISOR, _BRIM = 0.068, 0.065  # metres
 _TALLER = {"cap": 0.006, "beanie": 0.016, "brimmed": 0.022}  # height of a hat over the crown beyond the gap, metres
 

@@ -135,9 +135,8 @@ def moved(camera: Camera, rotation: ArrayLike, shift: ArrayLike) -> Camera:
     rotation, shift = np.asarray(rotation, float), np.asarray(shift, float)
     if not rotation.any() and not shift.any():
         return camera
-    R = (
-        Rotation.from_rotvec(rotation).as_matrix().T @ camera.R
-    )  # axes and observed points rotate in opposite directions
+    # Axes and observed points rotate in opposite directions.
+    R = Rotation.from_rotvec(rotation).as_matrix().T @ camera.R
     return replace(camera, R=R, t=-R @ (camera.center + shift))
 
 

@@ -20,7 +20,6 @@ from simharness.world.motion.poses.foot_placement import (
 from simharness.world.motion.poses.inverse_kinematics import (
     Foot,
     arm_angles,
-    pose_angles,
     reach_with,
     shoulder_girdle,
     solve_legs,
@@ -28,10 +27,7 @@ from simharness.world.motion.poses.inverse_kinematics import (
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import Curves, blend, cycle_time, limbs, minimum_jerk, relaxed_posture
 
-_GRIP, _NEARER = (
-    0.75,
-    0.15,
-)  # grip on the box: height and distance behind its centre, as fractions of its height and depth
+_GRIP, _NEARER = 0.75, 0.15  # grip on the box: height, and distance behind its centre, in its heights and depths
 _STRETCH = 0.92  # fraction of the arm length that is used to reach down
 _TOE_ROOM = 0.02  # metres between the toes and the box
 _CARRIED = (0.62, -0.58)  # hands while carrying: ahead of and above the shoulders, as fractions of the arm length
@@ -78,9 +74,8 @@ def carry(
     arm = kinematics.arms["left"]
     length, apart = np.linalg.norm(arm.end - arm.anchors[0]), width / 2 - arm.anchors[0, 1]
     toes = kinematics.soles["left"][:, 0].max() + prints["left"].place[0]
-    held = np.array(
-        [toes + _TOE_ROOM + depth / 2 - _NEARER * depth, -shift / 2]
-    )  # midpoint of the hands, projected to the floor
+    ahead = toes + _TOE_ROOM + depth / 2 - _NEARER * depth
+    held = np.array([ahead, -shift / 2])  # midpoint of the hands, projected to the floor
     # Tall enough to be gripped by this body, or as tall as drawn.
     drop = np.sqrt(max((_STRETCH * length) ** 2 - (held[0] - shoulders[0]) ** 2 - apart**2, 0.0))
     height = max((0.15 + 0.06 * tall) * stature, (shoulders[2] - drop) / _GRIP)
@@ -122,7 +117,7 @@ def _bend(
     )
     hip[:, 0] += foot.place[0]
     pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=np.radians(1.0 + 20.0 * low - 4.0 * up), aside=aside)
-    return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    return solve_legs(kinematics, time, pelvis, height, feet, curves)
 
 
 def _shoulders(kinematics: Kinematics, motion: Motion) -> Floats:

@@ -9,12 +9,11 @@ from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses import timing
 from simharness.world.motion.poses.foot_placement import PEELING, foot_path, hip_position, pelvis_from_hips, stance
-from simharness.world.motion.poses.inverse_kinematics import pose_angles, solve_legs
+from simharness.world.motion.poses.inverse_kinematics import solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 
-_ON_TOES, _TIPPED = np.radians(
-    [-88.0, -94.5]
-).tolist()  # pitch of the rear foot when kneeling: preferred and most negative
+# Pitch of the rear foot when kneeling: preferred and most negative.
+_ON_TOES, _TIPPED = np.radians([-88.0, -94.5]).tolist()
 _ANKLE = float(np.radians(20.0))  # largest dorsiflexion of the rear ankle
 _OTHER = {"left": "right", "right": "left"}
 
@@ -45,7 +44,7 @@ def squat(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
         kinematics, spot, hip, lean=lean, aside=0.004 * timing.smooth_noise(time, rng, 0.2)
     )
     feet = {side: foot_path(kinematics, spot, time, prints[side]) for side in SIDES}
-    return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    return solve_legs(kinematics, time, pelvis, height, feet, curves)
 
 
 @solo_activity("kneel", clearance=0.5)
@@ -87,7 +86,7 @@ def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     low = through(0.0, 0.15, 1.0)
     _rest_on_knee(curves, low, front)
     timing.blend(curves, low, lumbar_flexion=8.0 + 10 * bow, thorax_flexion=5.0 + 8 * bow, neck_flexion=10.0 * look)
-    return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    return solve_legs(kinematics, time, pelvis, height, feet, curves)
 
 
 @solo_activity("crouch", clearance=0.4)
@@ -126,7 +125,7 @@ def crouch(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.G
         neck_flexion=-14.0 + 8.0 * timing.smooth_noise(time, rng, rate),
         neck_rotation=35.0 * timing.smooth_noise(time, rng, rate),
     )
-    return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    return solve_legs(kinematics, time, pelvis, height, feet, curves)
 
 
 def _rest_on_knee(curves: timing.Curves, on: Floats, front: str) -> None:

@@ -8,7 +8,7 @@ from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import Footprint, foot_path, spot_to_world, stance
-from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_standing
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import blend, limb, minimum_jerk, relaxed_posture, smooth_noise
 
@@ -92,12 +92,5 @@ def dance(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
         neck_flexion=2.0 + 8.0 * dip * bouncy,
     )
     pelvis, feet = stances(count)
-    return solve_standing(
-        kinematics,
-        time,
-        pelvis,
-        feet,
-        pose_angles(len(time), **curves),
-        straightest=_STRAIGHTEST,
-        fit=stances(np.linspace(0.0, _BAR, _FITTED)),
-    )
+    whole = stances(np.linspace(0.0, _BAR, _FITTED))
+    return solve_standing(kinematics, time, pelvis, feet, curves, straightest=_STRAIGHTEST, fit=whole)

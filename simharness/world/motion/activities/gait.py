@@ -39,9 +39,8 @@ _VIGOUR = (0.3, 1.6)  # range of amplitudes, relative to the curves, in which a 
 _PELVIS_TURN, _PELVIS_LIST, _PELVIS_SWAY = np.radians(5.0), np.radians(3.5), 0.018
 
 FOOT_FLAT, _HEEL_RISE = 0.1, 0.45  # fractions of the stride at foot flat and at heel rise
-_STIFF_TOES = np.radians(
-    250.0
-)  # toes do not bend in this model: a heel that rose fully over their tips would lift the leg
+# Toes do not bend in this model: a heel that rose fully over their tips would lift the leg.
+_STIFF_TOES = np.radians(250.0)
 _EARLY = 0.03  # fraction of the stride by which feet land nearer; otherwise the leg would be too short at heel strike
 _HASTE = 1.02  # the foot is above its next footprint a little before it lands
 _CLEARANCE = 0.02  # metres between the swinging foot and the floor

@@ -19,7 +19,6 @@ from simharness.world.motion.poses.foot_placement import foot_path, spot_to_worl
 from simharness.world.motion.poses.inverse_kinematics import (
     Pelvis,
     arm_angles,
-    pose_angles,
     reach_with,
     solve_legs,
     solve_standing,
@@ -71,7 +70,7 @@ def reach(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
         thorax_rotation=-sign * 14.0,
         neck_flexion=2.0,
     )
-    motion = solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    motion = solve_legs(kinematics, time, pelvis, height, feet, curves)
 
     arm = kinematics.arms[side]
     shoulder, length = arm.anchors[0], float(np.linalg.norm(arm.end - arm.anchors[0]))
@@ -138,15 +137,7 @@ def gesture(name: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng:
     ends = np.array([[ahead, left] for ahead in (-_FURTHEST, _FURTHEST) for left in (-_FURTHEST, _FURTHEST)])
     corners = _shifted(spot, *ends.T, turned=np.zeros(4), lean=np.zeros(4))
     planted = {side: foot_path(kinematics, spot, np.zeros(4), stance(kinematics, side)) for side in SIDES}
-    return solve_standing(
-        kinematics,
-        time,
-        pelvis,
-        feet,
-        pose_angles(len(time), **curves),
-        straightest=_STRAIGHTEST,
-        fit=(corners, planted),
-    )
+    return solve_standing(kinematics, time, pelvis, feet, curves, straightest=_STRAIGHTEST, fit=(corners, planted))
 
 
 def _shifted(spot: Spot, forward: Floats, aside: Floats, *, turned: Floats, lean: Floats) -> Pelvis:

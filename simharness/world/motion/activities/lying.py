@@ -18,7 +18,7 @@ from simharness.world.motion.poses.foot_placement import (
     spot_to_world,
     stance,
 )
-from simharness.world.motion.poses.inverse_kinematics import arm_angles, pose_angles, reach_with, solve_legs
+from simharness.world.motion.poses.inverse_kinematics import arm_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 
 _SITTING = 0.68  # distance from ankles to hips when sitting on the floor with bent knees, in leg lengths
@@ -26,19 +26,8 @@ _BACK = 0.05  # additional distance when lying, in leg lengths
 _STRETCHED = 0.965  # distance from ankles to hips with stretched legs, in leg lengths
 _HEELS = np.radians(10.0)  # pitch of the feet while sitting on the floor, on the heels
 _TOES_UP = np.radians(58.0)  # pitch of the feet while lying
-_LYING: tuple[str, ...] = (
-    "Hips",
-    "LHipJoint",
-    "RHipJoint",
-    "LowerBack",
-    "Spine",
-    "Spine1",
-    "Neck",
-    "Neck1",
-    "Head",
-    "LeftShoulder",
-)
-_LYING += ("RightShoulder", "LeftUpLeg", "RightUpLeg")
+_LYING = {"Hips", "LHipJoint", "RHipJoint", "LowerBack", "Spine", "Spine1", "Neck", "Neck1", "Head"}
+_LYING |= {"LeftShoulder", "RightShoulder", "LeftUpLeg", "RightUpLeg"}
 _SAMPLES, _SPARE = 14, 0.002  # metres: extra height of the trunk, which moves a little with the legs
 # In statures: distance of the hands from the midline; heights of the palm on its thumb and on its edge.
 _HANDS, _THUMB, _EDGE = 0.2, 0.042, 0.05
@@ -101,16 +90,14 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
     timing.blend(curves, low, lumbar_flexion=18.0, thorax_flexion=12.0, neck_flexion=-8.0, thorax_rotation=0.0)
     timing.blend(curves, low * (1 - down), **timing.limbs(shoulder_flexion=70.0, elbow_flexion=15.0))
     timing.blend(curves, down, **trunk, neck_rotation=14.0 * roll * timing.smooth_noise(time, rng, 0.12))
-    motion = solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    motion = solve_legs(kinematics, time, pelvis, height, feet, curves)
 
     # The hands support the body behind the hips, and finally lie beside them.
     seat = ankle - _SITTING * length
     arm = kinematics.arms["left"]
     reach = 0.955 * float(np.linalg.norm(arm.end - arm.anchors[0]))
-    behind, beside = (
-        seat - 0.3 * length,
-        lying - arm.anchors[0, 2] + reach,
-    )  # nearly straight: bent elbows would be below the floor
+    behind = seat - 0.3 * length
+    beside = lying - arm.anchors[0, 2] + reach  # nearly straight: bent elbows would be below the floor
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         ahead, left = behind + roll * (beside - behind), np.full(len(time), sign * _HANDS * kinematics.body.stature)
         over = (_THUMB + roll * (_EDGE - _THUMB) + 0.25 * (1 - down)) * kinematics.body.stature
@@ -154,15 +141,14 @@ def _hip_height(kinematics: Kinematics, roll: Floats) -> Floats:
     trunk = _trunk(share)
     lean = np.radians(trunk.pop("lean"))
     body, spot, length = kinematics.body, Spot(np.zeros(2), 0.0), kinematics.leg_length
-    most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
-    lying = np.isin(most, [body.index(name) for name in _LYING])
+    lying = body.skin_of(_LYING)
     prints = {side: stance(kinematics, side, out=_OUT) for side in SIDES}
     feet = {side: foot_path(kinematics, spot, share, prints[side], pitch=_HEELS) for side in SIDES}
     height = np.full(_SAMPLES, 0.1)
     for _ in range(2):
         hip = np.stack([prints["left"].place[0] - (_SITTING + _BACK * share) * length, height], axis=-1)
         pelvis, up = pelvis_from_hips(kinematics, spot, hip, lean=lean)
-        motion = solve_legs(kinematics, share, pelvis, up, feet, pose_angles(_SAMPLES, **trunk))
+        motion = solve_legs(kinematics, share, pelvis, up, feet, trunk)
         lowest = [body.skin(pose)[lying, 2].min() for pose in kinematics.transforms(motion)]
         height = height + _SPARE - np.array(lowest, float)
     return PchipInterpolator(share, height)(roll)

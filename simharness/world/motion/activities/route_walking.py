@@ -31,7 +31,6 @@ from simharness.world.motion.poses.inverse_kinematics import (
     Pelvis,
     follow_shank,
     pelvis_height,
-    pose_angles,
     solve_legs,
 )
 from simharness.world.motion.poses.kinematics import Kinematics
@@ -112,7 +111,7 @@ def walk_route(
     for side, each in steps.items():
         foot = partial(each.foot, time)
         feet[side] = foot(follow_shank(kinematics, side, pelvis, height, each.pitch(time), foot))
-    return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    return solve_legs(kinematics, time, pelvis, height, feet, curves)
 
 
 _TOE_OUT = np.radians(7.0)

@@ -18,7 +18,7 @@ from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
 from simharness.world.motion.poses.foot_placement import leftward
-from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_standing
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease
 
@@ -75,8 +75,7 @@ def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gene
     arms = (0.75 + 0.5 * swing) * (0.5 + 0.5 * vigour)
     turned = np.degrees(pelvis.bearing - loop.heading(time))
     bank = np.degrees(_bank(loop, time))
-    angles = pose_angles(
-        len(time),
+    posture: dict[str, ArrayLike] = dict(
         lumbar_flexion=3.0,
         thorax_flexion=3.0,
         neck_flexion=-6.0 + 4.0 * droop,
@@ -93,7 +92,7 @@ def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gene
         **{f"{side}_clavicle_elevation": 3.0 for side in SIDES},
     )
     lap, strides = laps(loop, stride)
-    return solve_standing(kinematics, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=stances(lap, strides))
+    return solve_standing(kinematics, time, pelvis, feet, posture, straightest=_STRAIGHTEST, fit=stances(lap, strides))
 
 
 def _bank(loop: Loop, time: Floats) -> Floats:

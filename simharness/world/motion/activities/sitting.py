@@ -11,7 +11,7 @@ from simharness.world.motion.activity_registry import activity
 from simharness.world.motion.motion import Performance, Prop, Trajectory
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.poses import foot_placement
-from simharness.world.motion.poses.inverse_kinematics import pose_angles, reach_with, solve_legs
+from simharness.world.motion.poses.inverse_kinematics import reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import blend, cycle_time, ease, limbs, minimum_jerk, relaxed_posture
 
@@ -73,7 +73,7 @@ def sit(
     blend(curves, bow, lumbar_flexion=14.0, thorax_flexion=10.0, neck_flexion=-10.0)
     blend(curves, np.maximum(seated, bow), **limbs(shoulder_flexion=24.0, shoulder_abduction=10.0, elbow_flexion=58.0))
     feet = {side: foot_placement.foot_path(kinematics, track, time, prints[side]) for side in SIDES}
-    motion = solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    motion = solve_legs(kinematics, time, pelvis, height, feet, curves)
     lap = _knee(kinematics)[0] + ankle - (0.2 + 0.35 * along) * kinematics.leg_parts[0]
     for side in SIDES:
         place = foot_placement.spot_to_world(
@@ -114,8 +114,7 @@ def fit_seat(kinematics: Kinematics, *, below_knee: float) -> Seat:
     upper, knee = kinematics.leg_parts[0], _knee(kinematics)
     height, front = float(knee[1] - below_knee), float(knee[0] - _KNEE_ROOM)
     body, spot, count = kinematics.body, Spot(np.zeros(2), 0.0), len(_LEANS)
-    most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
-    lap = np.isin(most, [body.index(name) for name in _LAP])
+    lap = body.skin_of(_LAP)
     prints = {side: foot_placement.stance(kinematics, side) for side in SIDES}
     prints = {side: foot.moved(-foot.place[0]) for side, foot in prints.items()}
     feet = {side: foot_placement.foot_path(kinematics, spot, np.zeros(count), prints[side]) for side in SIDES}
@@ -124,7 +123,7 @@ def fit_seat(kinematics: Kinematics, *, below_knee: float) -> Seat:
         across = np.sqrt(np.maximum(upper**2 - (up - knee[1]) ** 2, 0.0))
         hip = np.stack([knee[0] - across, up], axis=-1)
         pelvis, high = foot_placement.pelvis_from_hips(kinematics, spot, hip, lean=_LEANS)
-        motion = solve_legs(kinematics, np.arange(float(count)), pelvis, high, feet, pose_angles(count))
+        motion = solve_legs(kinematics, np.arange(float(count)), pelvis, high, feet, {})
         skins = np.array([body.skin(pose)[lap] for pose in kinematics.transforms(motion)], float)
         over = np.where(skins[..., 0] < front, skins[..., 2], np.inf)
         up = up + height - over.min(axis=1)

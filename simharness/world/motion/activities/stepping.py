@@ -17,7 +17,7 @@ from simharness.world.motion.poses.foot_placement import (
     spot_to_world,
     stance,
 )
-from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_legs, solve_standing
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, solve_legs, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import blend, bump, cycle_time, limb, minimum_jerk, relaxed_posture
 
@@ -79,15 +79,8 @@ def turn(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gen
     curves = relaxed_posture(time, rng)
     curves["neck_rotation"] = curves["neck_rotation"] + np.clip(0.9 * early, -45.0, 45.0)
     curves["thorax_rotation"] = curves["thorax_rotation"] + np.clip(0.25 * early, -15.0, 15.0)
-    return solve_standing(
-        kinematics,
-        time,
-        pelvis,
-        feet,
-        pose_angles(len(time), **curves),
-        straightest=_STRAIGHTEST,
-        fit=stances(np.linspace(0.0, marks[-1], _FITTED)),
-    )
+    whole = stances(np.linspace(0.0, marks[-1], _FITTED))
+    return solve_standing(kinematics, time, pelvis, feet, curves, straightest=_STRAIGHTEST, fit=whole)
 
 
 @activity("step", clearance=0.3)
@@ -155,7 +148,7 @@ def step(
     for side, sign in ((lead, -1.0), (trail, 1.0)):
         curves[f"{side}_shoulder_flexion"] = curves[f"{side}_shoulder_flexion"] + sign * (10 + 14 * swing) * moving
     blend(curves, bump(u, 0.1, up) + bump(u, stood, down), neck_flexion=14.0, **limb(lead, elbow_flexion=28.0))
-    motion = solve_legs(kinematics, time, pelvis, rise, feet, pose_angles(len(time), **curves))
+    motion = solve_legs(kinematics, time, pelvis, rise, feet, curves)
     foot = kinematics.soles["left"]
     front, back = above["left"].place[0] + foot[:, 0].max(), above["left"].place[0] + foot[:, 0].min()
     depth = float(front - back) + 0.08

@@ -9,7 +9,7 @@ from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
 from simharness.world.motion.poses.foot_placement import Footprints
-from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_standing
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import limbs
 
@@ -50,10 +50,9 @@ def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gen
     curves["thorax_bending"] = 0.4 * np.degrees(pelvis.list) + 0.2 * np.degrees(bank)
     look = np.degrees(np.clip(0.5 * loop.curvature(time), -0.6, 0.6))  # into the bend
     curves["neck_rotation"] = curves["neck_rotation"] + look
-    hands = limbs(shoulder_rotation=8.0, forearm_pronation=15.0, wrist_flexion=6.0)
-    angles = pose_angles(len(time), **curves, **hands)
+    posture = curves | limbs(shoulder_rotation=8.0, forearm_pronation=15.0, wrist_flexion=6.0)
     lap, strides = laps(loop, gait)
-    return solve_standing(kinematics, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=stances(lap, strides))
+    return solve_standing(kinematics, time, pelvis, feet, posture, straightest=_STRAIGHTEST, fit=stances(lap, strides))
 
 
 def laps(loop: Loop, gait: Gait) -> tuple[Floats, Floats]:

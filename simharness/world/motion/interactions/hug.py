@@ -203,9 +203,8 @@ def _approach(
 ) -> Motion:
     """Return the motion of stepping up to the other and back, with hanging arms."""
     pelvis, feet = _steps(mover, home, course, u)
-    angles = inverse_kinematics.pose_angles(len(u), **curves)
     whole = _steps(mover, home, course, np.linspace(0.0, course.end, 80))
-    motion = inverse_kinematics.solve_standing(mover, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=whole)
+    motion = inverse_kinematics.solve_standing(mover, time, pelvis, feet, curves, straightest=_STRAIGHTEST, fit=whole)
     near = course.near(u)
     return blend_angles(lean_forward(motion, lean * near), near, neck_bending=9.0)
 
@@ -289,8 +288,7 @@ def _palm_on_trunk(mover: Kinematics, height: float, left: float, wrap: float) -
         wrap: how far round the arm reaches: 1 to the back, 0 to the flank only.
     """
     body = mover.body
-    most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
-    trunk = mover.neutral_skin[np.isin(most, [body.index(name) for name in _TRUNK])]
+    trunk = mover.neutral_skin[body.skin_of(_TRUNK)]
     height = float(np.clip(height, trunk[:, 2].min() + _LEVEL, trunk[:, 2].max() - _LEVEL))
     near = trunk[np.argsort(np.abs(trunk[:, 1] - left) + np.abs(trunk[:, 2] - height))[:40]]
     back = np.array([near[:, 0].min() - _ON_SKIN, left, height])

@@ -15,7 +15,7 @@ from simharness.world.motion.interactions import partners
 from simharness.world.motion.motion import Motion, Performance, Prop, Trajectory
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import foot_path, pelvis_from_hips, spot_to_world, stance
-from simharness.world.motion.poses.inverse_kinematics import pose_angles, reach_with, solve_legs
+from simharness.world.motion.poses.inverse_kinematics import reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import blend, gesture_envelope, relaxed_posture, smooth_noise
 
@@ -123,7 +123,7 @@ def _seated(mover: Kinematics, seat: Seat, home: Spot, time: Floats, rng: np.ran
     for side in SIDES:
         print_ = stance(mover, side, apart=1.15)
         feet[side] = foot_path(mover, home, time, print_.moved(ankles - print_.place[0]))
-    return solve_legs(mover, time, pelvis, height, feet, pose_angles(len(time), **curves)), ankles
+    return solve_legs(mover, time, pelvis, height, feet, curves), ankles
 
 
 def _chair(seat: Seat, home: Spot, ankles: float, time: Floats) -> Prop:

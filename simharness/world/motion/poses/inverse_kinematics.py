@@ -55,20 +55,12 @@ class Pelvis:
         return Rotation.from_euler("ZYX", np.stack([self.bearing, self.lean, self.list], axis=-1))
 
 
-def pose_angles(frames: int, **degrees: ArrayLike) -> Floats:
-    """Return angles (T, D) in radians from named curves or constants in degrees; all others are 0."""
-    angles = np.zeros((frames, len(DOFS)))
-    for name, value in degrees.items():
-        angles[:, DOFS.index(name)] = np.radians(value)
-    return angles
-
-
 def solve_standing(
     kinematics: Kinematics,
     time: Floats,
     pelvis: Pelvis,
     feet: Mapping[str, Foot],
-    angles: Floats,
+    posture: Mapping[str, ArrayLike],
     *,
     straightest: float,
     fit: tuple[Pelvis, Mapping[str, Foot]] | None = None,
@@ -80,13 +72,13 @@ def solve_standing(
         time: times in seconds, (T,).
         pelvis: motion of the pelvis.
         feet: motion of the feet by side.
-        angles: angles of the upper body, (T, D); the columns of the legs are overwritten.
+        posture: curves (T,) or constants of the upper body by degree of freedom, degrees; all others are 0.
         straightest: smallest flexion of a knee, radians; it determines the height.
         fit: pelvis and feet to which the height is fitted, if it must not depend on ``time``: their whole cycle, or its
             extremes; None: ``pelvis`` and ``feet``.
     """
     height = highest_pelvis(kinematics, *(fit or (pelvis, feet)), straightest=straightest)
-    return solve_legs(kinematics, time, pelvis, height, feet, angles)
+    return solve_legs(kinematics, time, pelvis, height, feet, posture)
 
 
 def highest_pelvis(kinematics: Kinematics, pelvis: Pelvis, feet: Mapping[str, Foot], *, straightest: float) -> float:
@@ -105,7 +97,7 @@ def solve_legs(
     pelvis: Pelvis,
     height: ArrayLike,
     feet: Mapping[str, Foot],
-    angles: Floats,
+    posture: Mapping[str, ArrayLike],
     *,
     guess: Mapping[str, Floats] | None = None,
 ) -> Motion:
@@ -117,13 +109,15 @@ def solve_legs(
         pelvis: motion of the pelvis; ``bob`` is added to the height.
         height: height of the pelvis above the floor, (T,) or constant, metres.
         feet: target motion of the feet by side.
-        angles: angles of the upper body, (T, D); the columns of the legs are overwritten.
+        posture: curves (T,) or constants of the upper body by degree of freedom, degrees; all others are 0.
         guess: by side, start values of hip flexion, knee flexion and ankle dorsiflexion, (T, 3) or (3,), radians; None:
             the solution for a leg in the sagittal plane.
     """
     turn = pelvis.turn.as_matrix()
     position = np.column_stack([pelvis.ground, np.asarray(height, float) + pelvis.bob])
-    angles = angles.copy()
+    angles = np.zeros((len(position), len(DOFS)))
+    for name, value in posture.items():
+        angles[:, DOFS.index(name)] = np.radians(value)
     order = kinematics.leg_order
     sagittal = [order.index(name) for name in ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")]
     inward = turn.swapaxes(1, 2)

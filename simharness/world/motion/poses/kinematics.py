@@ -144,8 +144,7 @@ class Kinematics:
     def _palm(self, side: str) -> Floats:
         """Return the centre of the palm in the neutral pose, on the skin, (3,) metres."""
         body, bones = self.body, [f"{side.capitalize()}{name}" for name in ("Hand", "FingerBase", "HandFinger1")]
-        most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
-        hand = self.neutral_skin[np.isin(most, [body.index(name) for name in bones])]
+        hand = self.neutral_skin[body.skin_of(bones)]
         middle = (self._head(bones[0]) + self._head(bones[-1])) / 2  # between wrist and knuckles
         slice_ = hand[np.abs(hand[:, 2] - middle[2]) < _PALM]
         inward = -np.sign(middle[1])

@@ -16,7 +16,6 @@ from simharness.world.motion.poses.inverse_kinematics import (
     dorsiflexion,
     follow_shank,
     pelvis_height,
-    pose_angles,
     solve_legs,
 )
 from simharness.world.motion.routes import Itinerary
@@ -114,9 +113,7 @@ def test_dorsiflexion_is_that_of_the_solved_leg_and_the_heel_rises_only_near_the
     pelvis = Pelvis(np.zeros((60, 2)), still, still, still, still)
 
     def solved(pitch):
-        motion = solve_legs(
-            mover, np.arange(60.0), pelvis, height, {side: foot(pitch) for side in SIDES}, pose_angles(60)
-        )
+        motion = solve_legs(mover, np.arange(60.0), pelvis, height, {side: foot(pitch) for side in SIDES}, {})
         return motion.angles[:, DOFS.index("left_ankle_dorsiflexion")]
 
     hips = np.tile(hip + [0.0, 0.0, height], (60, 1))
