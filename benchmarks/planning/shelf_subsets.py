@@ -20,11 +20,14 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import spearmanr
 
+from benchmarks.planning.recorded_scenes import recorded_scenes
 from mvpose import COCO17, SHELF14, Camera
 from mvpose.arrays import Bools, Floats
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.viewing_conditions import world_offsets
 from simharness.planning import FastLayer, Volume
+from simharness.planning.fast_layer import reconstruct
+from simharness.planning.standing_people import pose_pool
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import AnnotationModel
 from simharness.reality.detector_fit.fit import fit
@@ -167,14 +170,10 @@ def predicted_pcp(
         seed: seed of all draws.
         repeats: number of people at each place.
     """
-    layer = FastLayer.in_volume(
-        Volume.around(people.joints),
-        detector=read_profile(detector),
-        orientations=repeats,
-        tracks=people.joints,
-        seed=seed,
-    )
-    scenes, terms, result = layer.scenes, [layer.terms(camera) for camera in people.cameras], {}
+    volume = Volume.around(people.joints)
+    scenes, frames = recorded_scenes(people.joints, pose_pool(), volume.places(0.5), repeats=repeats, seed=seed)
+    layer = FastLayer(volume, scenes, read_profile(detector), seed=seed)
+    terms, result = [layer.terms(camera) for camera in people.cameras], {}
     truth = coco17_to_shelf14(scenes.joints)
     if annotation is not None:
         shown = scenes.joints.copy()  # annotated heads are fitted to the detected face, as in twins
@@ -182,9 +181,9 @@ def predicted_pcp(
         truth = annotation.annotate(
             shown, np.arange(0.0, 10.0 * len(scenes), 10.0), seed=seed
         )  # errors last less than 10 s
-    scored = people.scored[scenes.frame] & scenes.present
+    scored = people.scored[frames] & scenes.present
     for views in camera_subsets(len(people.cameras)):
-        made = layer.reconstruct([terms[view] for view in views], variant="full")
+        made = reconstruct([terms[view] for view in views], variant="full")
         correct = part_states(truth, coco17_to_shelf14(fill_face(made.nearest))) == Part.CORRECT
         result[views] = float(np.mean([100.0 * correct[:, actor][scored[:, actor]].mean() for actor in actors]))
     return result

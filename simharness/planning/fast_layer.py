@@ -65,7 +65,6 @@ class FastLayer:
         draws: int = 1,
         obstacles: Sequence[Box] = (),
         activities: Sequence[str] = ACTIVITIES,
-        tracks: Floats | None = None,
         seed: int = 0,
     ) -> "FastLayer":
         """Draw the scenes of a volume.
@@ -73,14 +72,12 @@ class FastLayer:
         Args:
             volume: where people stand.
             detector: profile of the detector (:func:`simharness.scenario.presets.read_profile`).
-            people: number of people at a time; with tracks, those people stand as recorded.
+            people: number of people at a time.
             spacing: metres between the places of the map.
             orientations: number of directions in which somebody stands at each place, per draw.
             draws: number of draws of everything else at each place and direction.
             obstacles: boxes that hide people; nobody stands in them.
             activities: activities of the simulator from which poses are taken.
-            tracks: joints of recorded people who walk in the volume, COCO-17, (T, P, 17, 3), metres, NaN where a
-                person is absent.
             seed: seed of all draws.
 
         Raises:
@@ -93,7 +90,6 @@ class FastLayer:
             spacing=spacing,
             repeats=orientations * draws,
             obstacles=obstacles,
-            tracks=tracks,
             seed=seed,
         )
         return cls(volume, scenes, detector, tuple(obstacles), seed)
@@ -133,10 +129,6 @@ class FastLayer:
                 unknown variant.
         """
         return _prediction(self.scenes, terms, reconstruct(terms, variant=variant))
-
-    def reconstruct(self, terms: Sequence[CameraTerms], *, variant: str = "") -> "Reconstruction":
-        """Return what the method makes of everyone in every scene; arguments as of :meth:`predict`."""
-        return reconstruct(terms, variant=variant)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Bools, Floats, Integers
-from mvpose.checks import as_array
 from simharness.detector.viewing_conditions import body_axes
 from simharness.scenario.sections.people_section import ActivityName
 from simharness.types.floor import Floor, Volume
@@ -31,7 +30,6 @@ _BODIES, _POSES = 6, 48  # bodies of the pool, and poses of each
 _FIRST, _LAST = 0.5, 9.5  # seconds of the motion from which poses are taken
 _AREA = 6.0  # metres, half the side of the square in which the people of the pool move
 _NOWHERE = np.array([0.0, 0.0, -1e4])  # position of absent people: no ray goes there
-_LIMBS = slice(5, 17)  # of COCO-17: shoulders to ankles
 _EXTREMES = 100  # directions in which the outermost vertices of a pose are taken
 _CLEARANCE = 0.25  # metres around an obstacle where nobody stands: half the width of a person
 _OVERHEAD = 1.9  # metres: people stand under an obstacle that begins higher
@@ -74,12 +72,6 @@ class PosePool:
 
     def __len__(self) -> int:
         return len(self.landmarks)
-
-    def nearest(self, joints: Floats) -> Integers:
-        """Return the pose whose limbs are nearest to those of n poses (n, 17, 3) over the origin, facing +x, (n,)."""
-        own = self.landmarks[:, _LIMBS].reshape(len(self), -1)
-        given = np.nan_to_num(joints[:, _LIMBS].reshape(len(joints), -1))
-        return ((given**2).sum(axis=1)[:, None] - 2 * given @ own.T + (own**2).sum(axis=1)).argmin(axis=1)
 
 
 def pose_pool(activities: Sequence[str] = ACTIVITIES) -> PosePool:
@@ -194,30 +186,19 @@ class StandingScenes:
     """Positions of all landmarks, (S, Q, L, 3), metres."""
     capsules: Floats
     """Ends of the axes of all capsules, (S, Q, C, 2, 3), metres."""
-    frame: Integers
-    """Recorded frame of each scene, (S,); -1 of a scene that is drawn."""
 
     @classmethod
     def posed(
-        cls,
-        pool: PosePool,
-        places: Floats,
-        place: Integers,
-        pose: Integers,
-        position: Floats,
-        angle: Floats,
-        *,
-        frame: Integers | None = None,
+        cls, pool: PosePool, places: Floats, place: Integers, pose: Integers, position: Floats, angle: Floats
     ) -> Self:
         """Return the scenes with people at positions (S, Q, 2), NaN where absent, facing angles (S, Q), radians."""
-        frame = np.full(len(place), -1) if frame is None else frame
         present = np.isfinite(position).all(axis=-1) & np.isfinite(angle)
         turn = _turns(np.where(present, angle, 0.0))
         flat = np.concatenate([position, np.zeros((*position.shape[:2], 1))], axis=-1)
         here = np.where(present[..., None], flat, _NOWHERE)
         landmarks = np.einsum("sqij,sqlj->sqli", turn, pool.landmarks[pose]) + here[:, :, None]
         capsules = np.einsum("sqij,sqcej->sqcei", turn, pool.capsules[pose]) + here[:, :, None, None]
-        return cls(pool, places, place, pose, here, turn, present, landmarks, capsules, frame)
+        return cls(pool, places, place, pose, here, turn, present, landmarks, capsules)
 
     def __len__(self) -> int:
         return len(self.place)
@@ -248,13 +229,11 @@ def standing_scenes(
     spacing: float = 0.5,
     repeats: int = 16,
     obstacles: Sequence[Box] = (),
-    tracks: Floats | None = None,
     seed: int = 0,
 ) -> StandingScenes:
     """Draw scenes in which every place of the volume is taken ``repeats`` times, facing evenly spread directions.
 
-    The others in a scene stand at other places, at random. With tracks, scenes are recorded frames: ``repeats`` times
-    as many people as there are places, with the pool's poses that are nearest to the recorded ones.
+    The others in a scene stand at other places, at random.
 
     Args:
         volume: where people stand.
@@ -263,8 +242,6 @@ def standing_scenes(
         spacing: metres between places.
         repeats: number of times that somebody stands at each place.
         obstacles: boxes in which nobody stands.
-        tracks: joints of recorded people who walk in the volume, COCO-17, (T, P, 17, 3), metres, NaN where a person is
-            absent.
         seed: seed of the draws.
 
     Raises:
@@ -278,9 +255,6 @@ def standing_scenes(
         places = places[~taken.contains(places)]
     if not len(places):
         raise ValueError("obstacles take the whole floor of the volume: nobody can stand in it; move or remove some")
-    if tracks is not None:
-        tracks = as_array(tracks, ("T", "P", 17, 3), "joints of recorded people")
-        return _recorded_scenes(tracks, pool, places, repeats=repeats, seed=seed)
     rng = stream(seed, "planning", "places")
     target = np.tile(np.arange(len(places)), repeats)
     position = places[target] + spacing * (rng.random((len(target), 2)) - 0.5)
@@ -326,20 +300,3 @@ def _grouped(position: Floats, order: Integers, people: int) -> Integers:
         while len(incomplete) < people:
             incomplete.append(next(spare))
     return np.array(groups)
-
-
-def _recorded_scenes(tracks: Floats, pool: PosePool, places: Floats, *, repeats: int, seed: int) -> StandingScenes:
-    """Return scenes whose people stand as in recorded frames, evenly spread over the recording."""
-    here = np.asarray(np.isfinite(tracks[..., [5, 6, 11, 12], :]).all(axis=(-1, -2)))
-    frames = np.flatnonzero(here.any(axis=1))
-    wanted = max(1, round(repeats * len(places) / max(here[frames].sum(axis=1).mean(), 1.0)))
-    offset = stream(seed, "planning", "frames").random()
-    chosen = frames[((np.arange(wanted) + offset) / wanted * len(frames)).astype(int)]
-    joints, present = tracks[chosen], here[chosen]
-    position = np.where(present[..., None], joints[:, :, 11:13, :2].mean(axis=2), np.nan)
-    angle = np.where(present, bearings_of(joints), np.nan)
-    local = joints - np.concatenate([position, np.zeros((*present.shape, 1))], axis=-1)[:, :, None]
-    local = np.einsum("sqji,sqlj->sqli", _turns(np.nan_to_num(angle)), local)
-    pose = pool.nearest(local.reshape(-1, 17, 3)).reshape(present.shape)
-    away = ((np.nan_to_num(position)[:, :, None] - places) ** 2).sum(axis=-1)
-    return StandingScenes.posed(pool, places, away.argmin(axis=-1), pose, position, angle, frame=chosen)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import Polygon, Rectangle
 
@@ -11,11 +12,12 @@ from mvpose import Camera
 from mvpose.arrays import Floats
 from mvpose.report.rig_plots import MapLabel, cone_from_above, write_labels
 from mvpose.report.svg_plots import FAINT, INK, LINE, svg_plot
-from simharness.planning.floor_coverage import grid_spacing
+from simharness.outputs.planning.rehearsal_plots import draw_cells
 from simharness.planning.plan_result import RigPlan
 from simharness.planning.planned_room import Room
 
 _COLORS = LinearSegmentedColormap.from_list("quality", ["#b3261e", "#e8a33d", "#f2e3a0", "#7cc4a4", "#1f7a51"])
+_UNKNOWN = (0.5, 0.5, 0.5, 0.4)
 _SIZE = (5.2, 3.1)
 _SIMULATED, _LAYER = "#d9643a", "#3b82c4"
 CAMERA, FIXED, PLACE, VOLUME, OBSTACLE, DOOR = "#d9643a", "#8a63c9", "#3b82c4", "#2e9e6b", "#8b93a1", "#d9a514"
@@ -75,18 +77,17 @@ def room_from_side(
     wide = float(high - low) + 2 * _MARGIN
     height = (_SIDE_WIDTH - _PAD[0]) * (room.space.height + 0.6) / wide + _PAD[1]
     with svg_plot(name, size=(_SIDE_WIDTH, height)) as (axes, written):
-        axes.add_patch(_rectangle(low, high, 0.0, room.space.height, fc="none", ec=INK, lw=2.2, zorder=2))
-        along = room.volume.outline[:, axis]
-        axes.add_patch(
-            _rectangle(
-                along.min(), along.max(), 0.0, room.volume.height, fc=VOLUME, ec=VOLUME, alpha=0.16, lw=1.2, zorder=1
-            )
-        )
-        for box in room.obstacles:
-            span, (bottom, top) = box.corners[:, axis], (box.center[2] - box.half[2], box.center[2] + box.half[2])
-            axes.add_patch(
-                _rectangle(span.min(), span.max(), bottom, top, fc=OBSTACLE, ec=FAINT, alpha=0.5, lw=0.8, zorder=1.5)
-            )
+        walls = Rectangle((low, 0.0), high - low, room.space.height, fc="none", ec=INK, lw=2.2, zorder=2)
+        left, across = room.volume.outline[:, axis].min(), np.ptp(room.volume.outline[:, axis])
+        volume = Rectangle((left, 0.0), across, room.volume.height, color=VOLUME, alpha=0.16, lw=1.2, zorder=1)
+        boxes = [
+            Rectangle(each.corners[:, [axis, 2]].min(axis=0), *np.ptp(each.corners[:, [axis, 2]], axis=0))
+            for each in room.obstacles
+        ]
+        obstacles = PatchCollection(boxes, fc=OBSTACLE, ec=FAINT, alpha=0.5, lw=0.8, zorder=1.5)
+        axes.add_patch(walls)
+        axes.add_patch(volume)
+        axes.add_collection(obstacles)
         if places is not None and len(places):
             axes.scatter(places[:, axis], places[:, 2], s=10, c=PLACE, alpha=0.25, lw=0, zorder=3)
         for camera in cameras:
@@ -141,22 +142,13 @@ def place_map(name: str, plan: RigPlan, values: Floats, *, worst: float, best: f
         best: value of the best colour.
         digits: digits of the written values.
     """
-    places = plan.prediction.places
     low, high = plan.room.space.bounds[0] - 0.3, plan.room.space.bounds[1] + 0.3
     tall = float((high - low)[1] / (high - low)[0])
-    side = grid_spacing(places)
     with svg_plot(name, size=(_SIZE[0], _SIZE[0] * tall)) as (axes, written):
         draw_room(axes, plan.room)
-        for place, value in zip(places, values, strict=True):
-            share = float(np.clip((value - worst) / (best - worst), 0.0, 1.0)) if np.isfinite(value) else 0.0
-            color = _COLORS(share) if np.isfinite(value) else (0.5, 0.5, 0.5, 0.4)
-            axes.add_patch(Rectangle(tuple(place - side / 2), side, side, fc=color, ec="none", zorder=2.2))
-            text = f"{value:.{digits}f}" if np.isfinite(value) else "–"
-            dark = 0.25 < share < 0.85
-            axes.text(
-                place[0], place[1], text, ha="center", va="center", fontsize=6.2,
-                color="#1b1d21" if dark else "#ffffff", zorder=3,
-            )  # fmt: skip
+        shares = np.where(np.isfinite(values), np.clip((values - worst) / (best - worst), 0.0, 1.0), np.nan)
+        colors = np.array([_COLORS(share) if np.isfinite(share) else _UNKNOWN for share in shares])
+        draw_cells(axes, plan.prediction.places, values, colors, digits=digits)
         for camera in plan.rig:
             axes.plot(*camera.center[:2], "o", color=CAMERA, ms=5, mec="white", mew=0.7, zorder=5)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -231,11 +223,6 @@ def _label(axes: Axes, room: Room, cameras: Sequence[Camera]) -> None:
         ],
         areas=[(corners.min(axis=0), corners.max(axis=0)) for corners in boxes],
     )
-
-
-def _rectangle(left: float, right: float, bottom: float, top: float, **style: object) -> Polygon:
-    corners = np.array([[left, bottom], [right, bottom], [right, top], [left, top]])
-    return Polygon(corners, closed=True, **style)
 
 
 def _lows(plan: RigPlan) -> list[float]:

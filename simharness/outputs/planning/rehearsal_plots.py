@@ -10,11 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PatchCollection
+from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.patches import Ellipse, Polygon, Rectangle
 
-from mvpose import Camera
 from mvpose.arrays import Bools, Floats
 from mvpose.report.rig_plots import camera_from_above, fit_view, name_cameras
 from mvpose.report.svg_plots import FAINT, INK, legend_above, svg_plot
@@ -109,28 +108,37 @@ def floor_map(
     places = rehearsal.prediction.places
     spacing = grid_spacing(places)
     with svg_plot(name, size=size) as (axes, written):
-        known = np.flatnonzero(np.isfinite(values))
-        colors = [scale.color(float(values[k])) for k in known]
-        cells = [Rectangle(tuple(places[k] - spacing / 2), spacing, spacing) for k in known]
-        axes.add_collection(PatchCollection(cells, facecolors=colors, edgecolors="none", zorder=1.5))
+        colors = np.array([scale.color(value) if np.isfinite(value) else (0, 0, 0, 0) for value in values.tolist()])
         width = _surroundings(axes, rehearsal, names=size[0] >= SIZE[0])
         step = max(1, int(np.ceil(_LEAST / (spacing / width * _USED * 72 * size[0]))))
-        rows = np.rint((places - places.min(axis=0)) / spacing).astype(int)
-        for k, color in zip(known, colors, strict=True):
-            if (rows[k] % step == step // 2).all():
-                axes.text(
-                    float(places[k, 0]),
-                    float(places[k, 1]),
-                    f"{values[k]:.{scale.digits}f}",
-                    ha="center",
-                    va="center",
-                    fontsize=6.2,
-                    color="#ffffff" if _luminance(color) < _DARK else "#1b1d21",
-                    zorder=3,
-                )
+        draw_cells(axes, places, values, colors, digits=scale.digits, step=step)
         if outlined:
             axes.add_collection(LineCollection(outline_of(places, rehearsal.good), colors=GOOD, lw=2.0, zorder=3.5))
     return written[0]
+
+
+def draw_cells(axes: Axes, places: Floats, values: Floats, colors: Floats, *, digits: int, step: int = 1) -> None:
+    """Draw a cell with its number for each place of a square grid; "–" for NaN.
+
+    Args:
+        axes: the plot.
+        places: centres of the cells, (P, 2), metres.
+        values: numbers, (P,).
+        colors: colours of the cells, (P, 4), red, green, blue and opacity; 0: no cell. Numbers on dark ones are white.
+        digits: decimals of the numbers.
+        step: cells along either axis that share a number.
+    """
+    side = grid_spacing(places)
+    rows = np.rint((places - places.min(axis=0)) / side).astype(int)
+    numbered = (rows % step == step // 2).all(axis=1)
+    for (x, y), value, color, shown in zip(places.tolist(), values.tolist(), colors, numbered, strict=True):
+        if color[3] == 0:
+            continue
+        axes.add_patch(Rectangle((x - side / 2, y - side / 2), side, side, fc=color, ec="none", zorder=1.5))
+        if shown:
+            text = f"{value:.{digits}f}" if np.isfinite(value) else "–"
+            ink = "#ffffff" if color[:3] @ (0.299, 0.587, 0.114) < _DARK else "#1b1d21"
+            axes.text(x, y, text, ha="center", va="center", fontsize=6.2, color=ink, zorder=3)
 
 
 def ellipse_map(rehearsal: Rehearsal, *, name: str) -> tuple[str, str]:
@@ -195,18 +203,12 @@ def crowd_curve(rehearsal: Rehearsal, *, name: str) -> str:
     """Plot PCP against the number of people: the fast layer as a line, simulation as points with intervals."""
     crowds = rehearsal.crowds
     with svg_plot(name, size=_WIDE) as (axes, written):
-        axes.plot(
-            [each.people for each in crowds],
-            [each.layer_pcp for each in crowds],
-            "--",
-            color=LAYER,
-            lw=1.5,
-            label="fast layer",
-        )
+        people, layer = [each.people for each in crowds], [each.layer_pcp for each in crowds]
+        axes.plot(people, layer, "--", color=LAYER, lw=1.5, label="fast layer")
         known = [(each.people, each.pcp) for each in crowds if each.pcp is not None]
         _points(axes, [number for number, _ in known], [pcp for _, pcp in known], "simulation")
         axes.axhline(rehearsal.setup.target.pcp, color=FAINT, lw=0.9, ls=":")
-        values = [each.layer_pcp for each in crowds] + [_low(pcp) for _, pcp in known]
+        values = layer + [_low(pcp) for _, pcp in known]
         axes.set(xlabel="people in the volume", ylabel="PCP, %", ylim=(_bottom(values), 101))
         axes.set_xticks([each.people for each in crowds])
         axes.grid(axis="y")
@@ -249,20 +251,12 @@ def subset_curve(rehearsal: Rehearsal, *, name: str) -> str:
     sets = {names: each for names, each in rehearsal.subsets.items() if np.isfinite(each.pcp.mean)}
     counts = sorted({len(names) for names in sets})
     with svg_plot(name, size=_WIDE) as (axes, written):
-        axes.plot(
-            [len(names) for names in sets],
-            [each.pcp.mean for each in sets.values()],
-            "o",
-            color=SIMULATION,
-            ms=4.5,
-            alpha=0.45,
-            mew=0,
-            label="a set of cameras",
-        )
+        sizes, pcp = [len(names) for names in sets], [each.pcp.mean for each in sets.values()]
+        axes.plot(sizes, pcp, "o", color=SIMULATION, ms=4.5, alpha=0.45, mew=0, label="a set of cameras")
         best = [max(each.pcp.mean for names, each in sets.items() if len(names) == count) for count in counts]
         axes.plot(counts, best, "-", color=SIMULATION, lw=1.5, label="the best of its size")
         axes.axhline(rehearsal.setup.target.pcp, color=FAINT, lw=0.9, ls=":")
-        axes.set(xlabel="cameras", ylabel="PCP, %", ylim=(_bottom([each.pcp.mean for each in sets.values()]), 101))
+        axes.set(xlabel="cameras", ylabel="PCP, %", ylim=(_bottom(pcp), 101))
         axes.set_xticks(counts)
         axes.grid(axis="y")
         legend_above(axes, columns=2)
@@ -281,7 +275,7 @@ def _surroundings(axes: Axes, rehearsal: Rehearsal, *, names: bool = True) -> fl
     for camera in rehearsal.rig:
         camera_from_above(axes, camera)
     if rehearsal.extra is not None:
-        _extra(axes, rehearsal.extra.camera)
+        axes.plot(*rehearsal.extra.camera.center[:2], "o", mfc="none", mec=EXTRA, mew=1.6, ms=7, zorder=4.5)
     points = np.concatenate([outline, walls, rehearsal.rig.centers[:, :2]])
     if rehearsal.extra is not None:
         points = np.concatenate([points, rehearsal.extra.camera.center[None, :2]])
@@ -294,14 +288,6 @@ def _surroundings(axes: Axes, rehearsal: Rehearsal, *, names: bool = True) -> fl
         axes.set(xlabel="", ylabel="")
     left, right = axes.get_xlim()
     return right - left
-
-
-def _extra(axes: Axes, camera: Camera) -> None:
-    axes.plot(*camera.center[:2], "o", mfc="none", mec=EXTRA, mew=1.6, ms=7, zorder=4.5)
-
-
-def _luminance(color: tuple[float, ...]) -> float:
-    return 0.299 * color[0] + 0.587 * color[1] + 0.114 * color[2]
 
 
 def _points(axes: Axes, at: Sequence[float], values: Sequence[Interval], label: str, *, line: bool = False) -> None:

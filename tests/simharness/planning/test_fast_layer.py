@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.planning.recorded_scenes import recorded_scenes
 from simharness.detector.viewing_conditions import VISIBLE
 from simharness.planning import Box, FastLayer, Volume
 from simharness.planning.camera_terms import covariance, information
@@ -66,8 +67,8 @@ class TestScenes:
         scenes = standing_scenes(Volume.box(4, 4), pool, people=2, spacing=1.0, repeats=2)
         tracks = scenes.joints.copy()
         tracks[::2, 1] = np.nan
-        again = standing_scenes(Volume.around(tracks), pool, spacing=0.5, repeats=4, tracks=tracks)
-        for s, frame in enumerate(again.frame):
+        again, frames = recorded_scenes(tracks, pool, Volume.around(tracks).places(0.5), repeats=4)
+        for s, frame in enumerate(frames):
             assert (again.present[s] == np.isfinite(tracks[frame, :, 0, 0])).all()
             here = again.present[s]
             assert np.allclose(again.joints[s][here], tracks[frame][here])  # the poses are those of the pool
