@@ -2,12 +2,15 @@
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
+from mvpose import Camera
+from mvpose.arrays import Floats
 from mvpose.files.atomic_files import write_atomic
 from mvpose.report.documents import fill_template
 from simharness.outputs import TEMPLATES
@@ -64,158 +67,59 @@ def render_preview(room: Room) -> str:
         ValueError: no place to hang a camera.
     """
     places = np.array([place for _, place in places_in(room, spacing=_SPACING, levels=_LEVELS)])
-    found = len(candidates_in(room))
     lenses = ", ".join(f"{each.name} ({each.fov[0]:.0f}°)" for each in room.lenses if not each.turned)
-    return fill_template(
-        "plan.html",
-        folder=TEMPLATES,
-        program="simharness",
-        name=room.name,
-        code=code_version(),
-        title=f"{room.name}: the room",
-        sentences=[
-            f"Places on {len(room.mounts)} walls, ceilings and areas for tripods give {found} cameras to choose from, "
-            f"with the lenses {lenses}."
-        ],
-        facts=_facts(room),
-        cards=[],
-        key=_KEY_OF_PLACES,
-        above=Markup(room_from_above(room, places=places, cameras=room.fixed)),
-        sides=[
-            Markup(room_from_side(f"side{axis}", room, axis=axis, places=places, cameras=room.fixed)) for axis in (0, 1)
-        ],
-        cameras=[],
-        command="",
+    says = (
+        f"Places on {len(room.mounts)} walls, ceilings and areas for tripods give {len(candidates_in(room))} cameras "
+        f"to choose from, with the lenses {lenses}."
     )
+    return _filled(room, room.fixed, plan=None, sentences=[says], key=_KEY_OF_PLACES, places=places)
 
 
 def render_plan(plan: RigPlan, *, command: str = "") -> str:
     """Return the page of a plan."""
-    room, target = plan.room, plan.room.keys.target
-    scenes = f"on the same {plan.simulated_scenes} simulated scenes" if plan.best.simulated else "not simulated"
-    shown = plan.prediction
+    target, shown = plan.room.keys.target, plan.prediction
+
+    def drawn(name: str, values: Floats, worst: float, best: float, **style: Any) -> Markup:
+        return Markup(place_map(name, plan, values, worst=worst, best=best, **style))
+
+    usual = [each for each in plan.alternatives if each.title in ("corners", "ring")]
+    return _filled(
+        plan.room,
+        list(plan.rig),
+        plan=plan,
+        sentences=sentences(plan),
+        key=_KEY,
+        usual=max(usual, key=lambda each: (each.simulated or each.predicted).pcp.mean, default=None),
+        looks=_direction,
+        maps={
+            "pcp": drawn("pcp", shown.pcp, 60.0, 100.0),
+            "error": drawn("error", shown.error_mm, 2.0 * target.error, 0.4 * target.error),
+            "views": drawn("views", shown.views, 1.0, float(max(len(plan.rig), 4)), digits=1),
+            "risk": drawn("risk", 100.0 * shown.risk, 30.0, 0.0),
+        },
+        curve=Markup(buying_curve("curve", plan)) if plan.curve else None,
+        bars=Markup(rig_bars("bars", plan)),
+        command=command,
+    )
+
+
+def _filled(room: Room, cameras: Sequence[Camera], *, places: Floats | None = None, **values: Any) -> str:
+    """Return the page with the room from above and from both sides."""
+    sides = [room_from_side(f"side{axis}", room, axis=axis, places=places, cameras=cameras) for axis in (0, 1)]
     return fill_template(
         "plan.html",
         folder=TEMPLATES,
         program="simharness",
         name=room.name,
         code=code_version(),
-        title=f"{room.name}: a plan of {len(plan.rig)} cameras",
-        sentences=sentences(plan),
-        facts=_facts(room),
-        cards=_cards(plan),
-        key=_KEY,
-        above=Markup(room_from_above(room, cameras=list(plan.rig))),
-        sides=[Markup(room_from_side(f"side{axis}", room, axis=axis, cameras=list(plan.rig))) for axis in (0, 1)],
-        cameras=_camera_rows(plan),
-        people="one" if room.keys.people.count == 1 else room.keys.people.count,
-        maps=[
-            (
-                "PCP",
-                f"Percent of correct parts; the target is {target.pcp:g}.",
-                Markup(place_map("pcp", plan, shown.pcp, worst=60.0, best=100.0)),
-            ),
-            (
-                "Joint error, mm",
-                f"Mean error of joints; the target is {target.error:g} mm.",
-                Markup(place_map("error", plan, shown.error_mm, worst=2.0 * target.error, best=0.4 * target.error)),
-            ),
-            (
-                "Cameras that see a person whole",
-                "Mean number of cameras with all limbs in the picture and none hidden by others.",
-                Markup(place_map("views", plan, shown.views, worst=1.0, best=float(max(len(plan.rig), 4)), digits=1)),
-            ),
-            (
-                "Probability of a wrong match, %",
-                "Detections of one person taken for another's; of 8 people at each place, so only large values count.",
-                Markup(place_map("risk", plan, 100.0 * shown.risk, worst=30.0, best=0.0)),
-            ),
-        ],
-        curve=Markup(buying_curve("curve", plan)) if plan.curve else None,
-        bars=Markup(rig_bars("bars", plan)),
-        scenes=scenes,
-        points=_points(plan),
-        command=command,
+        room=room,
+        above=Markup(room_from_above(room, places=places, cameras=cameras)),
+        sides=[Markup(each) for each in sides],
+        **{"command": "", **values},
     )
 
 
-def _facts(room: Room) -> list[tuple[str, str]]:
-    x, y = room.space.size.tolist()
-    u, v = room.volume.size.tolist()
-    target, objective = room.keys.target, room.keys.objective
-    facts = [
-        ("room", f"{x:.1f} by {y:.1f} m, {room.space.height:.1f} m high"),
-        ("volume", f"{u:.1f} by {v:.1f} m"),
-        ("people", f"{room.keys.people.count}"),
-        ("detector", room.detector.name),
-        ("target", f"{target.pcp:g} PCP, {target.error:g} mm"),
-        ("objective", objective.kind),
-    ]
-    return facts + ([("may fail", f"{objective.failing}")] if objective.failing else [])
-
-
-def _cards(plan: RigPlan) -> list[dict[str, str]]:
-    figures, predicted = plan.figures, plan.best.predicted
-    how = f"simulation, {plan.simulated_scenes} scenes" if plan.best.simulated else "fast layer"
-    usual = [each for each in plan.alternatives if each.title in ("corners", "ring")]
-    cards = [
-        {
-            "title": "PCP",
-            "text": f"{figures.pcp.mean:.1f} %",
-            "about": f"{figures.pcp.low:.1f} to {figures.pcp.high:.1f}; {how}",
-        },
-        {
-            "title": "Joint error",
-            "text": f"{figures.error_mm.mean:.0f} mm",
-            "about": f"{figures.error_mm.low:.0f} to {figures.error_mm.high:.0f}; {how}",
-        },
-        {
-            "title": "Within the target",
-            "text": f"{predicted.share:.0f} %",
-            "about": f"of the volume; worst place {predicted.worst:.0f} PCP; fast layer",
-        },
-    ]
-    if usual:
-        best = max(usual, key=lambda each: (each.simulated or each.predicted).pcp.mean)
-        gain = figures.pcp.mean - (best.simulated or best.predicted).pcp.mean
-        cards.append(
-            {"title": "Gain", "text": f"{gain:+.1f} PCP", "about": f"over cameras without a plan ({best.title})"}
-        )
-    return cards
-
-
-def _camera_rows(plan: RigPlan) -> list[list[str]]:
-    rows = []
-    for camera, built in zip(plan.cameras, plan.rig, strict=True):
-        forward = built.R[2]
-        bearing = math.degrees(math.atan2(forward[1], forward[0])) % 360.0
-        rows.append(
-            [
-                camera.name,
-                camera.mount,
-                *(f"{value:.2f}" for value in built.center),
-                f"{bearing:.0f}°",
-                f"{-math.degrees(math.asin(forward[2])):.0f}°",
-                camera.lens or "–",
-                f"{100 * camera.sure:.0f} %" if math.isfinite(camera.sure) else "–",
-                f"{camera.worth:.1f}",
-            ]
-        )
-    return rows
-
-
-def _points(plan: RigPlan) -> list[dict[str, Any]]:
-    return [
-        {
-            "now": point.cameras == len(plan.rig),
-            "cells": [
-                f"{point.cameras}",
-                f"{point.figures.pcp.mean:.1f}",
-                f"{point.figures.error_mm.mean:.0f}",
-                f"{point.figures.share:.0f} %",
-                f"{point.figures.worst:.0f}",
-                f"{point.cost:g}",
-            ],
-        }
-        for point in plan.curve
-    ]
+def _direction(camera: Camera) -> tuple[float, float]:
+    """Return the bearing of a camera from the x axis, and its tilt below the horizon, degrees."""
+    x, y, z = camera.R[2].tolist()
+    return math.degrees(math.atan2(y, x)) % 360.0, -math.degrees(math.asin(z))
