@@ -167,13 +167,9 @@ def _cameras(case: DoctorCase) -> list[dict[str, Any]]:
     rows = []
     for view, name in enumerate(case.names):
         usual = math.nan if case.diagnosis.usual is None else float(case.diagnosis.usual[view])
-        row: dict[str, Any] = {
-            "name": name,
-            "before": number(before[view]),
-            "large": before[view] >= ALARM["times_usual"] * usual,
-            "usual": number(usual),
-            "accused": view in case.accused,
-        }
+        large, accused = before[view] >= ALARM["times_usual"] * usual, view in case.accused
+        row: dict[str, Any] = {"name": name, "before": number(before[view]), "large": large, "accused": accused}
+        row["usual"] = number(usual)
         if after is not None and case.repair is not None:
             correction, covariance = case.repair.corrections[view], case.repair.covariance[view]
             row["turned"] = _with_spread(correction[:3], covariance[:3, :3], 180.0 / math.pi, "°", 2)
@@ -255,15 +251,8 @@ def _lines(case: DoctorCase, pictures: Pictures | None) -> dict[str, Any] | None
         label = f"joints in camera {case.names[view]}"
         element = picture_element(case.rig[view], [*bodies, *over, *dots], label=label, picture=picture)
         views.append({"name": case.names[view], "svg": Markup(element)})
-    rows = [
-        {
-            "number": row + 1,
-            "joint": joint.name,
-            "before": number(drawings.distance_from_line(*before, joint)),
-            "after": "" if after is None else number(drawings.distance_from_line(*after, joint)),
-        }
-        for row, joint in enumerate(joints)
-    ]
+    pairs = [before] if after is None else [before, after]
+    rows = [(joint.name, [number(drawings.distance_from_line(*pair, joint)) for pair in pairs]) for joint in joints]
     return {"views": views, "rows": rows, "frame": joints[0].frame}
 
 

@@ -76,7 +76,8 @@ def write_page(
         program="mvpose",
         code=program_version(),
         name=name,
-        facts=_facts(recording),
+        people=people,
+        rig=rig,
         cards=_cards(recording),
         doctor=_doctor(diagnosis),
         missing=[] if left_out is None else left_out.sentences(),
@@ -91,20 +92,8 @@ def write_page(
     return Path(folder) / PAGE
 
 
-def _facts(recording: ExaminedRecording) -> list[tuple[str, str]]:
-    people, rig = recording.people, recording.rig
-    sizes = {f"{camera.size[0]}×{camera.size[1]}" for camera in rig}
-    seconds = float(people.times[-1] - people.times[0]) + 1.0 / people.rate
-    return [
-        ("cameras", f"{len(rig)} × {sizes.pop()}" if len(sizes) == 1 else str(len(rig))),
-        ("frames", f"{people.frames} at {people.rate:.4g} Hz"),
-        ("duration", f"{seconds:.1f} s" if seconds < 120 else f"{seconds / 60:.1f} min"),
-        ("detections", f"{sum(map(len, recording.frames))}"),
-        ("skeleton", people.skeleton.name),
-    ]
-
-
-def _cards(recording: ExaminedRecording) -> list[dict[str, str]]:
+def _cards(recording: ExaminedRecording) -> list[tuple[str, str, str]]:
+    """Return title, number and explanation of the headline numbers that are known."""
     people = recording.people
     present = people.present.any(axis=2).sum(axis=1)
     pixels, metres = recording.residual
@@ -112,17 +101,13 @@ def _cards(recording: ExaminedRecording) -> list[dict[str, str]]:
     known = [bone.spread / bone.length for bone in recording.bones]
     varies = 100 * float(np.median(known)) if known else math.nan
     cards = [
-        ("People", str(len(people)), f"identities; at most {int(present.max(initial=0))} at once"),
-        ("Residual", _with_unit(pixels, 1, "px"), f"median of detected joints, {1000 * metres:.0f} mm at the person"),
-        ("On one view", _with_unit(100 * alone, 1, "%"), "of joints rest on one view or none, which gives no depth"),
-        ("Bones vary", _with_unit(varies, 1, "%"), "of their length over time, median"),
-        ("Expected error", _with_unit(1000 * error, 0, "mm"), "median, from covariances: expected, not measured"),
+        ("People", f"{len(people)}", f"identities; at most {int(present.max(initial=0))} at once"),
+        ("Residual", f"{pixels:.1f} px", f"median of detected joints, {1000 * metres:.0f} mm at the person"),
+        ("On one view", f"{100 * alone:.1f} %", "of joints rest on one view or none, which gives no depth"),
+        ("Bones vary", f"{varies:.1f} %", "of their length over time, median"),
+        ("Expected error", f"{1000 * error:.0f} mm", "median, from covariances: expected, not measured"),
     ]  # fmt: skip
-    return [{"title": title, "text": text, "about": about} for title, text, about in cards if text != tables.NOTHING]
-
-
-def _with_unit(value: float, digits: int, unit: str) -> str:
-    return f"{value:.{digits}f} {unit}" if math.isfinite(value) else tables.NOTHING
+    return [card for card in cards if not card[1].startswith("nan")]
 
 
 def _doctor(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
@@ -177,14 +162,11 @@ def _residuals(recording: ExaminedRecording) -> tables.Table:
     )
 
 
-def _rests(recording: ExaminedRecording) -> list[dict[str, str]]:
+def _rests(recording: ExaminedRecording) -> list[float]:
+    """Return the share of the joints that rest on no view, on one, on two and so on."""
     counts = np.bincount(recording.supports[recording.supports >= 0], minlength=len(recording.rig) + 1)
-    shares = counts / max(1, counts.sum())
-    names = ["none", "one", *(str(views) for views in range(2, len(shares)))]
-    return [
-        {"name": name, "share": f"{share:.3f}", "text": f"{100 * share:.1f} %"}
-        for name, share in zip(names, shares.tolist(), strict=True)
-    ]
+    shares: list[float] = (counts / max(1, counts.sum())).tolist()
+    return shares
 
 
 def _errors(recording: ExaminedRecording, columns: Sequence[int]) -> tables.Table | None:

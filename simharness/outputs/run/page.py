@@ -61,11 +61,12 @@ def render(
         scenario=record.scenario,
         summary=summary,
         main=main,
-        facts=_facts(record),
-        cards=[{"title": column.title, "about": column.about, "text": column.text(scores)} for column in COLUMNS],
+        record=record,
+        objects=_objects(record),
+        scores=scores,
         columns=COLUMNS,
         whole_body_columns=WHOLE_BODY_COLUMNS if has_whole_body(summary) else (),
-        parts=_parts_table(summary["variants"]),
+        groups=GROUPS,
         people=_people_table(record, main),
         pictures=pictures,
         film=film,
@@ -83,33 +84,15 @@ def render(
     )
 
 
-def _facts(record: Record) -> list[tuple[str, str]]:
+def _objects(record: Record) -> int:
+    """Return the number of objects and decoys that a scenario asks for."""
     scenario = record.scenario
     counts = scenario.clutter.model_dump(exclude={"coverage", "objects"}) | scenario.decoys.model_dump()
-    objects = len(scenario.clutter.objects) + sum(counts.values())
-    return [
-        ("people", f"{scenario.people.count}"),
-        ("cameras", f"{len(record.rig)} × {record.rig[0].size[0]}×{record.rig[0].size[1]}"),
-        ("objects", f"{objects}"),
-        ("detector", scenario.detector.label),
-        ("frames", f"{len(record.time)} at {scenario.rate:g} Hz"),
-        ("detections", f"{sum(map(len, record.detections))}"),
-        ("seed", f"{scenario.seed}"),
-        ("version", f"{record.summary['code']}"),
-    ]
+    return len(scenario.clutter.objects) + sum(counts.values())
 
 
 def _command(record: Record) -> str:
     return record.summary.get("run", {}).get("command") or "simharness run scenario.toml"
-
-
-def _parts_table(variants: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the table of PCP: a row for each group of parts, a number for each variant."""
-    rows = [
-        {"part": group.replace("_", " "), "values": [scores["pcp_parts"][group] for scores in variants.values()]}
-        for group in GROUPS
-    ]
-    return [*rows, {"part": "all", "values": [scores["pcp"] for scores in variants.values()]}]
 
 
 def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
