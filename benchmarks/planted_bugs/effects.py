@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from simharness.gate.baseline import TIME, read_baseline
-from simharness.statistics.paired_tests import holm, paired
+from simharness.statistics.many_tests import holm
+from simharness.statistics.paired_tests import paired
 
 _FIRST_SEED = 1000  # of the fresh seeds; those of the suite are smaller
 

@@ -1,8 +1,11 @@
 """Comparison of two measurements of one suite, seed by seed, and the result of a gate check."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
+
+import numpy as np
 
 from simharness.gate.baseline import GATED, TIME, Measurement
 from simharness.gate.changed_stage import changed_stage
@@ -10,7 +13,7 @@ from simharness.gate.score_tests import Pairs, Tested, pairs_of, test_of
 from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate_section import GateSection
 from simharness.scoring.catalogue import SCORES
-from simharness.statistics.paired_tests import hochberg
+from simharness.statistics.many_tests import joint_p
 
 Verdict = Literal["worse", "unexpected", "better", "same"]
 """``unexpected``: better by more than its bound; a score with a best value may also have moved past it."""
@@ -87,8 +90,8 @@ class Comparison:
 def compare(before: Measurement, after: Measurement, gate: GateSection) -> Comparison:
     """Compare two measurements of one suite.
 
-    P-values are corrected for the tests of a family: one score of all variants over the whole suite, or in all cases.
-    The two families of a score share the level.
+    P-values are corrected for all tests over the whole suite, and for all in its cases; the two families share the
+    level, so that many cases cannot hide what the whole suite shows (:func:`simharness.statistics.many_tests.joint_p`).
 
     Trials that only one of them has, because they failed in the other, are left out; the caller reports them.
 
@@ -102,21 +105,39 @@ def compare(before: Measurement, after: Measurement, gate: GateSection) -> Compa
     slowdown = gate.slowdown if before.processor == after.processor else gate.slowdown_elsewhere
     allowed = [_allowed(each.score, gate, slowdown) for each in pairs]
     made = [test.size > min(limits.loss, limits.gain) for test, limits in zip(tested, allowed, strict=True)]
-    families = 1 + any(each.case is not None for each in pairs)
-    p = [1.0] * len(pairs)
-    least = [1.0] * len(pairs)
-    for family in {(each.score, each.case is None) for each in pairs}:
-        members = [at for at, each in enumerate(pairs) if made[at] and (each.score, each.case is None) == family]
-        for at, value in zip(members, hochberg([tested[at].p for at in members]), strict=True):
-            p[at] = min(1.0, families * value)
-            least[at] = families * len(members) * tested[at].least_p
+    p, least = _corrected(pairs, tested, made)
     changes = [_change(*each, gate.level) for each in zip(pairs, tested, allowed, p, least, strict=True)]
     changes = [
         each if each.verdict == "same" else replace(each, where=changed_stage(pair, before, after))
         for each, pair in zip(changes, pairs, strict=True)
     ]
     uncompared = tuple(score for score in GATED if _has(after, score) and not _has(before, score))
-    return Comparison(tuple(changes), before.cases if families > 1 else (), uncompared)
+    return Comparison(tuple(changes), before.cases if len(before.cases) > 1 else (), uncompared)
+
+
+def _corrected(
+    pairs: Sequence[Pairs], tested: Sequence[Tested], made: Sequence[bool]
+) -> tuple[list[float], list[float]]:
+    """Return the p-values corrected for other tests, and the least ones that the seeds can have; 1 without a test.
+
+    Args:
+        pairs: the scores.
+        tested: their tests.
+        made: whether a test counts.
+    """
+    families = 1 + any(each.case is not None for each in pairs)
+    p, least = [1.0] * len(pairs), [1.0] * len(pairs)
+    for whole in (True, False):
+        members = [at for at, each in enumerate(pairs) if made[at] and (each.case is None) == whole]
+        flipped = [at for at in members if tested[at].changes]
+        counted = [at for at in members if not tested[at].changes]
+        seeds = sorted({seed for at in flipped for seed in tested[at].changes})
+        changes = np.array([[tested[at].changes.get(seed, 0.0) for seed in seeds] for at in flipped])
+        joint = joint_p(changes.reshape(len(flipped), len(seeds)), [tested[at].p for at in counted])
+        for at, value in zip([*flipped, *counted], joint.p, strict=True):
+            p[at] = min(1.0, families * float(value))
+            least[at] = families * joint.corrected(tested[at].least_p)
+    return p, least
 
 
 def _has(measurement: Measurement, score: str) -> bool:

@@ -8,8 +8,9 @@ factor of 1.2. What other processes or a graphics card do for an estimator is no
 
 The kernel is a fixed amount of the same kinds of work as the method, in similar shares: compiled loops (products of
 small matrices, likelihoods of points in views, small linear systems), and calls of NumPy on small arrays, whose time is
-that of the interpreter. The two suffer differently where other processes share a core and its caches: in units of
-compiled loops alone, unchanged code took up to 1.6 times as long at another load, in these units 1.1 times.
+that of the interpreter. The two suffer differently where other processes share a core and its caches: between an idle
+machine and one with two processes for each core, unchanged code took up to 1.6 times as long in units of compiled loops
+alone, and 1.1 to 1.35 times in these units.
 
 A variant with memory gets frames in order, because its time depends on the people whom it follows. If they take
 seconds, as the repair of a rig does, they are estimated once.

@@ -40,26 +40,24 @@ class Power:
     whole: float
     """Change of the mean over the whole suite that is found; infinite where the seeds are too few for any."""
     case: float
-    """Change in one case that is found: median over the cases."""
+    """Change in one case alone that is found: median over the cases."""
     seeds: Mapping[int, int | None]
     """Seeds that changes of the whole suite need, by their size in tolerances; None: more than :data:`MOST`."""
 
 
 def power_of(measurement: Measurement, gate: GateSection) -> list[Power]:
     """Return the power of a suite for each score and variant that it measured."""
-    cases = len(measurement.cases)
     spreads: dict[tuple[str, str], list[tuple[bool, int, float]]] = {}
     for pairs in pairs_of((*GATED, TIME), measurement, measurement):
         values = replace(pairs, before=np.log(pairs.before)).means()[0] if pairs.score == TIME else pairs.means()[0]
         if len(values) > 1:
             each = pairs.case is None, len(values), float(values.std(ddof=1))
             spreads.setdefault((pairs.score, pairs.variant), []).append(each)
-    found = []
+    found, level = [], _level(measurement, gate)
     for (score, variant), rows in spreads.items():
-        level = _level(measurement, gate)
         limit = math.log(gate.slowdown) if score == TIME else gate.tolerance_of(score)
         (seeds, spread), *_ = [(n, size) for whole, n, size in rows if whole]
-        single = [least_changes(n, size, limit, level / cases) for whole, n, size in rows if not whole]
+        single = [least_changes(n, size, limit, level) for whole, n, size in rows if not whole]
         needed = {wish: needed_seeds(wish * limit, spread, limit, level) for wish in WISHED}
         whole = float(least_changes(seeds, spread, limit, level))
         found.append(Power(score, variant, limit, whole, float(np.median(single)) if single else whole, needed))
@@ -67,8 +65,13 @@ def power_of(measurement: Measurement, gate: GateSection) -> list[Power]:
 
 
 def _level(measurement: Measurement, gate: GateSection) -> float:
-    """Return the level of one test over the whole suite, if the other variants change less clearly."""
-    return gate.level / (len(measurement.variants) * (1 + (len(measurement.cases) > 1)))
+    """Return the level of one test if all scores of all variants change, the others less clearly: Boole's inequality.
+
+    It is the worst case, since scores that agree share it (:func:`simharness.statistics.many_tests.joint_p`). Of the
+    cases, one changes alone.
+    """
+    scores = {key for scores in measurement.scores.values() for key in (*GATED, TIME) if scores[key] is not None}
+    return gate.level / (len(measurement.variants) * len(scores) * (1 + (len(measurement.cases) > 1)))
 
 
 def even_changes(measurement: Measurement, gate: GateSection) -> str:
@@ -78,7 +81,7 @@ def even_changes(measurement: Measurement, gate: GateSection) -> str:
         return "A change that is alike in all seeds is shown from its tolerance on."
     enough = needed_seeds(1.0, 0.0, 0.0, level)
     more = f"{enough} seeds are enough" if enough else "choose a higher gate.level"
-    return f"A change is shown only if all variants show it, never one variant that changes among others: {more}."
+    return f"A change is shown only if most variants and scores show it, never one score among others: {more}."
 
 
 def needed_seeds(change: float, spread: float, tolerance: float, level: float) -> int | None:

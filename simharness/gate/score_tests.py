@@ -1,7 +1,7 @@
 """Test of the change of one score: of a mean, of the rate of rare events, of the time of a frame."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -43,10 +43,15 @@ class Pairs:
     frames: Floats
 
     @property
+    def seed_numbers(self) -> list[int]:
+        """Seeds in order."""
+        return sorted({trial.seed for trial in self.trials})
+
+    @property
     def seeds(self) -> tuple[NDArray[np.intp], ...]:
         """Indices of the trials of each seed. Trials of different seeds are independent."""
         seeds = np.array([trial.seed for trial in self.trials])
-        return tuple(np.flatnonzero(seeds == seed) for seed in np.unique(seeds))
+        return tuple(np.flatnonzero(seeds == seed) for seed in self.seed_numbers)
 
     def means(self) -> tuple[Floats, Floats]:
         """Return the means over the trials of each seed, before and after."""
@@ -100,6 +105,7 @@ class Tested:
         loss: growth of what should be small: in the unit of the score, for ``TIME`` the logarithm of the ratio.
         size: mean size of the changes of the seeds, regardless of their signs, in the unit of ``loss``.
         least_p: least p-value that a test of this number of seeds can have.
+        changes: tested change of each seed; empty where events are counted.
         worst: trial with the largest loss.
     """
 
@@ -113,6 +119,7 @@ class Tested:
     loss: float
     size: float
     least_p: float
+    changes: Mapping[int, float]
     worst: TrialKey
 
 
@@ -145,6 +152,7 @@ def _test_mean(pairs: Pairs) -> Tested:
         loss=float(np.diff(_badness(pairs.score, ends))[0]),
         size=float(np.abs(after - before).mean()),
         least_p=0.0 if rare else least_two_sided_p(test.n),
+        changes={} if rare else dict(zip(pairs.seed_numbers, after - before, strict=True)),
         worst=pairs.trials[int(np.argmax(_badness(pairs.score, pairs.after) - _badness(pairs.score, pairs.before)))],
     )
 
@@ -171,6 +179,7 @@ def _test_time(pairs: Pairs) -> Tested:
         loss=ratio,
         size=float(_middle(np.sort(np.abs(change))).mean()),
         least_p=least_two_sided_p(test.n),
+        changes=dict(zip(pairs.seed_numbers, change, strict=True)),
         worst=pairs.trials[int(np.argmax(ratios))],
     )
 

@@ -1,6 +1,6 @@
-"""Significance of the difference between two measurements of the same scenes, and correction for many tests."""
+"""Significance of the difference between two measurements of the same scenes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -20,6 +20,9 @@ EXACT = 12
 
 DRAWS = 20_000
 """Usual number of random sign flips."""
+
+ROUNDING = 1e-9
+"""Relative tolerance of equal sums, since the order of a summation changes its rounding."""
 
 _PRIOR_SCENES = 4.0
 """Weight, in scenes, of the mean square change (which contains the tested effect) beside the variance of the changes.
@@ -147,41 +150,6 @@ def paired_counts(
     return Paired(rate, float(low), float(high), _p(change, alternative), len(change))
 
 
-def holm(p: Sequence[float]) -> list[float]:
-    """Return Holm's adjusted p-values, in the order of ``p``, which control the family-wise error rate.
-
-    Holm, "A simple sequentially rejective multiple test procedure", Scandinavian Journal of Statistics 1979.
-
-    Raises:
-        ValueError: a p-value that is not between 0 and 1.
-    """
-    return _adjusted(p, np.maximum.accumulate)
-
-
-def hochberg(p: Sequence[float]) -> list[float]:
-    """Return Hochberg's adjusted p-values, in the order of ``p``: at most those of Holm, and at most the largest p.
-
-    They control the family-wise error rate of tests that do not depend on each other negatively, such as two-sided ones
-    of the same scenes (Hochberg, Biometrika 1988; Sarkar, Annals of Statistics 1998). A change that all tests of a
-    family show alike is not corrected at all.
-
-    Raises:
-        ValueError: a p-value that is not between 0 and 1.
-    """
-    return _adjusted(p, lambda factors: np.minimum.accumulate(factors[::-1])[::-1])
-
-
-def _adjusted(p: Sequence[float], accumulate: Callable[[Floats], Floats]) -> list[float]:
-    """Return p-values times the number of those that are at least as large, made monotone."""
-    values = np.asarray(p, float)
-    if not ((values >= 0) & (values <= 1)).all():
-        raise ValueError(f"p must be between 0 and 1, got {list(p)}")
-    order = np.argsort(values, kind="stable")
-    adjusted = np.empty(len(values))
-    adjusted[order] = accumulate(values[order] * np.arange(len(values), 0, -1))
-    return [float(each) for each in np.minimum(adjusted, 1.0)]
-
-
 def _studentized_p(change: Floats, alternative: Alternative) -> float:
     """Return the p-value of the t test corrected for skewness; 0 for a single pair, which has no deviation."""
     if len(change) < 2:
@@ -196,8 +164,7 @@ def _studentized_p(change: Floats, alternative: Alternative) -> float:
 def _sign_flip_p(change: Floats, alternative: Alternative, draws: int, seed: int) -> float:
     """Return the share of sign flips with a sum at least as extreme as the observed one."""
     differing = change[change != 0]
-    # The order of a summation changes its rounding, so equal sums are compared with a tolerance.
-    observed, tolerance = differing.sum(), 1e-9 * np.abs(differing).sum()
+    observed, tolerance = differing.sum(), ROUNDING * np.abs(differing).sum()
 
     def count_extreme(sums: Floats) -> int:
         if alternative == "greater":
@@ -208,16 +175,16 @@ def _sign_flip_p(change: Floats, alternative: Alternative, draws: int, seed: int
 
     n = len(differing)
     if n <= EXACT:
-        return count_extreme(_signs(n) @ differing) / 2**n
+        return count_extreme(sign_flips(n) @ differing) / 2**n
     # A random byte is the signs of eight differences; their sums are looked up.
     eights = np.pad(differing, (0, -n % 8)).reshape(-1, 8)
-    sums = _signs(8) @ eights.T
+    sums = sign_flips(8) @ eights.T
     drawn = stream(seed, "sign-flip").integers(256, size=(draws, len(eights)))
     share = (1 + count_extreme(sums[drawn, np.arange(len(eights))].sum(axis=1))) / (1 + draws)
     return max(share, 2.0**-n)  # no sum of random signs is rarer, but few draws may miss all
 
 
-def _signs(n: int) -> Floats:
+def sign_flips(n: int) -> Floats:
     """Return all signs of n differences, (2^n, n)."""
     return np.where((np.arange(2**n)[:, None] >> np.arange(n)) & 1, -1.0, 1.0)
 

@@ -17,6 +17,7 @@ rate = 5.0
 rendering.renderer = "rays"
 people.count = 2
 detector.profile = "perfect"
+gate.slowdown = 4.0    # other tests run beside it
 
 [clutter]
 boxes = 0

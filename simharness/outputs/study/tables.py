@@ -15,7 +15,8 @@ from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES, ScoreInfo
 from simharness.scoring.failure_classes import DISPLACED, FailureKind
 from simharness.statistics.intervals import Interval, mean_interval
-from simharness.statistics.paired_tests import holm, paired
+from simharness.statistics.many_tests import holm
+from simharness.statistics.paired_tests import paired
 from simharness.statistics.resampling import pseudo_values
 from simharness.statistics.studentized import unseen_share
 from simharness.study.factors import FactorBreakingPoint

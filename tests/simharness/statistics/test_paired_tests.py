@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
-from simharness.statistics.paired_tests import DRAWS, holm, paired
+from simharness.statistics.paired_tests import DRAWS, paired
 from simharness.statistics.studentized import p_greater
 
 
@@ -108,29 +108,3 @@ def test_bad_arguments_of_paired_are_refused():
         paired([1, 2, 3], [1, 2])
     with pytest.raises(ValueError, match="two-sided, greater or less"):
         paired([1], [2], alternative="worse")
-
-
-def rejected_step_by_step(p, level):
-    """Return the indices that Holm's procedure rejects, step by step."""
-    rejected = set()
-    for step, index in enumerate(sorted(range(len(p)), key=p.__getitem__)):
-        if p[index] > level / (len(p) - step):
-            break
-        rejected.add(index)
-    return rejected
-
-
-def test_holm_by_hand():
-    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert holm([]) == []
-    assert holm([0.7, 0.8]) == [1.0, 1.0]
-    with pytest.raises(ValueError, match="between 0 and 1"):
-        holm([0.5, float("nan")])
-
-
-@given(
-    p=st.lists(st.integers(0, 997).map(lambda i: i / 997), min_size=1, max_size=12),
-    level=st.sampled_from([0.0101, 0.0502, 0.2003]),
-)
-def test_holm_agrees_with_the_step_by_step_procedure(p, level):
-    assert {i for i, adjusted in enumerate(holm(p)) if adjusted <= level} == rejected_step_by_step(p, level)
