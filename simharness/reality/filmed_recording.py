@@ -34,7 +34,7 @@ from simharness.world.motion.motion import held
 _LONGEST = 4.0  # seconds of a take
 _SHORTEST = 0.6  # seconds; shorter takes are joined with a neighbour
 _PRESENT = 0.5  # share of the frames of a take in which a person of it is present
-_ANKLE = 0.09  # metres: height of the ankle joint of a standing person, in shoes
+_ANKLE = 0.10  # metres: height of the ankle joint of a standing person, in shoes: that of simulated bodies
 _STANDING = 0.25  # quantile of the heights of the lower ankle: most people stand, noise is on both sides
 _MARGIN = 1.5  # metres between people or cameras and the border of the floor
 

@@ -88,8 +88,6 @@ def solve_directions(names: list[str], aims: list[Aim], *, start: Floats, ease: 
     hinges = [HINGES[DOFS.index(name)] for name in names]
     low, high = np.array([hinge.range for hinge in hinges]).T
     frames, count = start.shape
-    bands = 2 * count + 1
-    smooth = _second_differences(frames)
     angles = np.clip(start, low, high)
     for _ in range(_ITERATIONS):
         turns, axes = [np.broadcast_to(np.eye(3), (frames, 3, 3))], []
@@ -105,20 +103,34 @@ def solve_directions(names: list[str], aims: list[Aim], *, start: Floats, ease: 
                 moved[:, :, k] = np.cross(axes[k], now)
             normal += aim.weight**2 * moved.swapaxes(1, 2) @ moved
             right += aim.weight**2 * (moved.swapaxes(1, 2) @ (aim.target - now)[..., None])[..., 0]
-        right -= _SMOOTH**2 * _apply(smooth, angles)
-        banded = np.zeros((bands, frames * count))
-        for i in range(count):
-            for j in range(i, count):
-                banded[j - i, i::count] = normal[:, i, j]
-        for gap in range(3):
-            banded[gap * count] += _SMOOTH**2 * np.repeat(smooth[gap], count)
-        step = solveh_banded(banded, right.ravel(), lower=True).reshape(frames, count)
+        step = smooth_step(normal, right, angles, weight=_SMOOTH)
         moved_to = np.clip(angles + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP), low, high)
         change = np.abs(moved_to - angles).max(initial=0.0)
         angles = moved_to
         if change < 1e-4:
             break
     return angles
+
+
+def smooth_step(normal: Floats, right: Floats, values: Floats, *, weight: float) -> Floats:
+    """Return the step (T, n) of least squares of which the values after it have small second differences in time.
+
+    Args:
+        normal: matrices of the normal equations of each frame, (T, n, n).
+        right: their right sides, (T, n).
+        values: present values, (T, n).
+        weight: weight of the second differences.
+    """
+    frames, count = values.shape
+    smooth = _second_differences(frames)
+    banded = np.zeros((2 * count + 1, frames * count))
+    for i in range(count):
+        for j in range(i, count):
+            banded[j - i, i::count] = normal[:, i, j]
+    for gap in range(3):
+        banded[gap * count] += weight**2 * np.repeat(smooth[gap], count)
+    right = right - weight**2 * _apply(smooth, values)
+    return np.asarray(solveh_banded(banded, right.ravel(), lower=True)).reshape(frames, count)
 
 
 def _second_differences(frames: int) -> Floats:

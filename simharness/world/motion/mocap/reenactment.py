@@ -1,15 +1,11 @@
 """Re-enactment: a body performs the recorded joints of a person at the recorded place and time.
 
-The joints over time become the source motion of a retargeting to a body of the recorded size. The joints of COCO-17
-are not the axes of the hinges, and joints have ranges, so the result is compared with them, and trunk, head and arms
-are corrected by what they are off. The pelvis follows its recorded path on the floor; its height is that of feet on the
-floor.
+The joints over time become the source motion of a retargeting to a body of the recorded size, with feet on the floor.
+The joints of COCO-17 are not the axes of the hinges, so inverse kinematics then bring the body's joints to them.
 
 An orientation of trunk, head or feet, (N, 3, 3), has the columns forward, left and up; standing upright and facing +x
 is the identity.
 """
-
-from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -18,14 +14,13 @@ from mvpose.arrays import Floats
 from mvpose.recording import People
 from mvpose.skeleton import COCO17
 from simharness.world.humans.anatomy import DOFS, SIDES
-from simharness.world.motion.mocap.retarget import SourceMotion, retarget, tilt_pelvis
+from simharness.world.motion.mocap.joint_following import follow_joints
+from simharness.world.motion.mocap.retarget import SourceMotion, low_pass, retarget, tilt_pelvis
 from simharness.world.motion.motion import RATE, Motion, interpolate
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import smoothstep
 
 _CONTEXT = 0.5  # seconds before and after the performed part that determine steps and the height of the floor
-_CORRECTIONS = 2  # rounds; the next ones change little
-_MOST = np.radians(40.0)  # largest correction of a direction in one round: one beyond a joint's range has no end
 
 
 def reenact(people: People, person: int, kinematics: Kinematics, *, time: Floats) -> Motion:
@@ -42,19 +37,16 @@ def reenact(people: People, person: int, kinematics: Kinematics, *, time: Floats
     start, end = np.clip([time[0] - _CONTEXT, time[-1] + _CONTEXT], 0.0, people.times[-1])
     clock = np.linspace(start, end, round((end - start) * RATE) + 1)
     joints = interpolate(people.times, people.joints[:, person].reshape(people.frames, -1), clock)
-    motion = follow(joints.reshape(len(clock), -1, 3), kinematics, time=clock)
+    joints = low_pass(joints, RATE).reshape(len(clock), -1, 3)
+    motion = follow(joints, kinematics, time=clock)
     return Motion(time, *motion.read(time))
 
 
 def follow(joints: Floats, kinematics: Kinematics, *, time: Floats) -> Motion:
     """Return the motion of a body whose joints follow COCO-17 joints (N, 17, 3), metres, at times (N,), seconds."""
-    neutral = _neutral_joints(kinematics)
-    source = _source(time, joints, kinematics, neutral)
-    motion = retarget(source, kinematics)
-    for _ in range(_CORRECTIONS):
-        source = _corrected(source, joints, kinematics.joints(motion), neutral)
-        motion = retarget(source, kinematics)
-    return motion
+    source = _source(time, joints, kinematics, _neutral_joints(kinematics))
+    rate = 1.0 / np.diff(time).mean() if len(time) > 1 else RATE
+    return follow_joints(retarget(source, kinematics), kinematics, joints, rate=rate)
 
 
 def _neutral_joints(kinematics: Kinematics) -> Floats:
@@ -85,37 +77,6 @@ def _source(time: Floats, joints: Floats, kinematics: Kinematics, neutral: Float
     turns["pelvis"] = tilt_pelvis(pelvis, segments, rate=rate)
     legs = dict.fromkeys(SIDES, sum(kinematics.leg_parts))
     return SourceMotion(time=time, turns=turns, segments=segments, hips=centre, legs=legs)
-
-
-def _corrected(source: SourceMotion, wanted: Floats, reached: Floats, neutral: Floats) -> SourceMotion:
-    """Return the source motion changed by the difference between wanted and reached COCO-17 joints, (N, 17, 3)."""
-    turns, segments = dict(source.turns), dict(source.segments)
-    for name, turn in (("chest", chest_turn), ("head", lambda joints: head_turn(joints, neutral))):
-        turns[name] = _limited(turn(wanted) @ turn(reached).swapaxes(1, 2)) @ turns[name]
-    for side in SIDES:
-        for part in ("arm", "forearm"):
-            off = _between(segment(reached, side, part), segment(wanted, side, part))
-            segments[side, part] = (off @ segments[side, part][..., None])[..., 0]
-    shift = middle(wanted, "hip") - middle(reached, "hip")
-    shift[:, 2] = 0.0
-    for side in SIDES:  # the ankles stay
-        segments[side, "thigh"] = segments[side, "thigh"] - shift
-    return replace(source, turns=turns, segments=segments, hips=source.hips + shift)
-
-
-def _between(start: Floats, end: Floats) -> Floats:
-    """Return the smallest rotations (N, 3, 3) between two directions (N, 3), limited to ``_MOST``."""
-    start, end = unit(start), unit(end)
-    axis = np.cross(start, end)
-    angle = np.arctan2(np.linalg.norm(axis, axis=1), (start * end).sum(axis=1))
-    return Rotation.from_rotvec(unit(axis) * np.minimum(angle, _MOST)[:, None]).as_matrix()
-
-
-def _limited(turn: Floats) -> Floats:
-    """Return rotations (N, 3, 3) limited to ``_MOST``."""
-    vector = Rotation.from_matrix(turn).as_rotvec()
-    angle = np.linalg.norm(vector, axis=1, keepdims=True)
-    return Rotation.from_rotvec(vector * np.minimum(1.0, _MOST / np.maximum(angle, 1e-12))).as_matrix()
 
 
 _UP = np.array([0.0, 0.0, 1.0])

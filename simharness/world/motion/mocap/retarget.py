@@ -145,13 +145,14 @@ def _resampled(recording: RecordedMotion, rate: float) -> RecordedMotion:
     turns = recording.turns
     flips = np.where((turns[1:] * turns[:-1]).sum(axis=-1, keepdims=True) < 0, -1.0, 1.0)
     turns = turns * np.concatenate([np.ones_like(turns[:1, :, :1]), np.cumprod(flips, axis=0)])
-    turns = _low_pass(turns, recording.rate)
+    turns = low_pass(turns, recording.rate)
     turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
-    root = _low_pass(recording.root, recording.rate)
+    root = low_pass(recording.root, recording.rate)
     return replace(recording, rate=recording.rate / step, root=root[::step], turns=turns[::step])
 
 
-def _low_pass(values: Floats, rate: float) -> Floats:
+def low_pass(values: Floats, rate: float) -> Floats:
+    """Return values (N, ...) at ``rate`` frames per second without what is faster than human motion."""
     deviation = np.sqrt(np.log(2) / 2) / (2 * np.pi * _CUTOFF)  # of a Gaussian that passes half the power at _CUTOFF
     return np.asarray(gaussian_filter1d(values, deviation * rate, axis=0, mode="nearest"))
 

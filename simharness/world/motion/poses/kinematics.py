@@ -9,6 +9,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from mvpose.arrays import Floats
+from mvpose.skeleton import COCO17
 from simharness.world.humans.anatomy import DOFS, RANGES, SIDES
 from simharness.world.humans.body import Body
 from simharness.world.humans.mujoco_model import bone_transforms, person_spec
@@ -84,6 +85,45 @@ class Kinematics:
     def joints(self, motion: Motion) -> Floats:
         """Return the COCO-17 joints, (T, 17, 3) metres."""
         return self.body.joints(self.transforms(motion))
+
+    def linearised(self, motion: Motion) -> "LinearPose":
+        """Return joints and feet, and how they move with the pose."""
+        frames, bones = len(motion), len(self.body.bones)
+        places, turns = np.empty((frames, bones, 3)), np.empty((frames, bones, 3, 3))
+        anchors, axes = np.empty((2, frames, len(DOFS), 3))
+        for frame, (root, angles) in enumerate(zip(motion.root, motion.angles, strict=True)):
+            places[frame], turns[frame] = self._pose(root, angles)
+            anchors[frame], axes[frame] = self._data.xanchor[self._hinges], self._data.xaxis[self._hinges]
+        near = np.flatnonzero(self.body.keypoints[: len(COCO17)].any(axis=(0, 2)))  # bones that carry joints
+        transforms = bone_transforms(self.body, places, turns)[:, None, near]
+        keypoints, moves = self.body.keypoints[: len(COCO17), near], self._moves[:, near]
+        points = (transforms @ keypoints[..., None])[..., 0]  # share of each bone in each joint, (T, 17, B, 3)
+        joints = points.sum(axis=2)
+        moved = moves @ points - (keypoints[:, :, 3] @ moves.T)[..., None] * anchors[:, None]
+        translation = np.broadcast_to(np.eye(3), (*joints.shape[:2], 3, 3))
+        rotation = np.cross(np.eye(3), (joints - motion.root[:, None, :3])[:, :, None])
+        derivatives = np.concatenate([translation, rotation, np.cross(axes[:, None], moved)], axis=2)
+        feet = [self.body.index(_FEET[side]) for side in SIDES]
+        spins = np.broadcast_to(np.concatenate([np.zeros((3, 3)), np.eye(3)]), (frames, 2, 6, 3))
+        turning = np.concatenate([spins, axes[:, None] * self._moves.T[feet][None, :, :, None]], axis=2)
+        return LinearPose(joints, derivatives.swapaxes(2, 3), places[:, feet], turns[:, feet], turning.swapaxes(2, 3))
+
+    @cached_property
+    def _hinges(self) -> list[int]:
+        """Indices of the hinges in the MuJoCo model, (D,)."""
+        return [self._model.joint(name).id for name in DOFS]
+
+    @cached_property
+    def _moves(self) -> Floats:
+        """Whether a hinge moves a bone, (D, B)."""
+        moves = np.zeros((len(DOFS), len(self.body.bones)))
+        own = self._model.jnt_bodyid[self._hinges]
+        for bone, name in enumerate(self.body.bones):
+            above = self._model.body(name).id
+            while above:
+                moves[own == above, bone] = 1.0
+                above = self._model.body_parentid[above]
+        return moves
 
     @cached_property
     def neutral_skin(self) -> Floats:
@@ -166,6 +206,26 @@ class Kinematics:
             end=end,
             ranges=np.array([RANGES[name] for name in hinges]),
         )
+
+
+@dataclass(frozen=True)
+class LinearPose:
+    """Joints and feet over T frames, and their derivatives by the pose.
+
+    The columns of the derivatives are translation and rotation of the pelvis in the world, metres and radians, and the
+    D angles. Feet are left and right.
+    """
+
+    joints: Floats
+    """COCO-17 joints, (T, 17, 3) metres."""
+    joint_derivatives: Floats
+    """Derivatives of the joints, (T, 17, 3, 6 + D)."""
+    ankles: Floats
+    """Hinges of the ankles, (T, 2, 3) metres."""
+    feet: Floats
+    """Orientations of the feet, (T, 2, 3, 3)."""
+    foot_derivatives: Floats
+    """Rotations of the feet in the world, (T, 2, 3, 6 + D)."""
 
 
 class Addresses:
