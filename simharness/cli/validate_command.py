@@ -119,13 +119,15 @@ def _print_skill(validation: "Validation", name: str, console: Console) -> None:
     """Print the error of the forecasts, their skill, and whether the recording can be told from its twins."""
     from simharness.outputs.validation import tables
 
-    rivals, rows = tables.skill_rows(validation)
+    rivals = list(dict.fromkeys(rival for each in validation.skills for rival in each.rivals))
     title = f"{name}: mean error of the forecasts, points of PCP, and skill against rivals"
     table = plain_table(title, ("forecasts",), ("error", *rivals), pad_edge=False)
-    for row in rows:
-        skills = [f"{skill}\n[dim]{ends}[/]" for _, (skill, ends) in row.rivals]
-        table.add_row(row.title, f"{row.error[0]}\n[dim]{row.error[1]}[/]", *skills)
-    if rows:
+    for each in validation.skills:
+        figures = [(each.error, 1), *((each.rivals[name][1], 2) if name in each.rivals else None for name in rivals)]
+        texts = [tables.with_interval(*figure) if figure else (tables.NOTHING, "") for figure in figures]
+        forecasts = f"{tables.SKILL_GROUPS[each.what]}, {each.variant}"
+        table.add_row(forecasts, *(f"{text}\n[dim]{ends}[/]" for text, ends in texts))
+    if validation.skills:
         console.print(table, highlight=False)
     corrected = [tables.correction_sentence(validation.corrections)] if validation.corrections else []
     for sentence in (*corrected, tables.distance_sentence(validation.distance), *tables.cancelling_parts(validation)):

@@ -15,6 +15,7 @@ from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.validation import Validation
 from simharness.reality.validation.verdicts import BOUNDS, VerdictState
 from simharness.runtime.number_text import fixed
+from simharness.scoring.frame_scores import RULES
 from simharness.trial.identity import provenance_sentence
 
 _APART = 6  # groups of figures that are named as those in which twins differ most
@@ -38,96 +39,37 @@ def render_validation(validation: Validation, *, provenance: Mapping[str, Any], 
         A self-contained HTML document.
     """
     recording = validation.recording
-    rivals, skill = tables.skill_rows(validation)
+    pcp = [figures["pcp"][rule] for figures in validation.whole.variants.values() for rule in tables.PUBLISHED]
     return fill_template(
         "validation.html",
         folder=TEMPLATES,
         program="simharness",
         name=recording.name,
+        recording=recording,
+        validation=validation,
         code=provenance["code"],
         fitted_on=fitted_on,
-        facts=_facts(validation),
-        cards=_cards(validation),
-        distance=tables.distance_sentence(validation.distance),
-        apart=[
-            (key.replace("_", " "), fixed(each, 1)) for key, each in list(validation.distance.groups.items())[:_APART]
-        ],
-        corrected="" if validation.corrections is None else tables.correction_sentence(validation.corrections),
-        cancelling=tables.cancelling_parts(validation),
-        rivals=rivals,
-        skill=skill,
-        agreements=tables.agreement_rows(validation),
-        group_columns=tables.GROUP_COLUMNS,
+        tables=tables,
+        fixed=fixed,
+        isfinite=np.isfinite,
+        all_variants=ALL,
+        treatments=KINDS,
+        worst=max(abs(each.difference) for each in pcp),
+        counts={state.value: sum(each.state == state for each in validation.verdicts) for state in VerdictState},
+        apart=list(validation.distance.groups.items())[:_APART],
+        rivals=list(dict.fromkeys(rival for each in validation.skills for rival in each.rivals)),
         groups=tables.group_rows(validation.verdicts),
         verdicts=list(tables.verdict_rows(validation.verdicts)),
         heads=[_HEADS.get(rule.mapping, rule.mapping) for rule in tables.PUBLISHED],
-        variants=tables.variant_rows(validation),
-        contrasts=tables.contrast_rows(validation),
-        people=tables.people_rows(validation),
-        subsets=list(tables.subset_rows(validation)),
-        losses=list(tables.response_rows(validation)),
-        sampled=validation.subsets.sampled,
-        measurements=tables.measurement_rows(validation),
+        rules=(*tables.PUBLISHED, RULES[2]),
         colors=plots.colors(validation.plan.variants),
         plots={key: Markup(svg) for key, svg in _plots(validation).items()},
         curves=[(name, Markup(svg)) for name, svg in _subset_plots(validation)],
         responses=[(title, Markup(svg)) for title, svg in _response_plots(validation)],
-        subset_ranks=_ranks({name: rank.mean for name, rank in validation.subsets.ranks.items()}),
         bounds=BOUNDS,
         command=provenance.get("command") or "",
         provenance=provenance_sentence(provenance),
     )
-
-
-def _facts(validation: Validation) -> list[tuple[str, str]]:
-    recording = validation.recording
-    return [
-        ("frames", f"{len(recording)}, annotated"),
-        ("cameras", f"{len(recording.rig)}"),
-        ("actors", f"{recording.people}, {len(recording.scored)} of them scored"),
-        ("detector", recording.kind),
-        ("twins", f"{validation.twins} of {validation.twin_frames:.0f} frames"),
-        ("calibration draws", f"{validation.plan.draws}"),
-    ]
-
-
-def _cards(validation: Validation) -> list[dict[str, str]]:
-    """Return the headline numbers: errors of the forecasts and their skill, all cameras, and verdicts by state."""
-    states = [verdict.state for verdict in validation.verdicts]
-    scores = [of["pcp"] for of in validation.whole.variants.values()]
-    of_variants = [abs(pcp[rule].difference) for pcp in scores for rule in tables.PUBLISHED]
-    cards = [
-        {
-            "title": "All cameras",
-            "text": f"{fixed(max(of_variants), 1)} points",
-            "about": "largest difference of PCP between simulation and reality, all variants, both head rules",
-        }
-    ]
-    for each in validation.skills:
-        if each.variant == ALL:
-            against = ", ".join(
-                f"{fixed(skill.mean, 2)} against {rival}"
-                for rival, (_, skill) in each.rivals.items()
-                if np.isfinite(skill.mean)
-            )
-            ends = f"{fixed(each.error.low, 1)} to {fixed(each.error.high, 1)}"
-            cards.append(
-                {
-                    "title": tables.SKILL_GROUPS[each.what].replace("losses", "Losses"),
-                    "text": f"{fixed(each.error.mean, 1)} points",
-                    "about": f"mean error ({ends}) of {each.conditions} forecasts; skill {against or '–'}",
-                }
-            )
-    counts = {state: states.count(state) for state in VerdictState}
-    failed, unknown = counts[VerdictState.FAILS], counts[VerdictState.CANNOT_TELL]
-    return [
-        *cards,
-        {
-            "title": "Verdicts",
-            "text": f"{counts[VerdictState.HOLDS]} of {len(states)} hold",
-            "about": f"{failed} fail, of {unknown} nobody can tell from this recording",
-        },
-    ]
 
 
 def _points(validation: Validation) -> dict[str, dict[str, list[tuple[float, float]]]]:
@@ -211,8 +153,3 @@ def _response_plots(validation: Validation) -> list[tuple[str, str]]:
         for kind in dict.fromkeys(each.kind for each in validation.responses)
     }
     return [(KINDS[kind].title, plots.response(of, shades, name=f"dose-{kind}")) for kind, of in by_kind.items()]
-
-
-def _ranks(ranks: Mapping[str, float]) -> str:
-    """Return the rank correlations of variants as text."""
-    return ", ".join(f"{name} {rank:.2f}" for name, rank in ranks.items())

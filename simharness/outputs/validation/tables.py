@@ -105,31 +105,18 @@ def _numbers(verdict: BoundVerdict) -> tuple[tuple[str, str], ...]:
     return (real, ""), (twin, ""), (signed(factor * verdict.difference, digits), ends), (bound, "")
 
 
-@dataclass(frozen=True)
-class ComparedCells:
-    """Cells of a comparison: real, simulated, difference, each with its interval in small print."""
-
-    real: tuple[str, str]
-    twin: tuple[str, str]
-    difference: tuple[str, str]
-
-
-def cells(figure: Compared, digits: int, *, factor: float = 1.0) -> ComparedCells:
-    """Return the cells of a comparison, numbers times ``factor`` with so many decimals."""
+def cells(figure: Compared, digits: int, factor: float) -> tuple[tuple[str, str], ...]:
+    """Return real, simulated and difference times ``factor`` with so many decimals, each with its interval."""
     down, up = figure.uncertainty
-    difference = figure.difference
-    ends = (difference - down, difference + up)
-    return ComparedCells(
-        _with_interval(figure.real, digits, factor),
-        _with_interval(figure.twin, digits, factor),
-        (
-            signed(factor * difference, digits) if np.isfinite(difference) else NOTHING,
-            _span(factor * ends[0], factor * ends[1], digits) if np.isfinite(figure.real.low) else "",
-        ),
-    )
+    ends = (figure.difference - down, figure.difference + up)
+    difference = signed(factor * figure.difference, digits) if np.isfinite(figure.difference) else NOTHING
+    span = _span(factor * ends[0], factor * ends[1], digits) if np.isfinite(figure.real.low) else ""
+    real, twin = (with_interval(each, digits, factor) for each in (figure.real, figure.twin))
+    return real, twin, (difference, span)
 
 
-def _with_interval(value: Interval, digits: int, factor: float) -> tuple[str, str]:
+def with_interval(value: Interval, digits: int, factor: float = 1.0) -> tuple[str, str]:
+    """Return a number times ``factor`` with so many decimals, and its interval."""
     if not np.isfinite(value.mean):
         return NOTHING, ""
     return fixed(factor * value.mean, digits), _span(factor * value.low, factor * value.high, digits)
@@ -139,103 +126,8 @@ def _span(low: float, high: float, digits: int) -> str:
     return f"{fixed(low, digits)} to {fixed(high, digits)}" if np.isfinite(low) and np.isfinite(high) else ""
 
 
-def variant_rows(validation: Validation) -> list[tuple[str, list[ComparedCells]]]:
-    """Return a row for each variant: PCP by both head rules, and MPJPE."""
-    return [
-        (name, [*(cells(scores["pcp"][rule], 1) for rule in PUBLISHED), cells(scores["mpjpe_mm"][PUBLISHED[0]], 1)])
-        for name, scores in validation.whole.variants.items()
-    ]
-
-
-def people_rows(validation: Validation) -> list[tuple[str, list[ComparedCells]]]:
-    """Return a row for each variant: ghosts per frame, recall and precision."""
-    first = PUBLISHED[0]
-    return [
-        (
-            name,
-            [
-                cells(scores["ghosts_per_frame"][first], 2),
-                *(cells(scores[key][first], 1, factor=100.0) for key in ("recall", "precision")),
-            ],
-        )
-        for name, scores in validation.whole.variants.items()
-    ]
-
-
-def contrast_rows(validation: Validation) -> list[tuple[str, list[ComparedCells]]]:
-    """Return a row for each pair of variants: the difference of PCP by every rule for the head."""
-    return [
-        (f"{one} − {other}", [cells(figures[rule], 1) for rule in (*PUBLISHED, RULES[2])])
-        for (one, other), figures in validation.whole.contrasts.items()
-    ]
-
-
-def subset_rows(validation: Validation) -> Iterator[tuple[str, list[tuple[str, ComparedCells]]]]:
-    """Yield the PCP of each variant, and ``full`` minus ``fast``, by number of cameras."""
-    subsets = validation.subsets
-    for name in validation.plan.variants:
-        yield name, [(f"{count} cameras", cells(curve[name], 1)) for count, curve in subsets.curves.items()]
-    if subsets.gains:
-        yield "full − fast", [(f"{count} cameras", cells(gain, 1)) for count, gain in subsets.gains.items()]
-
-
-def response_rows(validation: Validation) -> Iterator[tuple[str, list[tuple[str, ComparedCells]]]]:
-    """Yield the loss of PCP of each variant, by treatment and level."""
-    groups: dict[str, list[tuple[str, ComparedCells]]] = {}
-    for each in validation.responses:
-        title = f"{KINDS[each.kind].title}, {level_text(each.kind, each.level)}"
-        groups.setdefault(title, []).append((each.variant, cells(each.loss, 1)))
-    yield from groups.items()
-
-
 SKILL_GROUPS: Mapping[str, str] = {"losses": "losses by added errors", "subsets": "PCP with fewer cameras"}
 """Titles of the groups of conditions of :func:`~simharness.reality.validation.skill.forecast_groups`."""
-
-
-@dataclass(frozen=True)
-class SkillRow:
-    """Row of a table of skill."""
-
-    title: str
-    """Conditions and variant."""
-    conditions: int
-    """Number of conditions."""
-    error: tuple[str, str]
-    """Mean absolute difference of the twins, points, and its interval."""
-    rivals: tuple[tuple[tuple[str, str], tuple[str, str]], ...]
-    """Error of each rival, and skill against it, with intervals."""
-
-
-def skill_rows(validation: Validation) -> tuple[list[str], list[SkillRow]]:
-    """Return the names of the rivals, and a row for each group of conditions and variant."""
-    names = list(dict.fromkeys(rival for each in validation.skills for rival in each.rivals))
-    nothing = (NOTHING, "")
-    rows = []
-    for each in validation.skills:
-        rivals = [
-            (_with_interval(each.rivals[name][0], 1, 1.0), _with_interval(each.rivals[name][1], 2, 1.0))
-            if name in each.rivals
-            else (nothing, nothing)
-            for name in names
-        ]
-        title = f"{SKILL_GROUPS[each.what]}, {each.variant}"
-        rows.append(SkillRow(title, each.conditions, _with_interval(each.error, 1, 1.0), tuple(rivals)))
-    return names, rows
-
-
-def agreement_rows(validation: Validation) -> list[tuple[str, int, list[tuple[str, str]]]]:
-    """Return variant, number of conditions, and the correlations and the rank violation with intervals."""
-    return [
-        (
-            each.variant,
-            each.conditions,
-            [
-                *(_with_interval(value, 3, 1.0) for value in (each.pearson, each.spearman)),
-                _with_interval(each.rank_violation, 1, 1.0),
-            ],
-        )
-        for each in validation.agreements
-    ]
 
 
 def cancelling_parts(validation: Validation) -> list[str]:
@@ -281,18 +173,6 @@ def level_text(kind: str, level: float) -> str:
     """Return a level of a treatment with its unit."""
     unit = KINDS[kind].unit
     return f"{100 * level:g} %" if unit == "share" else f"{level:g} {unit}"
-
-
-def measurement_rows(validation: Validation) -> list[tuple[str, ComparedCells]]:
-    """Return a row for each measurement of the detections that the recording has."""
-    rows = []
-    for key, figure in validation.whole.measured.items():
-        if np.isfinite(figure.real.mean):
-            title = measurement_title(key)
-            percent = title.endswith(", %")
-            digits = 2 if key.startswith(("score", "phantoms", "others", "residual", "memory")) else 1
-            rows.append((title, cells(figure, digits, factor=100.0 if percent else 1.0)))
-    return rows
 
 
 @cache
