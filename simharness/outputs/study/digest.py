@@ -45,7 +45,6 @@ _OVER_TIME = tuple(dict.fromkeys((*HEADS_OVER_TIME, *tables.OVER_TIME)))  # wher
 
 _CURVES = (("pcp", "map"), ("recall", "ghosts"))  # two scores in each row of the picture
 _MAX_COLUMNS = 3  # panels of cases in a row
-_STAGES = ("affinity", "matching", "reconstruction")
 
 
 def write_digest(results: Results, folder: Path, *, thresholds: Mapping[str, float] = THRESHOLDS) -> None:
@@ -101,7 +100,13 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
         **_swept(factors(results), names, thresholds, scored),
         "by_case": {case: _swept(factors(results, case), names, thresholds, scored) for case in cases},
         "failures": {variant: failure_rates(results, variant) for variant in names},
-        "time_ms": {variant: _times(trials.filter(pl.col("variant") == variant)) for variant in names},
+        "time_ms": {
+            variant: {
+                stage: round(mean, 3)
+                for stage, mean in tables.stage_means(trials.filter(pl.col("variant") == variant)).items()
+            }
+            for variant in names
+        },
     }
 
 
@@ -216,13 +221,6 @@ def _ends(interval: Interval) -> list[float | None] | None:
     return [round(end, 4) if math.isfinite(end) else None for end in (interval.mean, interval.low, interval.high)]
 
 
-def _times(trials: pl.DataFrame) -> dict[str, float]:
-    """Return the time of each stage, ms: means over trials of the medians over frames."""
-    columns = {**{stage: f"time_{stage}_ms" for stage in _STAGES}, "total": "time_ms"}
-    means = {stage: trials[column].mean() for stage, column in columns.items()}
-    return {stage: round(float(mean), 3) for stage, mean in means.items() if isinstance(mean, int | float)}
-
-
 def markdown(digest: Mapping[str, Any]) -> str:
     """Return the text of a digest.
 
@@ -239,7 +237,11 @@ def markdown(digest: Mapping[str, Any]) -> str:
     for factor, case in product(digest["factors"], parts):
         for each in parts[case]["breaking"]:
             if each["factor"] == factor["key"]:
-                row = (f"`{each['factor']}`", *([case] if case else []), _threshold(each))
+                row = (
+                    f"`{each['factor']}`",
+                    *([case] if case else []),
+                    tables.broken(each["score"], each["threshold"]),
+                )
                 breaking.setdefault(row, {})[each["variant"]] = _broken(each, len(seeds))
     text = fill_template(
         "digest.md",
@@ -312,13 +314,6 @@ def _interval(ends: Sequence[float | None] | None, score: str) -> str:
         return "–"
     digits = SCORES[score].digits
     return _with_ends(fixed(mean, digits), low, high, digits)
-
-
-def _threshold(each: Mapping[str, Any]) -> str:
-    """Return the condition that counts as broken."""
-    info = SCORES[each["score"]]
-    past = "under" if info.better == "higher" else "over"
-    return f"{info.title} {past} {each['threshold']:g}{f' {info.unit}' if info.unit else ''}"
 
 
 def _broken(each: Mapping[str, Any], seeds: int) -> str:

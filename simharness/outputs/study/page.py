@@ -16,7 +16,7 @@ from simharness.outputs.blame_section import blame_section
 from simharness.outputs.run.plots import stage_times
 from simharness.outputs.study import plots, tables
 from simharness.outputs.study.curves import finding, grid, panels
-from simharness.outputs.study.tables import failure_section
+from simharness.outputs.study.tables import failure_rows
 from simharness.outputs.study.worst_frames import WorstFramePictures, show, worst_frames
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scoring.catalogue import SCORES
@@ -28,7 +28,6 @@ from simharness.study.study_folder import Results
 CURVES = ("pcp", "recall", "mpjpe_mm", "ghosts")
 """Scores with robustness curves, besides :data:`simharness.outputs.study.tables.OVER_TIME` where people are tracked."""
 
-_STAGES = ("affinity", "matching", "reconstruction")
 _MAX_ERRORS = 20  # failed trials in the list on the page
 
 
@@ -100,13 +99,15 @@ def render_study(
     variants = [name for name in info["variants"] if name in set(trials["variant"])]
     swept = factors_by_case(results) if variants else {}
     seeds = trials["seed"].n_unique()
+    study_file = results.folder / "study.toml"
     drawn = (*CURVES, *(tables.OVER_TIME if tables.tracks_people(trials) else ()))
     return fill_template(
         "study.html",
         folder=TEMPLATES,
         program="simharness",
         info=info,
-        facts=_facts(results),
+        **_scenes(results),
+        time=duration(info["seconds"]),
         variants=variants,
         seeds=seeds,
         condition=tables.condition(seeds) if seeds else "",
@@ -127,38 +128,27 @@ def render_study(
         heats=_heats(swept, variants, drawn, one_at_a_time=info["one_at_a_time"]),
         threshold_drawn=any(score in thresholds for score in drawn),
         breaking=_breaking(swept, variants, thresholds),
-        failures=failure_section(results, variants),
+        failures=failure_rows(results, variants),
         blame=found and blame_section(found),
         blame_hint=f"simharness report {results.folder} --blame 10",
         shown=shown,
         times=_times(results, variants),
         study_folder=results.folder,
-        machine=_machine(info["machine"]),
-        study_file=_study_file(results.folder),
+        study_file=study_file.read_text(encoding="utf-8") if study_file.is_file() else "",
     )
 
 
-def _facts(results: Results) -> list[tuple[str, str]]:
-    info, trials = results.info, results.trials
-    finished = info["trials"] - len(info["failed"])
-    facts = [
-        ("trials", f"{finished} of {info['trials']}" if info["failed"] else f"{finished}"),
-        ("settings", f"{info['settings']}"),
-        ("seeds", f"{len(info['seeds'])}"),
-        ("variants", f"{len(info['variants'])}"),
-    ]
-    keys = [key for key in ("case", *info["factors"]) if key in trials.columns]
-    one_of_each = trials.unique(keys, keep="first", maintain_order=True)["trial"]
+def _scenes(results: Results) -> dict[str, Any]:
+    """Return the number of frames, and what differs between settings, for the facts of the page."""
+    keys = [key for key in ("case", *results.info["factors"]) if key in results.trials.columns]
+    one_of_each = results.trials.unique(keys, keep="first", maintain_order=True)["trial"]
     scenarios = [results.scenario_of(trial) for trial in one_of_each]
-    if scenarios:
-        facts += [
-            ("frames", f"{results.frames.select('trial', 'frame').n_unique():,}"),
-            ("people", _span([scenario.people.count for scenario in scenarios])),
-            ("cameras", _join(_rig(scenario.cameras) for scenario in scenarios)),
-            ("detector", _join(s.detector.label for s in scenarios)),
-        ]
-    kept = f", {info['kept']} kept" if info["kept"] else ""
-    return [*facts, ("time", f"{duration(info['seconds'])}{kept}"), ("version", f"{info['code']}")]
+    return {
+        "frames": results.frames.select("trial", "frame").n_unique() if scenarios else 0,
+        "people": _join(scenario.people.count for scenario in scenarios),
+        "cameras": _join(_rig(scenario.cameras) for scenario in scenarios),
+        "detectors": _join(scenario.detector.label for scenario in scenarios),
+    }
 
 
 def _rig(cameras: CamerasSection) -> str | int:
@@ -170,13 +160,10 @@ def _rig(cameras: CamerasSection) -> str | int:
 def _join(values: Any) -> str:
     """Return the distinct values as text: numbers as their range, and up to three words."""
     different = list(dict.fromkeys(values))
-    numbers = [value for value in different if isinstance(value, int)]
+    numbers = sorted(value for value in different if isinstance(value, int))
     words = [value for value in different if not isinstance(value, int)]
-    return ", ".join([*([_span(numbers)] if numbers else []), *words[:3], *(["…"] if len(words) > 3 else [])])
-
-
-def _span(numbers: Sequence[int]) -> str:
-    return f"{min(numbers)}" if min(numbers) == max(numbers) else f"{min(numbers)} to {max(numbers)}"
+    span = [" to ".join(dict.fromkeys((f"{numbers[0]}", f"{numbers[-1]}")))] if numbers else []
+    return ", ".join([*span, *words[:3], *(["…"] if len(words) > 3 else [])])
 
 
 def _curves(
@@ -261,22 +248,16 @@ def _breaking(
     for key, by_case in panels(swept).items():
         rows = []
         for case, factor in by_case.items():
-            lost = factor_breaking_points(factor, variants, "pcp", -LOST, relative=True) if factor.numeric else []
-            if lost:
-                found = {each.variant: each for each in lost}
-                cells = [tables.breaking_cell(found.get(variant)) for variant in variants]
-                rows.append({"case": case, "broken": f"{LOST:g} points of PCP lost", "cells": cells})
-            for score, threshold in thresholds.items() if factor.numeric else ():
-                info = SCORES[score]
-                points = {each.variant: each for each in factor_breaking_points(factor, variants, score, threshold)}
-                past = "under" if info.better == "higher" else "over"
-                rows.append(
-                    {
-                        "case": case,
-                        "broken": f"{info.title} {past} {threshold:g}{f' {info.unit}' if info.unit else ''}",
-                        "cells": [tables.breaking_cell(points.get(variant)) for variant in variants],
-                    }
-                )
+            if factor.numeric:
+                lost = factor_breaking_points(factor, variants, "pcp", -LOST, relative=True)
+                points = {f"{LOST:g} points of PCP lost": lost} if lost else {}
+                for score, threshold in thresholds.items():
+                    condition = tables.broken(score, threshold)
+                    points[condition] = factor_breaking_points(factor, variants, score, threshold)
+                for condition, each in points.items():
+                    found = {point.variant: point for point in each}
+                    cells = [tables.breaking_cell(found.get(variant)) for variant in variants]
+                    rows.append({"case": case, "broken": condition, "cells": cells})
         if rows:
             tables_by_factor.append({"factor": key, "rows": rows})
     return tables_by_factor
@@ -288,22 +269,9 @@ def _times(results: Results, variants: Sequence[str]) -> dict[str, Any]:
     spread, rows = {}, []
     for variant in variants:
         trials = results.trials.filter(pl.col("variant") == variant)
-        means = {stage: trials[f"time_{stage}_ms"].mean() for stage in _STAGES} | {"total": trials["time_ms"].mean()}
-        stages[variant] = {stage: float(value) for stage, value in means.items() if isinstance(value, int | float)}
+        stages[variant] = tables.stage_means(trials)
         times = results.frames.filter(pl.col("variant") == variant)["time_ms"].drop_nulls()
         spread[variant] = times.to_numpy()
         if len(times):
             rows.append((variant, [f"{times.quantile(share):.2f}" for share in (0.5, 0.9, 0.99, 1.0)]))
     return {"stages": Markup(stage_times(stages)), "spread": Markup(plots.time_distribution(spread)), "rows": rows}
-
-
-def _machine(machine: Any) -> str:
-    """Return the description of a machine in one line."""
-    if isinstance(machine, Mapping):
-        return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in machine.items())
-    return str(machine)
-
-
-def _study_file(folder: Path) -> str:
-    file = folder / "study.toml"
-    return file.read_text(encoding="utf-8") if file.is_file() else ""

@@ -14,6 +14,7 @@ from mvpose.report.tables import NOTHING, Cell
 from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES, ScoreInfo
 from simharness.scoring.failure_classes import DISPLACED, FailureKind
+from simharness.scoring.score_summary import STAGES
 from simharness.statistics.intervals import Interval, mean_interval
 from simharness.statistics.many_tests import holm
 from simharness.statistics.paired_tests import paired
@@ -156,6 +157,19 @@ def _signed(value: float, score: ScoreInfo) -> str:
     return signed(value, score.digits).replace("-", "−")
 
 
+def stage_means(trials: pl.DataFrame) -> dict[str, float]:
+    """Return the time of each stage, ms: means over trials of the medians over frames."""
+    means = {stage: trials["time_ms" if stage == "total" else f"time_{stage}_ms"].mean() for stage in STAGES}
+    return {stage: float(mean) for stage, mean in means.items() if isinstance(mean, int | float)}
+
+
+def broken(score: str, threshold: float) -> str:
+    """Return the condition that counts as broken."""
+    info = SCORES[score]
+    past = "under" if info.better == "higher" else "over"
+    return f"{info.title} {past} {threshold:g}{f' {info.unit}' if info.unit else ''}"
+
+
 def breaking_cell(breaking: FactorBreakingPoint | None) -> Cell:
     """Return the cell of a breaking point."""
     if breaking is None:
@@ -212,27 +226,17 @@ MEANING: Mapping[FailureKind, str] = {
 _JOINTS = (FailureKind.SWAPPED_LIMB, FailureKind.DISPLACED_JOINT)
 
 
-def failure_section(results: Results, variants: Sequence[str]) -> dict[str, Any]:
+def failure_rows(results: Results, variants: Sequence[str]) -> dict[str, Any]:
     """Return what the page shows of the failures, for its template; empty without failures."""
     failures = results.failures
     if not len(failures):
         return {}
-    frames = dict(results.frames["variant"].value_counts().iter_rows())
+    frames, people = (dict(table["variant"].value_counts().iter_rows()) for table in (results.frames, results.people))
     kinds = failures_per_100_frames(failures, frames, variants, "kind")
-    most = max(rate for variant in variants for rate in (*kinds[variant].values(), 0.0)) or 1.0
-    people = dict(results.people["variant"].value_counts().iter_rows())
-    rows = [
-        {
-            "kind": str(kind).replace("_", " "),
-            "meaning": meaning,
-            "rates": [(rate := kinds[variant].get(str(kind), 0.0), rate / most) for variant in variants],
-        }
-        for kind, meaning in MEANING.items()
-        if any(kinds[variant].get(str(kind)) for variant in variants)
-    ]
     return {
-        "rows": rows,
-        "all": [f"{sum(kinds[variant].values()):.1f}" for variant in variants],
+        "meanings": {kind: text for kind, text in MEANING.items() if any(of.get(str(kind)) for of in kinds.values())},
+        "rates": kinds,
+        "most": max(rate for of in kinds.values() for rate in (*of.values(), 0.0)) or 1.0,
         "wrong": [_wrong_people(failures, people, variant) for variant in variants],
         "typical": _typical(failures, variants[0]),
     }
