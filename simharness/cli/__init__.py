@@ -14,6 +14,7 @@ from simharness.cli import (
     report_command,
     run_command,
     scenarios_command,
+    shrink_command,
     study_command,
     validate_command,
 )
@@ -33,6 +34,7 @@ for command in (
     scenarios_command.mjcf,
     check_command.check,
     blame_command.blame,
+    shrink_command.shrink,
     report_command.report,
     study_command.study,
     study_command.merge,

@@ -22,6 +22,7 @@ ALONE = {
     "simharness render gathering --set sensor.profile=webcam --set sensor.jpeg=60": PICTURES,
     "simharness run passage": RAYS,
     "simharness mjcf quickstart": SMALL_SCENE,
+    "simharness shrink quickstart --set people.count=6 --set detector.profile=crowded": f"{FASTEST} --frame 0",
     "simharness scenarios": "",
     "simharness schema": "",
     "simharness show FILE": "",
@@ -44,6 +45,7 @@ NAMES = (  # mentioned
     "simharness fit-detector",
     "simharness profile-network",
     "simharness evaluate seeds",
+    "simharness shrink results/failures/NAME.toml",  # tests/simharness/hunt/test_kept_failure.py
 )
 CHECKS = (
     "simharness check ci --baseline results/baselines/ci.json --workers 2",

@@ -19,6 +19,7 @@ COMMANDS = {
     "fit-detector": ["fit-detector", "{}"],
     "validate": ["validate", "{}"],
     "report": ["report", "{}"],
+    "shrink": ["shrink", "{}"],
     "merge": ["merge", "{}", "--into", "store"],
 }
 PLACES = ["missing.toml", "a folder", "", " ", "名前", "x" * 300, "a/../../b\tc", "-", "folder/\x01"]
@@ -49,6 +50,9 @@ NUMBERS = [
     ["evaluate", "seeds", "quickstart", "--seeds", "-5"],
     ["evaluate", "seeds", "quickstart", "--seeds", ABSURD],
     ["evaluate", "twin", "shelf", "--twins", "0"],
+    ["shrink", "quickstart", "--frame", "-1"],
+    ["shrink", "quickstart", "--property", "名"],
+    ["shrink", "quickstart", "--variant", "名"],
     ["schema", "--out", "a folder"],
     ["run", "quickstart", "--out", "a file"],
     ["run", "quickstart", "--out", "a file/below"],

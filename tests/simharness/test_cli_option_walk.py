@@ -71,6 +71,7 @@ BASES = {
     "mjcf": "{lab}/tiny.toml --out {out}",
     "check": "ci --baseline {lab}/base.json",
     "blame": "{lab}/tiny.toml",
+    "shrink": "{lab}/wrong.toml --out {out}",
     "report": "{lab}/study",
     "study": "{lab}/tiny.toml --out {out}",
     "merge": "{lab}/store --into {out}",
@@ -116,6 +117,13 @@ ROWS = {
         "variant": Row("--variant full"),
         "score": Row("--score recall"),
         "cause": Row("--cause noise"),
+    },
+    "shrink": RUN
+    | {
+        "frame": Row("--frame 1"),
+        "variant": Row("--variant no-3dps"),
+        "property": Row("--property mirrored"),
+        "rival": Row("--rival full --property disagree"),
     },
     "report": {
         "out": Row("--out {out}/page.html"),
@@ -316,6 +324,7 @@ def lab(tmp_path_factory):
     """Scenario, studies, recordings, rigs and people that the commands read."""
     lab = tmp_path_factory.mktemp("walk")
     (lab / "tiny.toml").write_text(TINY)
+    (lab / "wrong.toml").write_text(TINY + "[detector.keypoints]\ninversion = 0.6\n")
     recording = walkers(frames=3, cameras=3, noise=3.0)
     describe(recording, lab, name="hall")
     describe(recording, lab, name="other")
