@@ -78,25 +78,25 @@ def render_profile(profile: NetworkProfile, check: ProfileCheck | None, *, prove
         check: its comparison with the network on other scenes; None: not made.
         provenance: keys of :func:`simharness.trial.identity.provenance`.
     """
-    labels = profile.labels
-    pictures = labels.boxes.shape[0] * labels.boxes.shape[1]
     return fill_template(
         "network_profile.html",
         folder=TEMPLATES,
         program="simharness",
         name=profile.name,
-        code=provenance["code"],
-        facts=[
-            ("pictures", f"{pictures:,}"),
-            ("scenes", f"{len(profile.scenes)}"),
-            ("conditions", f"{len({scene.case for scene in profile.scenes})}"),
-            ("joints", f"{int(labels.risk['drop'].sum()):,}"),
-            ("kind", profile.kind),
-        ],
+        profile=profile,
+        joints=int(profile.labels.risk["drop"].sum()),
         conditions=list(_plots(profile, conditions=True)),
         curves=list(_plots(profile, conditions=False)),
-        check=None if check is None else _check(check),
-        profile_text=profile.text,
+        check=check,
+        states=list(VerdictState),
+        shown={key: CATALOGUE[key].title for key in _SHOWN},
+        pairs=[] if check is None else list(combinations(check.variants, 2)),
+        groups=GROUPS,
+        kinds=KINDS,
+        figure=_figure,
+        ratio=_ratio,
+        number=_number,
+        code=provenance["code"],
         command=provenance.get("command") or "",
         provenance=provenance_sentence(provenance),
     )
@@ -113,59 +113,7 @@ def _plots(profile: NetworkProfile, *, conditions: bool) -> Iterator[tuple[str, 
         yield network.title, Markup(svg)
 
 
-def _check(check: ProfileCheck) -> dict[str, Any]:
-    """Return the tables of a check: the network, and differences of the simulated detectors from it."""
-    first, cases = check.detectors[0], list(dict.fromkeys(scene.case for scene in check.scenes))
-    return {
-        "scenes": len(check.scenes),
-        "detectors": check.detectors,
-        "verdicts": [(group, [of.count(each) for each in VerdictState]) for group, of in check.verdicts.items()],
-        "scores": [
-            (
-                CATALOGUE[key].title,
-                variant,
-                _row([check.score(name, variant, key) for name in check.detectors], 2 if key == "ghosts" else 1),
-            )
-            for key in _SHOWN
-            for variant in check.variants
-        ],
-        "contrasts": [
-            (f"{one} − {other}", _row([check.contrast(name, one, other) for name in check.detectors], 1))
-            for one, other in combinations(check.variants, 2)
-        ],
-        "cases": [
-            (case, [_cell(check.score(first, variant, "pcp", case=case), 1) for variant in check.variants])
-            for case in cases
-        ],
-        "variants": check.variants,
-        "parts": [
-            (
-                group.replace("_", " "),
-                [_cell(check.score(first, variant, f"pcp_{group}"), 1) for variant in check.variants],
-            )
-            for group in GROUPS
-        ],
-        "subsets": [
-            (
-                " ".join(str(camera + 1) for camera in cameras),
-                [_cell(check.subset(first, variant, cameras), 1) for variant in check.scenes[0].subsets[first]],
-            )
-            for cameras in next(iter(check.scenes[0].subsets[first].values()), {})
-        ],
-        "subset_variants": list(check.scenes[0].subsets[first]),
-        "errors": [
-            (kind, [_ratio(check.error(first, error, index)) for error in ("inversion", "miss", "gross")])
-            for index, kind in enumerate(KINDS)
-        ],
-    }
-
-
-def _row(figures: list[CheckedFigure], digits: int) -> list[tuple[str, str, VerdictState | None]]:
-    """Return the network's figure and the difference of each detector: text, interval, verdict."""
-    return [(_number(figures[0].network, digits), "", None), *(_cell(each, digits)[1:] for each in figures)]
-
-
-def _cell(figure: CheckedFigure, digits: int) -> tuple[str, str, str, VerdictState | None]:
+def _figure(figure: CheckedFigure, digits: int) -> tuple[str, str, str, VerdictState | None]:
     """Return the network's figure, the difference, its interval and its verdict."""
     each = figure.difference
     ends = f"{each.low:+.{digits}f} to {each.high:+.{digits}f}" if np.isfinite(each.low) else ""
