@@ -57,6 +57,7 @@ def run(cameras: int, *, annotated: bool, draw: int, films: Path) -> dict[str, A
             "high": measured[key].high,
             "measured": fitted.real[key].value,
             "n": measured[key].count,
+            "prior": measured[key].by_prior,
         }
         for key in sorted(set(measured) & set(profile))
         if measured[key].known

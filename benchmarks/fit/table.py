@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.stats import norm
 
 from benchmarks.fit.loop import BONE_NAMES
 from simharness.scenario.sections.detector_section import KINDS
@@ -26,11 +27,20 @@ def tables(draws: Sequence[Mapping[str, Any]], *, limbs: bool = True) -> Iterato
         yield from _bones(chosen)
 
 
-def inside(values: Mapping[str, float]) -> float:
-    """Return whether the interval of a parameter holds the truth, 0 or 1; NaN without an interval."""
-    low, high = values["low"], values["high"]
+def inside(values: Mapping[str, float], *, level: float = 0.95) -> float:
+    """Return whether the interval of a parameter holds the truth, 0 or 1; NaN without an interval.
+
+    Intervals of another level than 95 % have the deviations of the stated one, on a logarithmic scale where it is
+    above 0.
+    """
+    low, fitted, high = values["low"], values["fitted"], values["high"]
     if not (np.isfinite(low) and np.isfinite(high)):
         return np.nan
+    share = norm.ppf((1 + level) / 2) / norm.ppf(0.975)
+    if low > 0:
+        low, high = (fitted * (end / fitted) ** share for end in (low, high))
+    else:
+        low, high = (fitted + share * (end - fitted) for end in (low, high))
     return float(low - 1e-9 <= values["true"] <= high + 1e-9)
 
 
@@ -43,8 +53,8 @@ def _parameters(draws: Sequence[Mapping[str, Any]]) -> Iterator[str]:
                 continue
             group = start if kind in KINDS or kind.isdigit() else key
             groups[group][kind].append(values)
-    yield f"{'parameter':34s} {'true':>7s} {'raw':>7s} {'fit':>7s} {'bias':>8s} {'rms':>7s} {'inside':>7s}"
-    covered: list[float] = []
+    yield f"{'parameter':34s} {'true':>7s} {'raw':>7s} {'fit':>7s} {'bias':>8s} {'rms':>7s} {'in 95':>6s} {'in 90':>6s} {'prior':>6s}"
+    covered: list[tuple[float, ...]] = []
     for group, kinds in groups.items():
         rows = [
             (
@@ -53,14 +63,18 @@ def _parameters(draws: Sequence[Mapping[str, Any]]) -> Iterator[str]:
                 np.mean([v["fitted"] for v in values]),
                 np.mean([v["fitted"] - v["true"] for v in values]),
                 np.sqrt(np.mean([(v["fitted"] - v["true"]) ** 2 for v in values])),
-                np.nanmean([inside(v) for v in values]) if values else np.nan,
+                np.nanmean([inside(v) for v in values]),
+                np.nanmean([inside(v, level=0.9) for v in values]),
+                np.mean([v["prior"] for v in values]),
             )
             for values in kinds.values()
         ]
-        covered += [float(row[-1]) for row in rows]
+        covered += [row[-3:-1] for row in rows]
         mean = np.array(rows, float).mean(axis=0)
-        yield f"{group:34s} {mean[0]:7.3f} {mean[1]:7.3f} {mean[2]:7.3f} {mean[3]:+8.4f} {mean[4]:7.4f} {mean[5]:7.0%}"
-    yield f"{'all, mean over parameters':34s} {'':40s} {np.nanmean(covered):7.0%}"
+        line = f"{group:34s} {mean[0]:7.3f} {mean[1]:7.3f} {mean[2]:7.3f} {mean[3]:+8.4f} {mean[4]:7.4f} "
+        yield line + " ".join(f"{each:6.0%}" for each in mean[5:])
+    both = np.nanmean(np.array(covered, float), axis=0)
+    yield f"{'all, mean over parameters':34s} {'':40s} " + " ".join(f"{each:6.0%}" for each in both)
 
 
 def _annotation(draws: Sequence[Mapping[str, Any]]) -> Iterator[str]:

@@ -236,11 +236,14 @@ def _consecutive(labels: LabelledJoints, lag: int) -> Bools:
 
 
 def _dependence(labels: LabelledJoints) -> detector_sums.DependenceSums:
-    """Return observed and expected pairs of joints taken by the same class, and their products over time."""
+    """Return observed and expected pairs of visible joints taken by the same class, and their products over time.
+
+    Hidden joints are left out: whether a guess is a miss depends on the pose, which all joints of a limb share.
+    """
     steps = lags(labels.step)
-    frames, states = len(labels.occlusion), len(OCCLUSIONS) * len(KINDS)
-    state = labels.occlusion * len(KINDS) + np.array(KIND_OF_JOINT)  # occlusion class and kind of joint
-    member = state[..., None] == np.arange(states)  # (T, V, P, 17, 27)
+    frames, states = len(labels.occlusion), len(KINDS)
+    visible, state = labels.occlusion == VISIBLE, np.array(KIND_OF_JOINT)
+    member = state[:, None] == np.arange(states)  # (17, 9)
     limbs = np.array([limb == LIMB_OF_JOINT for limb in range(LIMB_OF_JOINT.max() + 1)])
     one, other = np.triu_indices(states)
     same = one == other
@@ -249,7 +252,7 @@ def _dependence(labels: LabelledJoints) -> detector_sums.DependenceSums:
     )
     excess, weight = np.zeros((2, frames, len(steps)))
     for key in CLASSES:
-        risk, taken = labels.risk[key], labels.taken[key]
+        risk, taken = labels.risk[key] & visible, labels.taken[key] & visible
         at_risk = member & risk[..., None]
         n, k = at_risk.sum(axis=(0, 1, 2, 3)), (at_risk & taken[..., None]).sum(axis=(0, 1, 2, 3))
         chance = k / np.maximum(n, 1)

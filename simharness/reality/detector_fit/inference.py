@@ -3,11 +3,13 @@
 What is measured is not the parameter behind it: the consensus of few views has noise, and errors of other views in it.
 Indirect inference (Gourieroux, Monfort & Renault, Journal of Applied Econometrics 1993) removes this without a formula
 for each value: detections are simulated and measured in the same way as the recording. Around the present parameters
-the measured values are linear in them, on scales without bounds. Levels and slopes follow from pairs of simulations
-whose draws are the same and whose parameters differ, each up or down at random (simultaneous perturbation, Spall, IEEE
-Transactions on Automatic Control 1992); parameters of one kind of joint act on each other's measured values alike for
-all kinds. A Gaussian prior takes over where slopes or counts say little. The result is the mean of the posterior, with
-its interval.
+the measured values are linear in them, on scales without bounds. Slopes follow from simulations with the same draws in
+which the parameters of one group are moved, those of all kinds of joints at once, because they act on the measured
+values of their own kind. A Gaussian prior takes over where slopes or counts say little. The result is the mean of the
+posterior, with its interval.
+
+A measured value varies as the bootstrap of the recording says, or, where errors last longer than the blocks of the
+bootstrap, as it does between simulations at the result.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,10 +22,9 @@ from scipy.special import expit, logit
 from mvpose.arrays import Floats
 from simharness.reality.detector_fit.detector_measurement import MeasuredValue
 from simharness.scenario.sections.detector_section import KINDS
-from simharness.types.random_streams import stream
 
-ROUNDS = 7
-"""Pairs of simulations, and single ones after them."""
+ROUNDS = 8
+"""Simulations after the slopes are known; half as many come before."""
 
 Scale = Literal["logit", "log", "fisher"]
 
@@ -48,20 +49,29 @@ SCALES: Scales = {
 """Inferred parameters of a recording by their scale and the beginning of their keys: shares, amounts, and correlations,
 which are on the inverse hyperbolic tangent; measured ones may be below 0."""
 
-_WIDTH = 0.7
-_WIDTHS = {"keypoints.guess": 1.2, "scores.hidden": 0.4, **dict.fromkeys(SCALES["fisher"], 0.35)}
-"""Standard deviation of the prior on the scale, and other ones by the beginning of the keys."""
+_WIDTHS: Mapping[Scale, float] = {"logit": 1.0, "log": 0.7, "fisher": 0.35}
+"""Standard deviation of the prior on each scale, and once more for what the kinds of joint have in common: by so much
+the fits to MoveNet and OpenPose differ from the shipped profiles."""
 
-_ALIKE = (
-    *("keypoints.jitter.", "keypoints.miss.", "keypoints.inversion.", "keypoints.swap.", "keypoints.scatter."),
-    *("keypoints.self_occluded.", "keypoints.occluded."),
+_PERTURBATIONS: Mapping[Scale, float] = {"logit": 0.5, "log": 0.3, "fisher": 0.3}
+_APART = 0.2
+"""Distance of the left-right counterpart, heights of the box, at which inversions are inferred: joints that are told
+from their counterpart are about so far from it. Shares at no distance are extrapolated with the reach."""
+
+_NOISE, _NOISE_ANEW = 0.4, 1.2
+"""Noise of changes between simulations with the same draws, deviations of the measured values; and of changes by
+parameters of _ANEW."""
+
+_ANEW = (
+    "correlation.life",
+    "correlation.views",
+    "correlation.gross_views",
+    "correlation.limb",
+    "boxes.life",
+    "boxes.missed_views",
 )
-_COMMON, _COMMON_USUAL = 1.0, 0.3
-"""Standard deviation, on the scale, of what a parameter of all kinds of joints has in common beside its prior, of those
-that begin so and of the others: a detector may have fewer errors than the shipped one in all kinds alike."""
+"""Parameters by which errors are drawn anew. They change no share: the marginal distributions are exact."""
 
-_PERTURBATIONS: Mapping[Scale, float] = {"logit": 0.5, "log": 0.3, "fisher": 0.15}
-_OF_PAIR = 1e-3  # weight of the levels of a pair
 _STEP = 1.0  # largest change in a round, on the scale
 _NORMAL = 1.96  # deviations from the mean to the ends of a 95 % interval
 _ONE_SIDED = 1.645  # deviations to the one end of a 95 % interval
@@ -72,14 +82,15 @@ _PRIORS_SHARE = 0.85  # of the prior's deviation, from which a parameter is the 
 _OWN, _OWN_SPREAD, _STEEPEST = 0.7, 0.4, 1.5
 """Usual slope of a measured value by its parameter, its spread, and its bound."""
 
-_OTHER_SPREAD, _KIND_SPREAD, _SAME = 0.15, 0.2, 1e-3
-"""Spread of slopes by other parameters; of the slopes of one kind of joint about those of all, by the parameter and by
-others."""
+_OTHER_SPREAD, _KIND_SPREAD = 0.15, 0.2
+"""Spread of slopes by other parameters, and of the slopes of one kind of joint about those of all."""
+
+_FEW = 4.0  # simulations that count as if the bootstrap were right
+
+_SCORED = ("good", "jitter", "miss", "inversion", "swap")
 
 _MOST = 9.0
 """Largest square of a difference in standard deviations that counts."""
-
-_SLIGHT = 0.12  # slope by another parameter, below which it is noise
 
 
 def infer(
@@ -97,7 +108,7 @@ def infer(
             prior's.
         simulate: function from parameters and the number of a draw to the measured values of simulated detections.
         prior: most likely values before the measurement, by key; keys without one have no prior.
-        rounds: number of pairs of simulations, and of single ones after them.
+        rounds: number of simulations after the slopes are known.
         scales: inferred parameters.
     """
     found = (_parameter(key, value, prior.get(key, 0.0), scales) for key, value in measured.items())
@@ -106,19 +117,30 @@ def infer(
         return dict(measured)
     state = _Inference(tuple(parameters))
     fixed = {key: each.value for key, each in measured.items()}
-    for number in range(rounds):
-        moves = np.array([each.step * stream(number, "inference", each.tie).choice([-1.0, 1.0]) for each in parameters])
-        state.keep_inside()
-        state.add(moves, *(simulate({**fixed, **state.values(side * moves)}, number) for side in (1.0, -1.0)))
-    for number in range(rounds, 2 * rounds):
-        state.add(np.zeros(len(parameters)), simulate({**fixed, **state.values()}, number))
-    deviation = state.posterior()[1]
-    ends = [state.values(side * _NORMAL * deviation) for side in (-1.0, 0.0, 1.0)]
-    result = dict(measured)
-    for each, unsure in zip(parameters, deviation > _PRIORS_SHARE * state.prior_deviation, strict=True):
-        low, value, high = (end[each.key] for end in ends)
-        result[each.key] = replace(measured[each.key], value=value, low=low, high=high, by_prior=bool(unsure))
+
+    def run(change: Floats | float, draw: int) -> Floats:
+        of = simulate({**fixed, **state.values(change)}, draw)
+        return np.array([each.scaled(of.get(each.key, np.nan)) for each in parameters])
+
+    for draw in range(rounds // 2):
+        state.add(run(0.0, draw))
+    state.find_slopes(lambda change: run(change, rounds))
+    for draw in range(rounds, 2 * rounds):
+        state.add(run(0.0, draw))
+    deviation, result = state.posterior()[1], dict(measured)
+    for index, each in enumerate(parameters):
+        reach = np.zeros(len(parameters))
+        reach[index] = _NORMAL * state.of_value(index, deviation)
+        low, value, high = (state.values(side * reach)[each.key] for side in (-1.0, 0.0, 1.0))
+        unsure = bool(deviation[index] > _PRIORS_SHARE * state.prior_deviation[index])
+        result[each.key] = replace(measured[each.key], value=value, low=low, high=high, by_prior=unsure)
     return result
+
+
+def simulations(measured: Mapping[str, MeasuredValue], *, rounds: int = ROUNDS, scales: Scales = SCALES) -> int:
+    """Return how many simulations :func:`infer` needs where all parameters have a prior."""
+    found = [_parameter(key, each, 0.5, scales) for key, each in measured.items()]
+    return rounds // 2 + 1 + len({each.group for each in found if each is not None}) + rounds
 
 
 def misfit(measured: Mapping[str, MeasuredValue], simulated: Mapping[str, float]) -> float:
@@ -153,26 +175,15 @@ class _Parameter:
     """Standard deviation of the measured value."""
 
     @property
-    def step(self) -> float:
-        """Perturbation in simulations."""
-        return _PERTURBATIONS[self.scale]
-
-    @property
     def group(self) -> str:
-        """Key without the kind of joint or the bearing."""
-        start, _, last = self.key.rpartition(".")
-        return start if last in KINDS or last.isdigit() else self.key
+        """Key without the kind of joint, or the class of a score."""
+        return self.key.rpartition(".")[0] if self.kind else self.key
 
     @property
     def kind(self) -> str:
-        """Kind of joint; empty for parameters of all."""
-        last = self.key.rpartition(".")[2]
-        return last if last in KINDS else ""
-
-    @property
-    def tie(self) -> str:
-        """Name of what is perturbed together: one value is measured for strays of all kinds of joints."""
-        return self.group if self.key.startswith("keypoints.stray") else self.key
+        """Kind of joint, or class of a score; empty for parameters of all."""
+        start, _, last = self.key.rpartition(".")
+        return last if last in (_SCORED if start in ("scores", "scores.hidden") else KINDS) else ""
 
     def scaled(self, value: float) -> float:
         """Return a value on the scale."""
@@ -213,115 +224,120 @@ def _parameter(key: str, measured: MeasuredValue, prior: float, scales: Scales) 
 
 @dataclass
 class _Inference:
-    """Present parameters, and all rounds of one or two simulations so far, N parameters."""
+    """Present parameters, and all simulations with them so far, N parameters."""
 
     parameters: tuple[_Parameter, ...]
     places: list[Floats] = field(default_factory=list)
-    """Parameters in each round, (N,)."""
-    moves: list[Floats] = field(default_factory=list)
-    """Perturbations in each round, (N,); 0 in those of one simulation."""
-    levels: list[Floats] = field(default_factory=list)
-    """Mean measured values of each round, (N,); NaN where unknown."""
-    changes: list[Floats] = field(default_factory=list)
-    """Half differences of the measured values of each pair, (N,); 0 in rounds of one simulation."""
+    """Parameters in each simulation, (N,)."""
+    measured: list[Floats] = field(default_factory=list)
+    """Measured values of each simulation, (N,); NaN where unknown."""
 
     def __post_init__(self) -> None:
         self.prior = np.array([each.prior for each in self.parameters])
         self.observed = np.array([each.observed for each in self.parameters])
-        self.at = np.where(np.isfinite(self.observed), self.observed, self.prior)
+        self.deviation = np.array([each.deviation for each in self.parameters])
+        self.at = np.where(np.isfinite(self.prior), self.prior, self.observed)
+        self.fisher = np.array([each.scale == "fisher" for each in self.parameters])
+        self.at[self.fisher] = np.maximum(self.at[self.fisher], 0.0)
+        self.slopes = _OWN * np.eye(len(self.parameters))
+        self.reach = next((i for i, each in enumerate(self.parameters) if each.key == "keypoints.inversion_reach"), -1)
+        self.apart = np.array([each.group == "keypoints.inversion" for each in self.parameters]) * (self.reach >= 0)
+        self.groups: dict[str, dict[str, int]] = {}
+        for index, each in enumerate(self.parameters):
+            self.groups.setdefault(each.group, {})[each.kind] = index
         self.inverse, self.prior_deviation = self._of_prior()
 
     def _of_prior(self) -> tuple[Floats, Floats]:
         """Return the inverse covariance of the prior, (N, N), and its deviations, (N,); without a prior 0, infinite."""
         index = np.flatnonzero(np.isfinite(self.prior))
         known = [self.parameters[each] for each in index]
-        widths = [next((w for start, w in _WIDTHS.items() if each.key.startswith(start)), _WIDTH) for each in known]
-        covariance = np.diag(np.square(widths))
-        for row, one in enumerate(known):
-            common = (_COMMON if one.key.startswith(_ALIKE) else _COMMON_USUAL) if one.group != one.key else 0.0
-            covariance[row] += [common**2 * (one.group == other.group) for other in known]
+        covariance = np.array(
+            [[(one is other) + (one.group == other.group != one.key) for other in known] for one in known], float
+        ).reshape(len(known), len(known)) * np.square([[_WIDTHS[each.scale]] for each in known])
         result, deviation = np.zeros((len(self.parameters),) * 2), np.full(len(self.parameters), np.inf)
         result[np.ix_(index, index)], deviation[index] = np.linalg.inv(covariance), np.sqrt(np.diag(covariance))
         return result, deviation
 
-    def keep_inside(self) -> None:
-        """Move correlations so far from 0 that both perturbations of a pair act."""
-        for index, each in enumerate(self.parameters):
-            if each.scale == "fisher":
-                self.at[index] = max(self.at[index], each.step)
-
     def values(self, change: Floats | float = 0.0) -> dict[str, float]:
         """Return the present parameters, or those at a distance, (N,) on their scales, by key."""
-        return {each.key: each.value(place) for each, place in zip(self.parameters, self.at + change, strict=True)}
+        place = self.at + change
+        place = place + self.apart * _APART / np.exp(place[self.reach])
+        return {each.key: each.value(there) for each, there in zip(self.parameters, place, strict=True)}
 
-    def add(self, moves: Floats, *simulated: Mapping[str, float]) -> None:
-        """Add the measured values of one or two simulations, and move towards the mean of the posterior."""
-        measured = np.array([[each.scaled(of.get(each.key, np.nan)) for each in self.parameters] for of in simulated])
-        self.places.append(self.at.copy())
-        self.moves.append(moves)
-        self.levels.append(measured.mean(axis=0))
-        self.changes.append((measured[0] - measured[-1]) / 2)
+    def of_value(self, index: int, deviation: Floats) -> float:
+        """Return the deviation of a value from those of the inferred parameters, (N,): shares of inversions at no
+        distance also depend on the reach."""
+        return float(
+            np.hypot(deviation[index], self.apart[index] * _APART * deviation[self.reach] / np.exp(self.at[self.reach]))
+        )
+
+    def add(self, measured: Floats) -> None:
+        """Add the measured values of a simulation, (N,), and move towards the mean of the posterior."""
+        self.places.append(self.at)
+        self.measured.append(measured)
         self.at = self.at + np.clip(self.posterior()[0] - self.at, -_STEP, _STEP)
-        fisher = np.array([each.scale == "fisher" for each in self.parameters])
-        self.at[fisher] = np.maximum(self.at[fisher], 0.0)
+        self.at[self.fisher] = np.maximum(self.at[self.fisher], 0.0)
+
+    def find_slopes(self, run: Callable[[Floats | float], Floats]) -> None:
+        """Find the slopes of all measured values by the parameters of each group; levels are found anew."""
+        before, slopes = run(0.0), np.zeros_like(self.slopes)
+        for group, columns in self.groups.items():
+            index = list(columns.values())
+            step = _PERTURBATIONS[self.parameters[index[0]].scale]
+            moves = np.zeros(len(self.parameters))
+            moves[index] = step
+            change = (run(moves) - before) / step
+            known = np.isfinite(change)
+            anew = group.startswith(_ANEW)
+            noise = _NOISE_ANEW if anew else _NOISE
+            for of, rows in self.groups.items():
+                row, own = np.array(list(rows.values())), of == group
+                weight = np.where(known[row] & (own or not anew), (step / (noise * self.deviation[row])) ** 2, 0.0)
+                spread = _OWN_SPREAD if own else _OTHER_SPREAD
+                usual = (weight @ np.nan_to_num(change[row]) + own * _OWN / spread**2) / (weight.sum() + spread**-2)
+                slope = (weight * np.nan_to_num(change[row]) + usual / _KIND_SPREAD**2) / (weight + _KIND_SPREAD**-2)
+                for each, place in zip(slope, row, strict=True):
+                    kind = self.parameters[place].kind
+                    if own:
+                        slopes[place, place] = np.clip(each, 0.0, _STEEPEST)
+                    elif kind in columns:
+                        slopes[place, columns[kind]] = each
+                    else:
+                        slopes[place, index] = each / len(index)
+        self.slopes = slopes
+        self.places.clear()
+        self.measured.clear()
 
     def posterior(self) -> tuple[Floats, Floats]:
         """Return mean and standard deviation of the parameters, (N,) each."""
-        slopes = self._slopes()
-        levels = np.array(self.levels) - np.array(self.places) @ slopes.T
-        # Rounds near the end count more, where all parameters were near to theirs; pairs, which are perturbed, hardly.
-        weight = (np.arange(len(levels)) + 1.0) ** 2 * np.where(np.any(self.moves, axis=1), _OF_PAIR, 1.0)
-        weight = np.where(np.isfinite(levels), weight[:, None], 0.0)
+        levels = np.array(self.measured) - np.array(self.places) @ self.slopes.T
+        # Simulations near the end count more, where all parameters were near to theirs.
+        weight = np.where(np.isfinite(levels), (np.arange(len(levels)) + 1.0)[:, None] ** 2, 0.0)
         weight = weight / np.maximum(weight.sum(axis=0), 1e-9)
         level = (weight * np.nan_to_num(levels)).sum(axis=0)
-        # Resamples of a recording without an event do not vary; simulations do.
-        spread = (weight * (np.nan_to_num(levels) - level) ** 2).sum(axis=0) * (len(levels) > 2)
-        variance = np.maximum(np.array([each.deviation for each in self.parameters]) ** 2, spread)
-        variance = variance * (1 + (weight**2).sum(axis=0))
         known = np.isfinite(self.observed) & (weight.sum(axis=0) > 0)
-        slopes = np.where(known[:, None], slopes, 0.0)
+        variance = self.deviation**2 * self._more(levels - level, weight) * (1 + (weight**2).sum(axis=0))
+        slopes = np.where(known[:, None], self.slopes, 0.0)
         weighed = slopes.T / variance
         information = weighed @ slopes + self.inverse + 1e-6 * np.eye(len(level))
         pull = weighed @ np.where(known, self.observed - level, 0.0) + self.inverse @ np.nan_to_num(self.prior)
         pull = pull + 1e-6 * self.at
         return np.linalg.solve(information, pull), np.sqrt(np.diag(np.linalg.inv(information)))
 
-    def _slopes(self) -> Floats:
-        """Return the slope of each measured value by each parameter, (N, N), by ridge regression over all pairs.
+    def _more(self, away: Floats, weight: Floats) -> Floats:
+        """Return by how much variances between simulations exceed those of the recording's bootstrap, (N,), 1 or more.
 
-        Those of parameters of one kind of joint are much alike for all kinds; parameters of all joints act on their own
-        measured values alone.
+        Kinds of joint are alike. A number of simulations that says nothing has the weight of _FEW.
+
+        Args:
+            away: levels of simulations less their mean, (n, N).
+            weight: their weights, (n, N).
         """
-        moves, changes = np.array(self.moves), np.array(self.changes)
-        result = np.zeros((len(self.parameters),) * 2)
-        groups: dict[str, list[int]] = {}
-        for index, each in enumerate(self.parameters):
-            groups.setdefault(each.group, []).append(index)
-        of_kinds = [group for group, rows in groups.items() if self.parameters[rows[0]].kind]
-        place = {(each.group, each.kind): index for index, each in enumerate(self.parameters)}
-        padded = np.concatenate([moves, np.zeros((len(moves), 1))], axis=1)
-        for group, rows in groups.items():
-            columns = of_kinds if group in of_kinds else [group]
-            own = np.array([group == each for each in columns])
-            cells = [
-                [place.get((other, self.parameters[row].kind), -1) if group in of_kinds else row for other in columns]
-                for row in rows
-            ]
-            every = np.concatenate([padded[:, each] for each in cells]), np.concatenate([changes[:, r] for r in rows])
-            pooled = _ridge(*every, _OWN * own, np.where(own, _OWN_SPREAD, _OTHER_SPREAD))
-            for row, cell in zip(rows, cells, strict=True):
-                slopes = _ridge(padded[:, cell], changes[:, row], pooled, np.where(own, _KIND_SPREAD, _SAME))
-                slopes[own] = np.clip(slopes[own], 0.0, _STEEPEST)
-                slopes[~own & (np.abs(slopes) < _SLIGHT)] = 0.0
-                shown = np.array(cell) >= 0
-                result[row, np.array(cell)[shown]] = slopes[shown]
+        free = np.maximum(1 - (weight**2).sum(axis=0), 1e-9)
+        ratio = (weight * np.nan_to_num(away) ** 2).sum(axis=0) / free / self.deviation**2
+        result = np.ones(len(ratio))
+        for rows in self.groups.values():
+            index = list(rows.values())
+            count = ((weight[:, index] > 0).sum(axis=0) - 1.0).clip(0.0)
+            result[index] = max(1.0, (count @ ratio[index] + _FEW) / (count.sum() + _FEW))
         return result
-
-
-def _ridge(design: Floats, change: Floats, usual: Floats, spread: Floats) -> Floats:
-    """Return slopes (C,) that explain changes (n,) by perturbations (n, C), with a prior of mean and spread (C,)."""
-    known = np.isfinite(change)
-    design, change = design[known], change[known]
-    noise = float(np.mean((change - design @ usual) ** 2)) + 1e-6 if len(change) else 1.0
-    left = design.T @ design / noise + np.diag(spread**-2)
-    return np.asarray(np.linalg.solve(left, design.T @ change / noise + usual / spread**2))
