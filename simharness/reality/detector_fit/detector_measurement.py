@@ -164,7 +164,7 @@ def measure_labels(labels: LabelledJoints, *, name: str, weights: Floats, indepe
     for key, value in whole.items():
         low, high = interval(drawn[key], blocks=independent)
         n = _count(key, sums)
-        if key.split(".")[1] in CLASSES and value[0] < _RULE_OF_THREE * design / max(n, 1):
+        if key.split(".")[1] in (*CLASSES, "guess") and value[0] < _RULE_OF_THREE * design / max(n, 1):
             high = np.fmax(high, min(1.0, _RULE_OF_THREE * design / max(n, 1)))
         # A percentile interval need not contain the value itself near a bound such as zero.
         result[key] = MeasuredValue(float(value[0]), float(np.fmin(low, value[0])), float(np.fmax(high, value[0])), n)
@@ -207,6 +207,8 @@ def _count(key: str, sums: FrameSums) -> int:
     if rest[0] in CLASSES and kind is not None:
         n = sums.classes[rest[0]].n[..., kind].sum(axis=0)
         return int(n[_OCCLUSIONS.index(rest[1])] if rest[1] in _OCCLUSIONS else n.sum())
+    if rest[0] == "guess" and rest[1] in _OCCLUSIONS:
+        return int(sums.classes["miss"].n[:, _OCCLUSIONS.index(rest[1]), kind].sum())
     if rest[0] in _COUNTED_BY_KIND and kind is not None:
         return int(_COUNTED_BY_KIND[rest[0]](sums)[:, kind].sum())
     if section == "scores":

@@ -49,9 +49,18 @@ SCALES: Scales = {
 """Inferred parameters of a recording by their scale and the beginning of their keys: shares, amounts, and correlations,
 which are on the inverse hyperbolic tangent; measured ones may be below 0."""
 
-_WIDTHS: Mapping[Scale, float] = {"logit": 1.0, "log": 0.7, "fisher": 0.35}
-"""Standard deviation of the prior on each scale, and once more for what the kinds of joint have in common: by so much
-the fits to MoveNet and OpenPose differ from the shipped profiles."""
+_WIDTHS = {
+    "keypoints.scatter": (0.2, 0.5),
+    "keypoints.jitter_mean": (0.3, 0.8),
+    "keypoints.self_occluded": (0.8, 1.2),
+    "keypoints.occluded": (0.8, 1.2),
+    **dict.fromkeys(SCALES["fisher"], (0.35, 0.0)),
+    **dict.fromkeys(SCALES["log"], (0.7, 0.0)),
+}
+"""Standard deviations of the prior on the scale, of each parameter and of what the kinds of joint have in common, by the
+beginning of the keys: by so much the fits to MoveNet and OpenPose differ from the shipped profiles."""
+
+_WIDTH = (1.0, 1.0)  # of the others, which are shares
 
 _PERTURBATIONS: Mapping[Scale, float] = {"logit": 0.5, "log": 0.3, "fisher": 0.3}
 _APART = 0.2
@@ -75,6 +84,7 @@ _ANEW = (
 _STEP = 1.0  # largest change in a round, on the scale
 _NORMAL = 1.96  # deviations from the mean to the ends of a 95 % interval
 _ONE_SIDED = 1.645  # deviations to the one end of a 95 % interval
+_LASTING = 3.0  # joints, about, of one error that lasts
 _LEAST = 2e-4  # of a share
 _SMALLEST = 1e-3  # of an amount
 _STRONGEST = 0.95  # correlation
@@ -82,10 +92,10 @@ _PRIORS_SHARE = 0.85  # of the prior's deviation, from which a parameter is the 
 _OWN, _OWN_SPREAD, _STEEPEST = 0.7, 0.4, 1.5
 """Usual slope of a measured value by its parameter, its spread, and its bound."""
 
-_OTHER_SPREAD, _KIND_SPREAD = 0.15, 0.2
+_OTHER_SPREAD, _KIND_SPREAD = 0.4, 0.2
 """Spread of slopes by other parameters, and of the slopes of one kind of joint about those of all."""
 
-_FEW = 4.0  # simulations that count as if the bootstrap were right
+_FEW = 1.0  # simulations that count as if the bootstrap were right
 
 _SCORED = ("good", "jitter", "miss", "inversion", "swap")
 
@@ -120,7 +130,7 @@ def infer(
 
     def run(change: Floats | float, draw: int) -> Floats:
         of = simulate({**fixed, **state.values(change)}, draw)
-        return np.array([each.scaled(of.get(each.key, np.nan)) for each in parameters])
+        return np.array([each.seen(of.get(each.key, np.nan)) for each in parameters])
 
     for draw in range(rounds // 2):
         state.add(run(0.0, draw))
@@ -152,7 +162,7 @@ def misfit(measured: Mapping[str, MeasuredValue], simulated: Mapping[str, float]
     for key, each in measured.items():
         parameter = _parameter(key, each, 0.5, SCALES)
         if parameter is not None and np.isfinite(parameter.observed) and np.isfinite(simulated.get(key, np.nan)):
-            away = (parameter.scaled(simulated[key]) - parameter.observed) / (np.sqrt(2) * parameter.deviation)
+            away = (parameter.seen(simulated[key]) - parameter.observed) / (np.sqrt(2) * parameter.deviation)
             squares.append(min(away**2, _MOST))
     return float(np.mean(squares)) if squares else np.nan
 
@@ -173,6 +183,8 @@ class _Parameter:
     """Measured value of the recording; NaN where unknown."""
     deviation: float
     """Standard deviation of the measured value."""
+    count: int
+    """Number of joints, people or detections behind it."""
 
     @property
     def group(self) -> str:
@@ -193,6 +205,12 @@ class _Parameter:
             return float(np.arctanh(np.clip(value, -_STRONGEST, _STRONGEST)))
         return float(logit(np.clip(value, self.least, 1 - self.least)))
 
+    def seen(self, value: float) -> float:
+        """Return a measured value on the scale; shares with the weight of _LASTING, as there may be no event."""
+        if self.scale == "logit":
+            value = (max(value, 0.0) * self.count + _LASTING) / (self.count + 2 * _LASTING)
+        return self.scaled(value)
+
     def value(self, place: float) -> float:
         """Return the value at a place on the scale."""
         if self.scale == "fisher":
@@ -207,17 +225,17 @@ def _parameter(key: str, measured: MeasuredValue, prior: float, scales: Scales) 
         return None
     n = measured.count
     least = max(_LEAST, 0.5 / (n + 1)) if scale == "logit" else _SMALLEST
-    result = _Parameter(key, scale, least, np.nan, np.nan, 1.0)
+    result = _Parameter(key, scale, least, np.nan, np.nan, 1.0, n)
     if prior > 0:
         result = replace(result, prior=result.scaled(prior))
     if measured.known and n > 0 and (prior > 0 or measured.value > least):
-        ends = [result.scaled(each) for each in (measured.low, measured.high) if np.isfinite(each)]
+        ends = [result.seen(each) for each in (measured.low, measured.high) if np.isfinite(each)]
         k = n * min(max(measured.value, 0.0), 1.0)
-        counted = np.sqrt(1 / (k + 0.5) + 1 / (n - k + 0.5)) if scale == "logit" else np.sqrt(0.5 / n)
-        observed = result.scaled(measured.value)
+        counted = np.sqrt(1 / (k + _LASTING) + 1 / (n - k + _LASTING)) if scale == "logit" else np.sqrt(0.5 / n)
+        observed = result.seen(measured.value)
         deviation = max(float(np.ptp(ends or [0.0])) / (2 * _NORMAL), float(counted))
         if scale == "logit" and measured.value == 0 and np.isfinite(measured.high):  # the interval has one end
-            deviation = max((result.scaled(measured.high) - observed) / _ONE_SIDED, 0.5)
+            deviation = max((result.seen(measured.high) - observed) / _ONE_SIDED, 0.5)
         result = replace(result, observed=observed, deviation=deviation)
     return result if np.isfinite(result.prior) or np.isfinite(result.observed) else None
 
@@ -251,9 +269,11 @@ class _Inference:
         """Return the inverse covariance of the prior, (N, N), and its deviations, (N,); without a prior 0, infinite."""
         index = np.flatnonzero(np.isfinite(self.prior))
         known = [self.parameters[each] for each in index]
-        covariance = np.array(
-            [[(one is other) + (one.group == other.group != one.key) for other in known] for one in known], float
-        ).reshape(len(known), len(known)) * np.square([[_WIDTHS[each.scale]] for each in known])
+        covariance = np.zeros((len(index),) * 2)
+        for row, one in enumerate(known):
+            own, common = next((each for start, each in _WIDTHS.items() if one.key.startswith(start)), _WIDTH)
+            covariance[row] = [common**2 * bool(one.kind and one.group == other.group) for other in known]
+            covariance[row, row] += own**2
         result, deviation = np.zeros((len(self.parameters),) * 2), np.full(len(self.parameters), np.inf)
         result[np.ix_(index, index)], deviation[index] = np.linalg.inv(covariance), np.sqrt(np.diag(covariance))
         return result, deviation
