@@ -53,7 +53,10 @@ def _parameters(draws: Sequence[Mapping[str, Any]]) -> Iterator[str]:
                 continue
             group = start if kind in KINDS or kind.isdigit() else key
             groups[group][kind].append(values)
-    yield f"{'parameter':34s} {'true':>7s} {'raw':>7s} {'fit':>7s} {'bias':>8s} {'rms':>7s} {'in 95':>6s} {'in 90':>6s} {'prior':>6s}"
+    yield (
+        f"{'parameter':34s} {'true':>7s} {'raw':>7s} {'fit':>7s} {'bias':>8s} {'rms':>7s} "
+        f"{'in 95':>6s} {'in 90':>6s} {'prior':>6s}"
+    )
     covered: list[tuple[float, ...]] = []
     for group, kinds in groups.items():
         rows = [
@@ -69,7 +72,7 @@ def _parameters(draws: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             )
             for values in kinds.values()
         ]
-        covered += [row[-3:-1] for row in rows]
+        covered += [(float(row[-3]), float(row[-2])) for row in rows]
         mean = np.array(rows, float).mean(axis=0)
         line = f"{group:34s} {mean[0]:7.3f} {mean[1]:7.3f} {mean[2]:7.3f} {mean[3]:+8.4f} {mean[4]:7.4f} "
         yield line + " ".join(f"{each:6.0%}" for each in mean[5:])

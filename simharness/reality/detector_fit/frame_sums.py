@@ -236,14 +236,15 @@ def _consecutive(labels: LabelledJoints, lag: int) -> Bools:
 
 
 def _dependence(labels: LabelledJoints) -> detector_sums.DependenceSums:
-    """Return observed and expected pairs of visible joints taken by the same class, and their products over time.
+    """Return observed and expected pairs of joints taken by the same class, and their products over time.
 
-    Hidden joints are left out: whether a guess is a miss depends on the pose, which all joints of a limb share.
+    Pairs within limbs are of visible joints: whether a guess is a miss depends on the pose, which a limb has in common.
     """
     steps = lags(labels.step)
-    frames, states = len(labels.occlusion), len(KINDS)
-    visible, state = labels.occlusion == VISIBLE, np.array(KIND_OF_JOINT)
-    member = state[:, None] == np.arange(states)  # (17, 9)
+    frames, states = len(labels.occlusion), len(OCCLUSIONS) * len(KINDS)
+    state = labels.occlusion * len(KINDS) + np.array(KIND_OF_JOINT)  # occlusion class and kind of joint
+    visible = labels.occlusion == VISIBLE
+    member = state[..., None] == np.arange(states)  # (T, V, P, 17, 27)
     limbs = np.array([limb == LIMB_OF_JOINT for limb in range(LIMB_OF_JOINT.max() + 1)])
     one, other = np.triu_indices(states)
     same = one == other
@@ -252,7 +253,7 @@ def _dependence(labels: LabelledJoints) -> detector_sums.DependenceSums:
     )
     excess, weight = np.zeros((2, frames, len(steps)))
     for key in CLASSES:
-        risk, taken = labels.risk[key] & visible, labels.taken[key] & visible
+        risk, taken = labels.risk[key], labels.taken[key]
         at_risk = member & risk[..., None]
         n, k = at_risk.sum(axis=(0, 1, 2, 3)), (at_risk & taken[..., None]).sum(axis=(0, 1, 2, 3))
         chance = k / np.maximum(n, 1)
@@ -260,13 +261,15 @@ def _dependence(labels: LabelledJoints) -> detector_sums.DependenceSums:
 
         # Over views: the same joint of a person, so only states of one kind form pairs.
         by_joint = at_risk.sum(axis=1, dtype=np.float32).reshape(frames, -1, states)
-        by_limb = np.einsum("tvpjs,lj->tvpls", at_risk.astype(np.float32), limbs.astype(np.float32))
+        by_limb = np.einsum(
+            "tvpjs,lj->tvpls", (at_risk & visible[..., None]).astype(np.float32), limbs.astype(np.float32)
+        )
         for sums, count, whole in (
             (gross_views if key in GROSS else views, by_joint, taken.sum(axis=1, dtype=float).reshape(frames, -1)),
             (
                 limb,
                 by_limb.reshape(frames, -1, states),
-                np.einsum("tvpj,lj->tvpl", taken.astype(float), limbs).reshape(frames, -1),
+                np.einsum("tvpj,lj->tvpl", (taken & visible).astype(float), limbs).reshape(frames, -1),
             ),
         ):
             # Pairs of states of the joints in one row, summed over the rows of a frame.

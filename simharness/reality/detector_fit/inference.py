@@ -57,8 +57,8 @@ _WIDTHS = {
     **dict.fromkeys(SCALES["fisher"], (0.35, 0.0)),
     **dict.fromkeys(SCALES["log"], (0.7, 0.0)),
 }
-"""Standard deviations of the prior on the scale, of each parameter and of what the kinds of joint have in common, by the
-beginning of the keys: by so much the fits to MoveNet and OpenPose differ from the shipped profiles."""
+"""Standard deviations of the prior on the scale, of each parameter and of what the kinds of joint have in common, by
+the beginning of the keys: by so much the fits to MoveNet and OpenPose differ from the shipped profiles."""
 
 _WIDTH = (1.0, 1.0)  # of the others, which are shares
 
@@ -138,19 +138,12 @@ def infer(
     for draw in range(rounds, 2 * rounds):
         state.add(run(0.0, draw))
     deviation, result = state.posterior()[1], dict(measured)
+    reach = np.diag(_NORMAL * state.of_values(deviation))
     for index, each in enumerate(parameters):
-        reach = np.zeros(len(parameters))
-        reach[index] = _NORMAL * state.of_value(index, deviation)
-        low, value, high = (state.values(side * reach)[each.key] for side in (-1.0, 0.0, 1.0))
+        low, value, high = (state.values(side * reach[index])[each.key] for side in (-1.0, 0.0, 1.0))
         unsure = bool(deviation[index] > _PRIORS_SHARE * state.prior_deviation[index])
         result[each.key] = replace(measured[each.key], value=value, low=low, high=high, by_prior=unsure)
     return result
-
-
-def simulations(measured: Mapping[str, MeasuredValue], *, rounds: int = ROUNDS, scales: Scales = SCALES) -> int:
-    """Return how many simulations :func:`infer` needs where all parameters have a prior."""
-    found = [_parameter(key, each, 0.5, scales) for key, each in measured.items()]
-    return rounds // 2 + 1 + len({each.group for each in found if each is not None}) + rounds
 
 
 def misfit(measured: Mapping[str, MeasuredValue], simulated: Mapping[str, float]) -> float:
@@ -263,6 +256,10 @@ class _Inference:
         self.groups: dict[str, dict[str, int]] = {}
         for index, each in enumerate(self.parameters):
             self.groups.setdefault(each.group, {})[each.kind] = index
+        for index in map(list, (each.values() for each in self.groups.values())):
+            # One value that is measured for several kinds of joint counts once.
+            alike = self.observed[index] == self.observed[index][:, None]
+            self.deviation[index] *= np.sqrt(np.maximum(alike.sum(axis=0), 1))
         self.inverse, self.prior_deviation = self._of_prior()
 
     def _of_prior(self) -> tuple[Floats, Floats]:
@@ -284,12 +281,11 @@ class _Inference:
         place = place + self.apart * _APART / np.exp(place[self.reach])
         return {each.key: each.value(there) for each, there in zip(self.parameters, place, strict=True)}
 
-    def of_value(self, index: int, deviation: Floats) -> float:
-        """Return the deviation of a value from those of the inferred parameters, (N,): shares of inversions at no
-        distance also depend on the reach."""
-        return float(
-            np.hypot(deviation[index], self.apart[index] * _APART * deviation[self.reach] / np.exp(self.at[self.reach]))
-        )
+    def of_values(self, deviation: Floats) -> Floats:
+        """Return the deviations of the values from those of the inferred parameters, (N,) each: shares of inversions
+        at no distance also depend on the reach.
+        """
+        return np.hypot(deviation, self.apart * _APART * deviation[self.reach] / np.exp(self.at[self.reach]))
 
     def add(self, measured: Floats) -> None:
         """Add the measured values of a simulation, (N,), and move towards the mean of the posterior."""
@@ -315,7 +311,9 @@ class _Inference:
                 weight = np.where(known[row] & (own or not anew), (step / (noise * self.deviation[row])) ** 2, 0.0)
                 spread = _OWN_SPREAD if own else _OTHER_SPREAD
                 usual = (weight @ np.nan_to_num(change[row]) + own * _OWN / spread**2) / (weight.sum() + spread**-2)
-                slope = (weight * np.nan_to_num(change[row]) + usual / _KIND_SPREAD**2) / (weight + _KIND_SPREAD**-2)
+                sure = weight + _KIND_SPREAD**-2
+                slope = (weight * np.nan_to_num(change[row]) + usual / _KIND_SPREAD**2) / sure
+                slope[slope**2 * sure < 1] = 0.0  # not told from none
                 for each, place in zip(slope, row, strict=True):
                     kind = self.parameters[place].kind
                     if own:

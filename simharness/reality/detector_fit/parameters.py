@@ -291,7 +291,7 @@ def _score_parameters(sums: FrameSums) -> dict[str, Floats]:
         usual = expit(_quantile(good, (1 + lower) / 2))
         # The classes of the face are unknown: its usual score is above its median as for good limb joints.
         usual = np.where(many > 0, usual, every * _averaged(usual / every, many)[:, None])
-        top = np.nanmax(usual[:, limbs], axis=1)
+        top = _averaged(usual[:, limbs], many[:, limbs])
         joint = usual / top[:, None]
         missed = _averaged(expit(_quantile(miss, ((1 - over) / 2)[:, None])) / joint, miss.sum(axis=-1))
         upper = _quantile(good, (3 + lower) / 4) - _quantile(good, (1 + lower) / 2)

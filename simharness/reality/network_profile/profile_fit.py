@@ -41,9 +41,7 @@ from simharness.types.random_streams import stream
 from simharness.types.truth import MISS_FROM, KeypointError
 
 ROUNDS = 6
-"""Pairs of simulations of all scenes by which the parameters are inferred, and single ones after them."""
-
-SIMULATIONS = 3 * ROUNDS
+"""Simulations of all scenes after the slopes are known."""
 
 _FEWEST = 60  # joints or people behind a value that is calibrated
 _RESAMPLES = 200
@@ -62,6 +60,9 @@ _SCALES: Scales = {
     ),
 }
 """Inferred parameters; correlations are measured without a consensus, and are shares."""
+
+SIMULATIONS = ROUNDS // 2 + ROUNDS + sum(map(len, _SCALES.values()))
+"""Simulations of all scenes, about."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ def fit_network(
         scenes: the scenes.
         name: name of the profile.
         command: command that made the profile, to be written into its file.
-        rounds: pairs of simulations, and single ones after them.
+        rounds: simulations after the slopes are known.
         progress: called with 1 after each simulation.
 
     Raises:
