@@ -50,12 +50,11 @@ SCALES: Scales = {
 which are on the inverse hyperbolic tangent; measured ones may be below 0."""
 
 _WIDTHS = {
-    "keypoints.scatter": (0.2, 0.5),
-    "keypoints.jitter_mean": (0.3, 0.8),
-    "keypoints.self_occluded": (0.8, 1.2),
-    "keypoints.occluded": (0.8, 1.2),
     **dict.fromkeys(SCALES["fisher"], (0.35, 0.0)),
     **dict.fromkeys(SCALES["log"], (0.7, 0.0)),
+    **dict.fromkeys(("keypoints.self_occluded", "keypoints.occluded"), (0.8, 1.2)),
+    "keypoints.scatter": (0.2, 0.5),
+    "keypoints.jitter_mean": (0.3, 0.8),
 }
 """Standard deviations of the prior on the scale, of each parameter and of what the kinds of joint have in common, by
 the beginning of the keys: by so much the fits to MoveNet and OpenPose differ from the shipped profiles."""
