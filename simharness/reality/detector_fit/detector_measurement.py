@@ -108,11 +108,10 @@ class MeasuredDetector:
             "level": 0.95,
             "figures": {
                 key: {
-                    "value": _number(each.value),
-                    "low": _number(each.low),
-                    "high": _number(each.high),
-                    "n": each.count,
+                    name: value if np.isfinite(value := float(getattr(each, name))) else None
+                    for name in ("value", "low", "high")
                 }
+                | {"n": each.count}
                 for key, each in self.values.items()
             },
         }
@@ -218,8 +217,3 @@ def _count(key: str, sums: FrameSums) -> int:
         return int(sums.scatter.n[:, kind].sum())
     counted = _COUNTED.get(key, _COUNTED.get(section, lambda sums: sums.classes["drop"].n))
     return int(counted(sums).sum())
-
-
-def _number(value: float) -> float | None:
-    """Return the value, None where it is not finite."""
-    return None if not np.isfinite(value) else float(value)

@@ -261,9 +261,8 @@ def _dependence(labels: LabelledJoints) -> detector_sums.DependenceSums:
 
         # Over views: the same joint of a person, so only states of one kind form pairs.
         by_joint = at_risk.sum(axis=1, dtype=np.float32).reshape(frames, -1, states)
-        by_limb = np.einsum(
-            "tvpjs,lj->tvpls", (at_risk & visible[..., None]).astype(np.float32), limbs.astype(np.float32)
-        )
+        shown = (at_risk & visible[..., None]).astype(np.float32)
+        by_limb = np.einsum("tvpjs,lj->tvpls", shown, limbs.astype(np.float32))
         for sums, count, whole in (
             (gross_views if key in GROSS else views, by_joint, taken.sum(axis=1, dtype=float).reshape(frames, -1)),
             (

@@ -24,7 +24,7 @@ from simharness.reality.detector_fit.detector_measurement import MeasuredValue
 from simharness.scenario.sections.detector_section import KINDS
 
 ROUNDS = 8
-"""Simulations after the slopes are known; half as many come before."""
+"""Simulations before the slopes are found, and after."""
 
 Scale = Literal["logit", "log", "fisher"]
 
@@ -52,9 +52,9 @@ which are on the inverse hyperbolic tangent; measured ones may be below 0."""
 _WIDTHS = {
     **dict.fromkeys(SCALES["fisher"], (0.35, 0.0)),
     **dict.fromkeys(SCALES["log"], (0.7, 0.0)),
-    **dict.fromkeys(("keypoints.self_occluded", "keypoints.occluded"), (0.8, 1.2)),
+    **dict.fromkeys(("keypoints.self_occluded", "keypoints.occluded"), (1.0, 1.0)),
     "keypoints.scatter": (0.2, 0.5),
-    "keypoints.jitter_mean": (0.3, 0.8),
+    "keypoints.jitter_mean": (0.6, 0.6),
 }
 """Standard deviations of the prior on the scale, of each parameter and of what the kinds of joint have in common, by
 the beginning of the keys: by so much the fits to MoveNet and OpenPose differ from the shipped profiles."""
@@ -66,36 +66,21 @@ _APART = 0.2
 """Distance of the left-right counterpart, heights of the box, at which inversions are inferred: joints that are told
 from their counterpart are about so far from it. Shares at no distance are extrapolated with the reach."""
 
-_NOISE, _NOISE_ANEW = 0.4, 1.2
-"""Noise of changes between simulations with the same draws, deviations of the measured values; and of changes by
-parameters of _ANEW."""
-
-_ANEW = (
-    "correlation.life",
-    "correlation.views",
-    "correlation.gross_views",
-    "correlation.limb",
-    "boxes.life",
-    "boxes.missed_views",
-)
+_ANEW = tuple(f"correlation.{key}" for key in ("life", "views", "gross_views", "limb")) + ("boxes.",)
 """Parameters by which errors are drawn anew. They change no share: the marginal distributions are exact."""
+
+_NOISE, _NOISE_ANEW = 0.4, 1.2
+"""Noise of changes between simulations with the same draws, and with others, deviations of the measured values."""
 
 _STEP = 1.0  # largest change in a round, on the scale
 _NORMAL = 1.96  # deviations from the mean to the ends of a 95 % interval
 _ONE_SIDED = 1.645  # deviations to the one end of a 95 % interval
 _LASTING = 3.0  # joints, about, of one error that lasts
-_LEAST = 2e-4  # of a share
-_SMALLEST = 1e-3  # of an amount
+_LEAST, _SMALLEST = 2e-4, 1e-3  # of a share, and of an amount
 _STRONGEST = 0.95  # correlation
 _PRIORS_SHARE = 0.85  # of the prior's deviation, from which a parameter is the prior's
-_OWN, _OWN_SPREAD, _STEEPEST = 0.7, 0.4, 1.5
-"""Usual slope of a measured value by its parameter, its spread, and its bound."""
-
-_OTHER_SPREAD, _KIND_SPREAD = 0.4, 0.2
-"""Spread of slopes by other parameters, and of the slopes of one kind of joint about those of all."""
-
-_FEW = 1.0  # simulations that count as if the bootstrap were right
-
+_OWN, _STEEPEST = 0.7, 1.5  # usual slope of a measured value by its parameter, and its bound
+_SPREAD, _KIND_SPREAD = 0.4, 0.2  # of slopes about the usual ones, and of those of one kind of joint about all
 _SCORED = ("good", "jitter", "miss", "inversion", "swap")
 
 _MOST = 9.0
@@ -117,7 +102,7 @@ def infer(
             prior's.
         simulate: function from parameters and the number of a draw to the measured values of simulated detections.
         prior: most likely values before the measurement, by key; keys without one have no prior.
-        rounds: number of simulations after the slopes are known.
+        rounds: number of simulations before the slopes are found, and after.
         scales: inferred parameters.
     """
     found = (_parameter(key, value, prior.get(key, 0.0), scales) for key, value in measured.items())
@@ -131,7 +116,7 @@ def infer(
         of = simulate({**fixed, **state.values(change)}, draw)
         return np.array([each.seen(of.get(each.key, np.nan)) for each in parameters])
 
-    for draw in range(rounds // 2):
+    for draw in range(rounds):
         state.add(run(0.0, draw))
     state.find_slopes(lambda change: run(change, rounds))
     for draw in range(rounds, 2 * rounds):
@@ -167,8 +152,6 @@ class _Parameter:
     """Its key."""
     scale: Scale
     """Its scale."""
-    least: float
-    """Smallest value that is told from 0, on no scale."""
     prior: float
     """Most likely place before the measurement; NaN without a prior."""
     observed: float
@@ -192,10 +175,10 @@ class _Parameter:
     def scaled(self, value: float) -> float:
         """Return a value on the scale."""
         if self.scale == "log":
-            return float(np.log(max(value, self.least)))
+            return float(np.log(max(value, _SMALLEST)))
         if self.scale == "fisher":
             return float(np.arctanh(np.clip(value, -_STRONGEST, _STRONGEST)))
-        return float(logit(np.clip(value, self.least, 1 - self.least)))
+        return float(logit(np.clip(value, _LEAST, 1 - _LEAST)))
 
     def seen(self, value: float) -> float:
         """Return a measured value on the scale; shares with the weight of _LASTING, as there may be no event."""
@@ -216,11 +199,10 @@ def _parameter(key: str, measured: MeasuredValue, prior: float, scales: Scales) 
     if scale is None:
         return None
     n = measured.count
-    least = max(_LEAST, 0.5 / (n + 1)) if scale == "logit" else _SMALLEST
-    result = _Parameter(key, scale, least, np.nan, np.nan, 1.0, n)
+    result = _Parameter(key, scale, np.nan, np.nan, 1.0, n)
     if prior > 0:
         result = replace(result, prior=result.scaled(prior))
-    if measured.known and n > 0 and (prior > 0 or measured.value > least):
+    if measured.known and n > 0 and (prior > 0 or measured.value > 0):
         ends = [result.seen(each) for each in (measured.low, measured.high) if np.isfinite(each)]
         k = n * min(max(measured.value, 0.0), 1.0)
         counted = np.sqrt(1 / (k + _LASTING) + 1 / (n - k + _LASTING)) if scale == "logit" else np.sqrt(0.5 / n)
@@ -255,10 +237,10 @@ class _Inference:
         self.groups: dict[str, dict[str, int]] = {}
         for index, each in enumerate(self.parameters):
             self.groups.setdefault(each.group, {})[each.kind] = index
-        for index in map(list, (each.values() for each in self.groups.values())):
+        for rows in map(list, (each.values() for each in self.groups.values())):
             # One value that is measured for several kinds of joint counts once.
-            alike = self.observed[index] == self.observed[index][:, None]
-            self.deviation[index] *= np.sqrt(np.maximum(alike.sum(axis=0), 1))
+            alike = self.observed[rows] == self.observed[rows][:, None]
+            self.deviation[rows] *= np.sqrt(np.maximum(alike.sum(axis=0), 1))
         self.inverse, self.prior_deviation = self._of_prior()
 
     def _of_prior(self) -> tuple[Floats, Floats]:
@@ -281,9 +263,7 @@ class _Inference:
         return {each.key: each.value(there) for each, there in zip(self.parameters, place, strict=True)}
 
     def of_values(self, deviation: Floats) -> Floats:
-        """Return the deviations of the values from those of the inferred parameters, (N,) each: shares of inversions
-        at no distance also depend on the reach.
-        """
+        """Return the deviations of the values, (N,): shares of inversions at no distance also depend on the reach."""
         return np.hypot(deviation, self.apart * _APART * deviation[self.reach] / np.exp(self.at[self.reach]))
 
     def add(self, measured: Floats) -> None:
@@ -302,16 +282,15 @@ class _Inference:
             moves = np.zeros(len(self.parameters))
             moves[index] = step
             change = (run(moves) - before) / step
-            known = np.isfinite(change)
+            known, change = np.isfinite(change), np.nan_to_num(change)
             anew = group.startswith(_ANEW)
             noise = _NOISE_ANEW if anew else _NOISE
             for of, rows in self.groups.items():
                 row, own = np.array(list(rows.values())), of == group
                 weight = np.where(known[row] & (own or not anew), (step / (noise * self.deviation[row])) ** 2, 0.0)
-                spread = _OWN_SPREAD if own else _OTHER_SPREAD
-                usual = (weight @ np.nan_to_num(change[row]) + own * _OWN / spread**2) / (weight.sum() + spread**-2)
+                usual = (weight @ change[row] + own * _OWN / _SPREAD**2) / (weight.sum() + _SPREAD**-2)
                 sure = weight + _KIND_SPREAD**-2
-                slope = (weight * np.nan_to_num(change[row]) + usual / _KIND_SPREAD**2) / sure
+                slope = (weight * change[row] + usual / _KIND_SPREAD**2) / sure
                 slope[slope**2 * sure < 1] = 0.0  # not told from none
                 for each, place in zip(slope, row, strict=True):
                     kind = self.parameters[place].kind
@@ -321,9 +300,7 @@ class _Inference:
                         slopes[place, columns[kind]] = each
                     else:
                         slopes[place, index] = each / len(index)
-        self.slopes = slopes
-        self.places.clear()
-        self.measured.clear()
+        self.slopes, self.places, self.measured = slopes, [], []
 
     def posterior(self) -> tuple[Floats, Floats]:
         """Return mean and standard deviation of the parameters, (N,) each."""
@@ -337,18 +314,14 @@ class _Inference:
         slopes = np.where(known[:, None], self.slopes, 0.0)
         weighed = slopes.T / variance
         information = weighed @ slopes + self.inverse + 1e-6 * np.eye(len(level))
-        pull = weighed @ np.where(known, self.observed - level, 0.0) + self.inverse @ np.nan_to_num(self.prior)
-        pull = pull + 1e-6 * self.at
+        pull = weighed @ np.where(known, self.observed - level, 0.0) + 1e-6 * self.at
+        pull = pull + self.inverse @ np.nan_to_num(self.prior)
         return np.linalg.solve(information, pull), np.sqrt(np.diag(np.linalg.inv(information)))
 
     def _more(self, away: Floats, weight: Floats) -> Floats:
         """Return by how much variances between simulations exceed those of the recording's bootstrap, (N,), 1 or more.
 
-        Kinds of joint are alike. A number of simulations that says nothing has the weight of _FEW.
-
-        Args:
-            away: levels of simulations less their mean, (n, N).
-            weight: their weights, (n, N).
+        Kinds of joint are alike. Levels of simulations less their mean are ``away``, with weights, (n, N).
         """
         free = np.maximum(1 - (weight**2).sum(axis=0), 1e-9)
         ratio = (weight * np.nan_to_num(away) ** 2).sum(axis=0) / free / self.deviation**2
@@ -356,5 +329,5 @@ class _Inference:
         for rows in self.groups.values():
             index = list(rows.values())
             count = ((weight[:, index] > 0).sum(axis=0) - 1.0).clip(0.0)
-            result[index] = max(1.0, (count @ ratio[index] + _FEW) / (count.sum() + _FEW))
+            result[index] = max(1.0, (count @ ratio[index] + 1.0) / (count.sum() + 1.0))
         return result

@@ -60,15 +60,7 @@ def fit_life(lags: ArrayLike, step: float, autocorrelation: Floats, weight: Floa
         autocorrelation: autocorrelations at the lags, (R, L).
         weight: weights of the least squares, (R, L).
     """
-    lags = np.asarray(lags, float)
-    lives = np.concatenate([[0.0], _LIVES])
-    with np.errstate(divide="ignore"):
-        curves = np.exp(-lags / lives[:, None])
-    weight = np.where(np.isfinite(autocorrelation), weight, 0.0)
-    values = np.nan_to_num(autocorrelation)
-    # Sum of w (r - e)² without an (R, lives, L) array; the term w r² is left out, as it is the same for all lives.
-    cost = weight @ (curves**2).T - 2 * (weight * values) @ curves.T
-    return np.where(weight.sum(axis=-1) > 0, lives[cost.argmin(axis=-1)] * step, np.nan)
+    return _fit(lags, step, autocorrelation, weight, np.concatenate([[0.0], _LIVES]), least=1.0)[0]
 
 
 def fit_noisy_life(lags: ArrayLike, step: float, autocorrelation: Floats, weight: Floats) -> tuple[Floats, Floats]:
@@ -76,13 +68,20 @@ def fit_noisy_life(lags: ArrayLike, step: float, autocorrelation: Floats, weight
 
     Arguments as of :func:`fit_life`; NaN without any weight.
     """
-    lags = np.asarray(lags, float)
-    curves = np.exp(-lags / _LIVES[:, None])
+    return _fit(lags, step, autocorrelation, weight, _LIVES, least=0.0)
+
+
+def _fit(
+    lags: ArrayLike, step: float, autocorrelation: Floats, weight: Floats, lives: Floats, *, least: float
+) -> tuple[Floats, Floats]:
+    """Return the fit with a share of ``least`` or more that lasts."""
+    with np.errstate(divide="ignore"):
+        curves = np.exp(-np.asarray(lags, float) / lives[:, None])
     weight = np.where(np.isfinite(autocorrelation), weight, 0.0)
-    values = np.nan_to_num(autocorrelation)
-    square, product = weight @ (curves**2).T, (weight * values) @ curves.T
-    kept = np.clip(np.divide(product, square, out=np.zeros_like(square), where=square > 0), 0.0, 1.0)
+    # Sums of w (r - e)² without an (R, lives, L) array; the term w r² is left out, as it is the same for all lives.
+    square, product = weight @ (curves**2).T, (weight * np.nan_to_num(autocorrelation)) @ curves.T
+    kept = np.clip(np.divide(product, square, out=np.zeros_like(square), where=square > 0), least, 1.0)
     best = (kept**2 * square - 2 * kept * product).argmin(axis=-1)
     known = weight.sum(axis=-1) > 0
     kept = np.take_along_axis(kept, best[:, None], axis=-1)[:, 0]
-    return np.where(known, _LIVES[best] * step, np.nan), np.where(known, 1 - kept, np.nan)
+    return np.where(known, lives[best] * step, np.nan), np.where(known, 1 - kept, np.nan)

@@ -34,13 +34,7 @@ from simharness.types.views import Visibility
 
 _GAP = 1000.0  # seconds between scenes
 _ON_DECOY = 0.3  # intersection over union of the boxes of a detection and of the decoy that it shows
-_REACHES = (
-    3.0,
-    2.0,
-    GOOD_BELOW,
-    GOOD_BELOW,
-    GOOD_BELOW,
-)  # units: keypoints beyond say nothing about the bias, by round
+_REACHES = (3.0, 2.0, *(3 * (GOOD_BELOW,)))  # units: keypoints beyond say nothing about the bias, by round
 _ALWAYS = 0.9  # share of the joints in the picture that a detector of whole people reports
 _JOINTS = len(COCO17)
 

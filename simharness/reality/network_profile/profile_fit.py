@@ -41,7 +41,7 @@ from simharness.types.random_streams import stream
 from simharness.types.truth import MISS_FROM, KeypointError
 
 ROUNDS = 6
-"""Simulations of all scenes after the slopes are known."""
+"""Simulations of all scenes before slopes are found, and after."""
 
 _FEWEST = 60  # joints or people behind a value that is calibrated
 _RESAMPLES = 200
@@ -61,7 +61,7 @@ _SCALES: Scales = {
 }
 """Inferred parameters; correlations are measured without a consensus, and are shares."""
 
-SIMULATIONS = ROUNDS // 2 + ROUNDS + sum(map(len, _SCALES.values()))
+SIMULATIONS = 2 * ROUNDS + sum(map(len, _SCALES.values()))
 """Simulations of all scenes, about."""
 
 
@@ -106,7 +106,7 @@ def fit_network(
         scenes: the scenes.
         name: name of the profile.
         command: command that made the profile, to be written into its file.
-        rounds: simulations after the slopes are known.
+        rounds: simulations before slopes are found, and after.
         progress: called with 1 after each simulation.
 
     Raises:

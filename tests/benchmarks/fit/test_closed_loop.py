@@ -58,7 +58,7 @@ def test_recordings_are_of_the_known_detector_and_annotation():
 
 
 def draw(fitted):
-    values = {"true": 0.4, "fitted": fitted, "low": 0.3, "high": 0.5, "measured": 0.2, "n": 100}
+    values = {"true": 0.4, "fitted": fitted, "low": 0.39, "high": 0.5, "measured": 0.2, "n": 100, "prior": False}
     return {
         "cameras": 3,
         "annotated": True,
@@ -72,12 +72,25 @@ def draw(fitted):
 def test_the_table_has_bias_and_coverage_of_limbs():
     lines = list(tables([draw(0.5), draw(0.7)]))
     (row,) = (line.split() for line in lines if line.startswith("keypoints.scatter"))
-    assert row[1:] == ["0.400", "0.200", "0.600", "+0.2000", "0.2236", "100%"]
+    assert row[1:] == ["0.400", "0.200", "0.600", "+0.2000", "0.2236", "100%", "0%", "0%"]
     assert any("forearm: 20.0 mm, of the twin 30.0, ratio 1.50" in line for line in lines)
     assert any("random part 20.0, fitted 30.0, bias +10.0" in line for line in lines)
 
 
 @pytest.mark.parametrize(("low", "high", "expected"), [(0.3, 0.5, 1.0), (0.41, 0.5, 0.0)])
 def test_inside(low, high, expected):
-    assert inside({"true": 0.4, "low": low, "high": high}) == expected
-    assert np.isnan(inside({"true": 0.4, "low": np.nan, "high": high}))
+    assert inside({"true": 0.4, "fitted": 0.45, "low": low, "high": high}) == expected
+    assert np.isnan(inside({"true": 0.4, "fitted": 0.45, "low": np.nan, "high": high}))
+
+
+@pytest.mark.parametrize(("deviations", "expected"), [(1.6, 1.0), (1.7, 0.0)])
+def test_inside_at_another_level(deviations, expected):
+    """A 90 % interval reaches 1.645 deviations far; one of 95 % 1.96."""
+    values = {
+        "true": 0.4 * np.exp(0.3 * deviations),
+        "fitted": 0.4,
+        "low": 0.4 / np.exp(0.588),
+        "high": 0.4 * np.exp(0.588),
+    }
+    assert inside(values, level=0.9) == expected
+    assert inside(values) == 1.0

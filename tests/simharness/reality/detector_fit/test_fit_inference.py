@@ -113,3 +113,48 @@ def test_events_that_never_happened_are_rare():
 def test_without_rounds_nothing_changes():
     measured = recording(0)
     assert infer(measured, simulate, PRIOR, rounds=0) == measured
+
+
+def test_inversions_at_no_distance_are_extrapolated_with_their_uncertainty():
+    """A recording tells how frequent inversions are at some distance; the reach is only the prior's."""
+    key, reach, scale = "keypoints.inversion.knees", "keypoints.inversion_reach", 0.2
+    measured = {key: MeasuredValue(0.02, 0.018, 0.022, 100_000), reach: MeasuredValue(np.nan, np.nan, np.nan, 0)}
+
+    def seen(values, draw):
+        return {key: values[key] * np.exp(-scale / values[reach]), reach: np.nan}
+
+    found = infer(measured, seen, {key: 0.01, reach: 0.3})
+    assert found[reach].by_prior
+    assert found[reach].value == pytest.approx(0.3)
+    assert found[key].value == pytest.approx(0.02 * np.exp(scale / 0.3), rel=0.1)
+    ends = [0.02 * np.exp(scale / found[reach].value * (1 + 0.7 * side * 1.96)) for side in (-1, 1)]
+    assert [found[key].low, found[key].high] == pytest.approx(ends, rel=0.2)
+
+
+def test_one_value_of_several_kinds_counts_once():
+    """Strays of all kinds of joint are one measured value: its error is the error of each parameter."""
+    keys = [f"keypoints.stray.{kind}" for kind in LIMBS]
+    measured = dict.fromkeys(keys, MeasuredValue(0.3, 0.25, 0.35, 200))
+    prior = dict.fromkeys(keys, 0.3)
+    found = infer(measured, lambda values, draw: dict.fromkeys(keys, np.mean([values[key] for key in keys])), prior)
+    alone = infer({keys[0]: measured[keys[0]]}, lambda values, draw: values, {keys[0]: 0.3})[keys[0]]
+    assert found[keys[0]].high - found[keys[0]].low > alone.high - alone.low
+
+
+def test_other_parameters_are_told_apart_by_what_they_do():
+    """Scatter and jitters both raise the measured share of jitters; scatter is also measured by itself."""
+    prior = {**dict.fromkeys(SCATTER, 0.4), **dict.fromkeys(JITTER, 0.04)}
+    near = {**{key: 0.9 * TRUE[key] for key in SCATTER}, **{key: TRUE[key] for key in JITTER}}
+
+    def seen(values, draw):
+        result = {}
+        for kind in LIMBS:
+            scatter, jitter = f"keypoints.scatter.{kind}", f"keypoints.jitter.{kind}"
+            result[scatter] = 0.9 * values[scatter]
+            result[jitter] = 0.5 * values[jitter] + 0.3 * values[scatter] ** 2
+        return result
+
+    exact = {key: MeasuredValue(each, 0.95 * each, 1.05 * each, 100_000) for key, each in seen(near, 0).items()}
+    found = infer(exact, seen, prior)
+    for key, true in near.items():
+        assert found[key].value == pytest.approx(true, rel=0.12), key

@@ -316,6 +316,12 @@ class TestGuesses:
         assert guessing["scores.outside"] == pytest.approx(0.6, abs=0.08)
         assert "keypoints.border" not in guessing
 
+    def test_errors_of_a_limb_do_not_depend_on_guesses(self, filmed):
+        """Guesses of a limb are wrong together, because its pose is unusual; its other errors are independent here."""
+        errors = {"scatter": 0.2, "miss": 0.06, "guess": {"self_occluded": 0.9, "occluded": 0.9}}
+        found = point_estimates(filmed.sample(keypoints=errors, correlation={"gross_views": 0.3}))
+        assert found["correlation.limb"] < 0.2
+
     def test_scores_of_guesses(self, guessing):
         assert np.mean([guessing[f"scores.guess.{kind}"] for kind in LIMB_KINDS]) == pytest.approx(0.3, abs=0.04)
         assert guessing["scores.good"] == pytest.approx(0.85, abs=0.01)
