@@ -62,17 +62,20 @@ def scene(seed: int) -> Simulation:
     return capture_trial(build_trial(scenario), Stages(Silence()))
 
 
-def known_recording(cameras: int, *, annotated: bool, draw: int) -> KnownRecording:
-    """Return a recording of the known detector.
+def known_recording(
+    cameras: int, *, annotated: bool, draw: int, detector: DetectorSection = DETECTOR
+) -> KnownRecording:
+    """Return a recording of a known detector.
 
     Args:
         cameras: number of cameras, a key of :data:`RIGS`.
         annotated: whether the truth has the errors of an annotation; else it is exact.
         draw: number of the draw, which decides the scene, the detections and the annotation.
+        detector: the detector.
     """
     simulation = scene(draw % SCENES)
     sequence, rig = simulation.sequence, simulation.trial.exposures.true_rig
-    found = detect(sequence, simulation.views, rig, DETECTOR, seed=100 + draw)
+    found = detect(sequence, simulation.views, rig, detector, seed=100 + draw)
     people = sequence.joints.shape[1]
     annotation = AnnotationModel.drawn(ANNOTATION if annotated else AnnotationSection(), people, seed=draw)
     spread = np.exp(SPREAD * stream(draw, "spread").standard_normal(annotation.deviation.shape))
@@ -85,6 +88,6 @@ def known_recording(cameras: int, *, annotated: bool, draw: int) -> KnownRecordi
         np.arange(len(found)),
         name=f"known {draw}",
         rate=RATE,
-        kind=DETECTOR.kind,
+        kind=detector.kind,
     )
     return KnownRecording(whole.subset(RIGS[cameras]), annotation)

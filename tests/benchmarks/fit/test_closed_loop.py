@@ -7,8 +7,11 @@ import pytest
 
 from benchmarks.fit.__main__ import main
 from benchmarks.fit.loop import truth_bones
+from benchmarks.fit.others import out_of_sample
 from benchmarks.fit.recordings import ANNOTATION, DETECTOR, RIGS, known_recording
+from benchmarks.fit.sensitivity import CONSTANTS, _times
 from benchmarks.fit.table import inside, tables
+from simharness.reality.detector_fit import inference
 
 
 @pytest.fixture(scope="module")
@@ -94,3 +97,18 @@ def test_inside_at_another_level(deviations, expected):
     }
     assert inside(values, level=0.9) == expected
     assert inside(values) == 1.0
+
+
+@pytest.mark.slow
+def test_other_detectors_are_predicted_out_of_sample():
+    header, row = out_of_sample(["poor"])
+    name, fitted, _, _, shipped, *_ = row.split()
+    assert "shipped" in header
+    assert name == "poor"
+    assert 0 < float(fitted) < 9
+    assert 0 < float(shipped) < 9
+
+
+def test_constants_of_the_sensitivity_are_those_of_the_inference():
+    assert all(hasattr(inference, name) for name in CONSTANTS)
+    assert _times({"a": (1.0, 2.0), "b": 3}, 2.0) == {"a": (2.0, 4.0), "b": 6.0}
