@@ -78,8 +78,17 @@ def write_page(
         name=name,
         people=people,
         rig=rig,
-        cards=_cards(recording),
-        doctor=_doctor(diagnosis),
+        most=int(people.present.any(axis=2).sum(axis=1).max(initial=0)),
+        residual=recording.residual,
+        on_one_view=share_on_one_view(recording.supports),
+        varies=float(np.median([bone.spread / bone.length for bone in recording.bones]))
+        if recording.bones
+        else math.nan,
+        expected=expected_error(people),
+        known=math.isfinite,
+        diagnosis=diagnosis,
+        sentence=sentence,
+        sentence_of=sentence_of,
         missing=[] if left_out is None else left_out.sentences(),
         detections=sum(map(len, frames)),
         films=films,
@@ -92,60 +101,28 @@ def write_page(
     return Path(folder) / PAGE
 
 
-def _cards(recording: ExaminedRecording) -> list[tuple[str, str, str]]:
-    """Return title, number and explanation of the headline numbers that are known."""
-    people = recording.people
-    present = people.present.any(axis=2).sum(axis=1)
-    pixels, metres = recording.residual
-    error, alone = expected_error(people), share_on_one_view(recording.supports)
-    known = [bone.spread / bone.length for bone in recording.bones]
-    varies = 100 * float(np.median(known)) if known else math.nan
-    cards = [
-        ("People", f"{len(people)}", f"identities; at most {int(present.max(initial=0))} at once"),
-        ("Residual", f"{pixels:.1f} px", f"median of detected joints, {1000 * metres:.0f} mm at the person"),
-        ("On one view", f"{100 * alone:.1f} %", "of joints rest on one view or none, which gives no depth"),
-        ("Bones vary", f"{varies:.1f} %", "of their length over time, median"),
-        ("Expected error", f"{1000 * error:.0f} mm", "median, from covariances: expected, not measured"),
-    ]  # fmt: skip
-    return [card for card in cards if not card[1].startswith("nan")]
-
-
-def _doctor(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
-    if diagnosis is None:
-        return None
-    lines = [sentence_of(finding) for finding in diagnosis.alarms[1:]]
-    if diagnosis.verdict == "cannot tell":
-        lines += [sentence_of(finding) for finding in diagnosis.findings if finding.severity == "unknown"]
-    lines = lines or list(diagnosis.evidence[:4])
-    return {"verdict": diagnosis.verdict, "sentence": sentence(diagnosis), "lines": lines}
-
-
 def _sections(recording: ExaminedRecording, pictures: Pictures | None) -> dict[str, Any]:
     """Return plots, drawings and tables by the names of the template; without people nearly nothing."""
-    people, rig, seen = recording.people, recording.rig, recording.seen
+    people, seen = recording.people, recording.seen
     step = seen.frames[1] - seen.frames[0] if len(seen.frames) > 1 else 1
-    thin = "" if step == 1 else f" Residuals and views are taken from one frame in {step}."
     if not len(people):
-        return {"plots": {}, "thinned": thin}
-    hidden = len(people) - plots.MOST_ROWS
+        return {"plots": {}, "step": step}
     drawn = {
-        "above": plots.paths_from_above("from-above", people, rig),
+        "above": plots.paths_from_above("from-above", people, recording.rig),
         "identities": plots.identities("identities", people),
-        "views": plots.views_over_time("views-over-time", people, seen.frames, recording.views, len(rig)),
+        "views": plots.views_over_time("views-over-time", people, seen.frames, recording.views, len(recording.rig)),
     }
     columns = plots.longest(people, _MOST_COLUMNS).tolist()
     return {
         "plots": {key: Markup(svg) for key, svg in drawn.items()},
-        "left_out": f" {hidden} more were there for a shorter time." if hidden > 0 else "",
-        "columns_left_out": f" Of {len(people)} people the {len(columns)} who are there longest."
-        if len(people) > len(columns)
-        else "",
+        "hidden": len(people) - plots.MOST_ROWS,
+        "columns": columns,
         "drawings": _drawings(recording, pictures),
         "residuals": _residuals(recording),
         "rests": _rests(recording),
         "errors": _errors(recording, columns),
         "lengths": tables.bone_table(recording.bones, people, columns),
-        "thinned": thin,
+        "step": step,
     }
 
 
