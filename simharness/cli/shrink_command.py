@@ -78,7 +78,9 @@ def shrink(
             stage = f"Stage to blame: {failure.stage}. " if failure.stage else ""
             words = f"{failure.text}\n{stage}It fails again with {share} draws of {NOISE:g} px more noise."
             Console().print(words, highlight=False, markup=False)
-            fails, text = False, f"kept: {path}"
+            from simharness.outputs.hunt.page import write_failures_page
+
+            fails, text = False, f"kept: {path}\npage: {write_failures_page(path.parent)}"
     Console().print(text, soft_wrap=True, highlight=False, markup=False)
     if fails:
         raise typer.Exit(FOUND)
