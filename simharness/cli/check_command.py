@@ -39,14 +39,12 @@ def check(
         Path,
         typer.Argument(help="The suite: a scenario file, or the name of a shipped one: [cyan]ci[/].", metavar="SUITE"),
     ],
-    baseline: Annotated[
-        Path,
-        typer.Option(
-            metavar="FILE",
-            help="Committed scores to compare with: [cyan]results/baselines/ci.json[/]; --update-baseline writes it.",
-            dir_okay=False,
-        ),
-    ],
+    baseline: Path | None = option(
+        None,
+        "Committed scores to compare with, which --update-baseline writes; by default those that ship with the suite.",
+        metavar="FILE",
+        dir_okay=False,
+    ),
     junit: Path | None = option(None, "Write a JUnit report (XML) to this file.", metavar="FILE", dir_okay=False),
     summary: Path | None = option(None, "Write a summary (Markdown) to this file.", metavar="FILE", dir_okay=False),
     update: bool = option(
@@ -74,17 +72,19 @@ def check(
             )
         if update and accept_better:
             raise ValueError("--accept-better: --update-baseline accepts every change; remove one of them")
-        for option, path in ({"--baseline": baseline} if update else reports).items():
+        if update and baseline is None:
+            raise ValueError("--update-baseline: expected --baseline FILE, where the scores are written")
+        for option, path in ({"--baseline": baseline} if update and baseline else reports).items():
             check_place(path, option=option, mark=_MARKS[option])
         study = load_study(suite)
-        if update:
+        if update and baseline:
             _update(study, baseline, workers)
             return
-        from simharness.gate.suite import baseline_of, kept_trials
+        from simharness.gate.suite import baseline_of, kept_trials, shipped_baseline
         from simharness.gate.suite import check as check_suite
 
-        before = baseline_of(study, baseline)
-        with kept_trials(study, baseline) as store:
+        before = baseline_of(study, baseline or shipped_baseline(study))
+        with kept_trials(study, baseline or Path(f"{study.name}.json")) as store:
             with failing(), reporter() as bars:
                 result = check_suite(
                     study, before, workers=workers, accept_better=accept_better, reporter=bars, store=store

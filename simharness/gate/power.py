@@ -71,7 +71,8 @@ def _level(measurement: Measurement, gate: GateSection) -> float:
     cases, one changes alone.
     """
     scores = {key for scores in measurement.scores.values() for key in (*GATED, TIME) if scores[key] is not None}
-    return gate.level / (len(measurement.variants) * len(scores) * (1 + (len(measurement.cases) > 1)))
+    tests = len(measurement.variants) * len(scores) * (1 + (len(measurement.cases) > 1))
+    return gate.level / max(tests, 1)
 
 
 def even_changes(measurement: Measurement, gate: GateSection) -> str:

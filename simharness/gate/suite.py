@@ -23,9 +23,11 @@ from simharness.gate.frame_times import relative_times
 from simharness.gate.score_tests import require_seeds
 from simharness.gate.trial_command import TrialKey, command_of, setting_name, settings_at_seeds
 from simharness.runtime.version import code_version
+from simharness.scenario.document import find_scenario
 from simharness.scenario.load import Study
 from simharness.scenario.sections.method_section import MethodSection
 from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.shipped import shipped_folder
 from simharness.study.stored_trial import StoredTrial, TrialOutput
 from simharness.study.study_folder import plan
 from simharness.study.study_run import run_planned, stored_entries
@@ -173,6 +175,23 @@ def _exclude(scenario: Scenario) -> set[str]:
     """Return the sections of a scenario that cannot change its results, or that count elsewhere."""
     sensor = set() if ReadFrames.needed(scenario) else {"sensor"}
     return {"name", "description", "seed", "method"} | sensor
+
+
+def shipped_baseline(study: Study) -> Path:
+    """Return the file of the baseline that ships with a suite.
+
+    Raises:
+        ValueError: the suite does not ship, or has no baseline.
+    """
+    scenarios, suite = shipped_folder().resolve(), find_scenario(study.path).resolve()
+    file = scenarios / "baselines" / f"{suite.stem}.json"
+    if suite.parent != scenarios or not file.exists():
+        names = ", ".join(sorted(each.stem for each in file.parent.glob("*.json")))
+        raise ValueError(
+            f"--baseline: no baseline ships with {study.path}, only with {names}; write one: --baseline "
+            f"{study.name}.json --update-baseline"
+        )
+    return file
 
 
 def baseline_of(study: Study, path: Path) -> Measurement:

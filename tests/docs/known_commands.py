@@ -48,11 +48,11 @@ NAMES = (  # mentioned
     "simharness shrink results/failures/NAME.toml",  # tests/simharness/hunt/test_kept_failure.py
 )
 CHECKS = (
-    "simharness check ci --baseline results/baselines/ci.json --workers 2",
-    "simharness check ci --baseline results/baselines/ci.json --workers 2 --junit junit.xml --summary summary.md",
+    "simharness check ci --workers 2",
+    "simharness check ci --workers 2 --junit junit.xml --summary summary.md",
 )
-CHECK_OF_TRACKING = "simharness check ci_tracking --baseline results/baselines/ci_tracking.json --workers 2"
-CHECK_OF_REPAIR = "simharness check ci_repair --baseline results/baselines/ci_repair.json --workers 2"
+CHECK_OF_TRACKING = "simharness check ci_tracking --workers 2"
+CHECK_OF_REPAIR = "simharness check ci_repair --workers 2"
 SHELF = (
     "simharness evaluate shelf FOLDER",
     "simharness evaluate twin shelf FOLDER",

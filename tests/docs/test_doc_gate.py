@@ -15,9 +15,10 @@ from known_commands import CHECK_OF_REPAIR, CHECK_OF_TRACKING, CHECKS, OWN_GATE
 
 def test_the_check(easy_workplace):
     plain, full = CHECKS
-    done(plain, "--update-baseline --workers 1")
-    assert "no regression" in done(plain, "--workers 1")
-    assert "no regression" in done(full, "--workers 1")
+    own = "--baseline easy.json --workers 1"
+    done(plain, f"{own} --update-baseline")
+    assert "no regression" in done(plain, own)
+    assert "no regression" in done(full, own)
     assert (easy_workplace / "junit.xml").read_text().startswith("<?xml")
     assert (easy_workplace / "summary.md").read_text().startswith("## easy: no regression")
 
@@ -60,7 +61,7 @@ class TestAssertRobust:
             self.example()()
 
     def test_its_numbers_are_right_for_the_suite_that_ships(self):
-        trials = json.loads((ROOT / "results" / "baselines" / "ci.json").read_text())["trials"]
+        trials = json.loads((ROOT / "scenarios" / "baselines" / "ci.json").read_text())["trials"]
         (example,) = re.findall(r'assert_robust\("ci", seeds=(\d+), (.*)\)', "".join(blocks("python")))
         first = sorted({trial["seed"] for trial in trials})[: int(example[0])]
         of_full = [trial for trial in trials if trial["variant"] == "full" and trial["seed"] in first]

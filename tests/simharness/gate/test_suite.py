@@ -17,7 +17,7 @@ from simharness.gate import frame_times, suite
 from simharness.gate.baseline import DETECTED, FRAMES, GATED, KEPT, TIME
 from simharness.gate.frame_times import reference_work, relative_times
 from simharness.gate.score_tests import least_corrected_p
-from simharness.gate.suite import baseline_of, fingerprint, kept_trials, run_suite
+from simharness.gate.suite import baseline_of, fingerprint, kept_trials, run_suite, shipped_baseline
 from simharness.scenario.load import load_study
 from simharness.scoring.catalogue import SCORES
 from simharness.study.stored_trial import TrialOutput
@@ -51,12 +51,18 @@ def test_the_suite_of_tracking_has_enough_seeds_and_only_variants_with_memory():
     assert tests * least_corrected_p(len(study.seeds), cases=len(study.settings)) < study.gate.level
 
 
-@pytest.mark.parametrize("name", ["ci", "ci_tracking", "ci_repair"])
+@pytest.mark.parametrize("name", ["ci", "ci_tracking", "ci_repair", "ci_pixels"])
 def test_a_committed_baseline_is_of_the_shipped_suite(name):
-    root = Path(__file__).parents[3]
-    study = load_study(root / "scenarios" / f"{name}.toml")
-    baseline = baseline_of(study, root / "results" / "baselines" / f"{name}.json")
+    study = load_study(name)
+    baseline = baseline_of(study, shipped_baseline(study))
     assert len(baseline.scores) == study.trials * len(study.variants)
+
+
+def test_another_suite_has_no_shipped_baseline(tmp_path):
+    own = tmp_path / "ci.toml"
+    own.write_text('extends = "ci"\nname = "own"\n')
+    with pytest.raises(ValueError, match=r"no baseline ships with .*ci\.toml, only with ci, .*--baseline own\.json"):
+        shipped_baseline(load_study(own))
 
 
 def test_the_work_of_the_reference_is_always_the_same():
