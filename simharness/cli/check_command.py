@@ -89,7 +89,7 @@ def check(
                 result = check_suite(
                     study, before, workers=workers, accept_better=accept_better, reporter=bars, store=store
                 )
-            _print(result, Console())
+            _print(result)
             unwritten = _write(result, reports)
     if not result.passed:
         raise typer.Exit(FOUND)
@@ -143,7 +143,7 @@ def _print_power(measured: "Measurement", study: "Study") -> None:
     say(even_changes(measured, study.gate))
 
 
-def _print(check: "GateResult", console: Console) -> None:
+def _print(check: "GateResult") -> None:
     """Print the result of a check."""
     from simharness.gate.gate_reports import sentence
 
@@ -160,8 +160,7 @@ def _print(check: "GateResult", console: Console) -> None:
     if check.advice:
         say(check.advice)
     for variant in check.variants:
-        console.print()
-        console.print(_table(check, variant))
+        Console().print("", _table(check, variant))
     say(f"\n{check.worst_description}\n  {check.command}")
 
 

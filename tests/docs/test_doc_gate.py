@@ -71,14 +71,17 @@ class TestAssertRobust:
 
 
 def test_the_workflow_runs_the_check():
-    (workflow,) = blocks("yaml")
+    workflow = blocks("yaml")[0]
     folded = " ".join(re.search(r"run: >\n((?: {10}.*\n)+)", workflow)[1].split())
     assert folded in CHECKS
 
 
 def test_the_workflow_is_valid():
     yaml = pytest.importorskip("yaml")
-    (workflow,) = map(yaml.safe_load, blocks("yaml"))
+    workflow, of_action, of_gitlab = map(yaml.safe_load, blocks("yaml"))
+    (given,) = (step["with"] for step in of_action["jobs"]["check"]["steps"] if "with" in step)
+    assert set(given) <= set(yaml.safe_load((ROOT / "action.yml").read_text())["inputs"])
+    assert of_gitlab["robustness"]["script"][1].startswith(OWN_GATE[1])
     runs = [step["run"].strip() for step in workflow["jobs"]["check"]["steps"] if "run" in step]
     assert len(runs) == 3
     assert runs[0] == "pip install -e ."

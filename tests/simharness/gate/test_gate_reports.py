@@ -1,12 +1,10 @@
 """Reports of a gate check: terminal, JUnit, Markdown."""
 
-import io
 import re
 from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
-from rich.console import Console
 
 from simharness.cli.check_command import _print
 from simharness.gate.baseline import FRAMES, GATED, TIME, Measurement
@@ -82,12 +80,12 @@ def test_a_difference_that_rounds_to_zero_has_no_sign():
 
 class TestTerminal:
     @pytest.mark.parametrize("more", [{}, {"mpjpe_mm": 412.34, TIME: 123.4}, {"pcp": -89.0, "ghosts": 12.3}])
-    def test_tables_are_complete_at_80_columns(self, more):
+    def test_tables_are_complete_at_80_columns(self, more, monkeypatch, capsys):
         """Large changes with wide intervals, in a terminal of 80 columns."""
         check = made(lambda trial: {key: value * (1 + 0.3 * (trial.seed % 3)) for key, value in more.items()})
-        file = io.StringIO()
-        _print(check, Console(file=file, width=80))
-        _, *tables, _ = file.getvalue().split("\n\n")  # verdict and changes, a table for each variant, command
+        monkeypatch.setenv("COLUMNS", "80")
+        _print(check)
+        _, *tables, _ = capsys.readouterr().out.split("\n\n")  # verdict and changes, a table for each variant, command
         assert len(tables) == 2
         tables = "\n".join(tables).splitlines()
         assert "…" not in "".join(tables)
