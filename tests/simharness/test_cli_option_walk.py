@@ -293,9 +293,7 @@ def _stand_ins(study):
         "simharness.reality.validation.validation": {
             "simulate_predictions": SimulatedTwins([], None), "validate": validated, "predict_halves": []
         },
-        "simharness.outputs.validation.tables": {
-            "skill_rows": ([], []), "distance_sentence": "", "cancelling_parts": []
-        },
+        "simharness.outputs.validation.tables": {"distance_sentence": "", "cancelling_parts": []},
         "simharness.reality.validation.validation_summary": {"summarize_validation": {}, "summarize_halves": {}},
         "simharness.outputs.validation.page": {"render_validation": "<!doctype html>"},
         "simharness.planning.rehearse_rig": {"rehearse_rig": rehearsed},
@@ -316,6 +314,7 @@ class _Validated:
     distance: None = None
     corrections: None = None
     verdicts: tuple = ()
+    skills: tuple = ()
     failed: tuple = ()
 
 
