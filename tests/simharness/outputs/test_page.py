@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mvpose import Detections, Estimate, Matching
-from simharness.outputs.run.page import _facts, joint_errors, person_errors, render
+from simharness.outputs.run.page import joint_errors, person_errors, render
 from simharness.outputs.run.result_folder import score_table
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.people_section import PeopleSection
@@ -105,4 +105,5 @@ def test_text_of_the_user_is_escaped():
 
 def test_objects_of_kinds_and_of_files_are_counted():
     clutter = {"boxes": 2, "objects": ("sofa.obj",)}
-    assert ("objects", "4") in _facts(make_record(clutter=clutter, decoys={"posters": 1}))
+    page = render(make_record(clutter=clutter, decoys={"posters": 1}))
+    assert "<dt>objects</dt><dd>4</dd>" in page
