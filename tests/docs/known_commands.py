@@ -136,6 +136,7 @@ MODULES = tuple(
 FORECASTS = "python -m benchmarks.planning.blind_forecasts FOLDER --shelf SHELF"  # half an hour; data of Shelf
 ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tracking/test_shelf_losses.py
 POWER = "python -m benchmarks.validation FOLDER"  # half an hour, and the data of Shelf; test_wrong_twins.py
+LOOP = "python -m benchmarks.fit FOLDER"  # half an hour; tests/benchmarks/fit/test_closed_loop.py
 GALLERY = "python -m tools.gallery results/gallery"  # tests/tools/test_gallery.py; minutes of rendering
 # Without arguments these begin to bake the body.
 BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")
@@ -160,6 +161,7 @@ KNOWN = {
     FORECASTS,
     ON_SHELF,
     POWER,
+    LOOP,
     *BAKE,
     GALLERY,
     CI,
