@@ -137,6 +137,7 @@ FORECASTS = "python -m benchmarks.planning.blind_forecasts FOLDER --shelf SHELF"
 ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tracking/test_shelf_losses.py
 POWER = "python -m benchmarks.validation FOLDER"  # half an hour, and the data of Shelf; test_wrong_twins.py
 LOOP = "python -m benchmarks.fit FOLDER"  # half an hour; tests/benchmarks/fit/test_closed_loop.py
+OUT_OF_SAMPLE = "python -m benchmarks.fit FOLDER --out-of-sample"  # tests/benchmarks/fit/test_closed_loop.py
 GALLERY = "python -m tools.gallery results/gallery"  # tests/tools/test_gallery.py; minutes of rendering
 # Without arguments these begin to bake the body.
 BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")
@@ -162,6 +163,7 @@ KNOWN = {
     ON_SHELF,
     POWER,
     LOOP,
+    OUT_OF_SAMPLE,
     *BAKE,
     GALLERY,
     CI,
