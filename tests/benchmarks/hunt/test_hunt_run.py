@@ -1,0 +1,134 @@
+"""Hunts: what is found and in which circumstances, continued after an interruption, kept as failures."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from crowded_frames import crowd
+
+from benchmarks.hunt.__main__ import main
+from benchmarks.hunt.hunt_run import TRIALS, HuntedPoint, distinct
+from benchmarks.hunt.hunted_trial import NOISES, HuntFinding, circumstances
+from simharness.hunt.kept_failure import read_failure
+
+SEARCHED = """
+scenario = "small.toml"
+overrides = ["detector.profile=crowded"]
+[search]
+people.count = { from = 2, to = 4, steps = 3 }
+cameras.count = [3, 4]
+detector.boxes.missed = { from = 0.6, to = 0.9, steps = 4 }
+"""
+SMALL = """
+extends = "quickstart"
+duration = 0.4
+rate = 5.0
+variants = ["fast"]
+[people]
+spacing = 0.5
+[rendering]
+renderer = "rays"
+"""
+
+
+@pytest.fixture
+def hunt(tmp_path, capsys):
+    (tmp_path / "searched.toml").write_text(SEARCHED)
+    (tmp_path / "small.toml").write_text(SMALL)
+
+    def call(*options, out="out"):
+        code = 0
+        try:
+            main([str(tmp_path / "searched.toml"), str(tmp_path / out), *options])
+        except SystemExit as stopped:
+            code = stopped.code
+        return SimpleNamespace(exit_code=code, **capsys.readouterr()._asdict()), tmp_path / out
+
+    return call
+
+
+def content(folder):
+    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
+def test_a_hunt_finds_keeps_and_continues(hunt):
+    options = ["--trials", "4", "--method", "random", "--keep", "2"]
+    result, folder = hunt(*options)
+    assert result.exit_code == 0, result.err
+    lines = [json.loads(line) for line in (folder / TRIALS).read_text().splitlines()]
+    assert [row["trial"] for row in lines[1:]] == list(range(4))
+    assert all(row["error"] == "" for row in lines[1:])
+    assert any(row["findings"] for row in lines[1:])
+    whole = content(folder)
+    kept = sorted((folder / "failures").glob("*.toml"))
+    assert 1 <= len(kept) <= 2
+    for path in kept:
+        failure = read_failure(path)
+        assert failure.replay()[1]
+        assert failure.text in result.out
+    text = (folder / TRIALS).read_text()
+    (folder / TRIALS).write_text("".join(text.splitlines(keepends=True)[:3]) + '{"trial": 3, "val')
+    again, _ = hunt(*options)
+    assert again.exit_code == 0, again.err
+    restored = content(folder)
+    assert sorted(restored.pop(TRIALS).splitlines()) == sorted(whole.pop(TRIALS).splitlines())
+    assert restored == whole
+    assert again.out == result.out
+    refused, _ = hunt(*options, "--seed", "5")
+    assert refused.exit_code == 2
+    assert "another hunt" in refused.err
+
+
+@pytest.mark.slow
+def test_the_number_of_workers_changes_nothing(hunt):
+    options = ["--trials", "4", "--method", "lhs", "--keep", "1"]
+    _, one = hunt(*options, out="one")
+    _, two = hunt(*options, "--workers", "2", out="two")
+    first, second = (sorted((folder / TRIALS).read_text().splitlines()) for folder in (one, two))
+    assert first == second
+    assert [path.name for path in (one / "failures").iterdir()] == [path.name for path in (two / "failures").iterdir()]
+
+
+@pytest.mark.parametrize(
+    ("options", "what"),
+    [
+        (["--minutes", "soon"], "--minutes"),
+        (["--trials", "0"], "--trials"),
+        (["--method", "luck"], "--method"),
+        (["--property", "luck"], "no such property"),
+        (["--variant", "track"], "memory"),
+    ],
+)
+def test_what_cannot_be_hunted(hunt, options, what):
+    result, _ = hunt("--trials", "1", *options)
+    assert result.exit_code == 2
+    assert what in result.err
+
+
+def finding(**changes):
+    return replace(HuntFinding("merged", 0, 0, NOISES, "detection", 4.0, 0.5, 0.2, 0.2), **changes)
+
+
+def test_near_twins_and_coincidences_do_not_count():
+    found = [finding(), finding(distance=0.55, person=2), finding(distance=2.0), finding(overlap=0.9, failed=2)]
+    points = [HuntedPoint(number, {}, number, (each,)) for number, each in enumerate(found)]
+    cells = distinct(points, lambda each: each.cell)
+    assert [point.seed for point, _ in cells.values()] == [0, 2]
+    better = [HuntedPoint(number, {}, number, (finding(failed=3 + number),)) for number in (0, 1)]
+    ((point, _),) = distinct(better, lambda each: each.cell[:2]).values()
+    assert point.seed == 1
+
+
+def test_circumstances():
+    truth = crowd().truth[4]
+    hips = truth.joints[:, 11:13].mean(axis=1)
+    apart = np.linalg.norm(hips[:, None] - hips, axis=-1) + 100 * np.eye(len(hips))
+    for person in range(len(hips)):
+        found = circumstances(truth, person)
+        assert found["distance"] == pytest.approx(apart[person].min(), abs=6e-4)
+        visible = (truth.visibility[:, person] <= 1).mean(axis=-1)
+        assert found["views"] == (visible >= 0.75).sum()
+        assert found["hidden"] == pytest.approx(1 - visible.mean(), abs=6e-4)
+    assert circumstances(truth, -1)["distance"] == pytest.approx(apart.min(), abs=6e-4)
