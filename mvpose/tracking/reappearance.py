@@ -127,7 +127,7 @@ class Reappearance:
     appears is taken for the lost person whom that motion makes likeliest, one to one, unless it is likelier that
     somebody new has come: lost people come back at a rate of their own, near the place that the motion predicts, and
     new ones at another, anywhere in the room.
-    Where detections carry descriptors, the likelihood of the looks (:mod:`mvpose.tracking.looks`) counts as well. It
+    Where detections carry descriptors, the likelihood of the looks (:func:`evidence_of_looks`) counts as well. It
     alone decides when the place says nothing more, and only if it outweighs the chance that somebody new is seen.
 
     Raises:
