@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 
 from mvpose.commands.option_groups import given, grouped, option
+from mvpose.commands.output_files import HTML, check_place
 from mvpose.commands.programs import FOUND, note
 from simharness.cli.program import PROGRAM, Overrides, Seed
 
@@ -68,6 +69,7 @@ def shrink(
             fails = failure.replay()[1]
             text = f"{failure.name} {'still fails' if fails else 'does not fail any more'}: {failure.text}"
         else:
+            check_place(out / "failures.html", option="--out", mark=HTML)
             from scipy.stats import binomtest
 
             from simharness.hunt.shrinking import NOISE

@@ -17,6 +17,7 @@ from mvpose import COCO17
 from mvpose.arrays import Floats
 from mvpose.commands.output_files import write_text
 from mvpose.estimators import SequenceEstimator
+from mvpose.files.input_files import read_bytes
 from mvpose.files.message_text import one_line
 from mvpose.presets import NEED_DESCRIPTORS
 from simharness.hunt.frozen_frame import DrawnError, FrozenFrame, freeze
@@ -242,7 +243,7 @@ def _lines(failure: KeptFailure) -> Iterator[str]:
 
 def is_failure(path: Path) -> bool:
     """Return whether a file is a kept failure, by its first lines."""
-    return path.suffix == ".toml" and path.is_file() and b"\n[[cameras]]\n" in path.read_bytes()
+    return path.suffix == ".toml" and path.is_file() and b"\n[[cameras]]\n" in read_bytes(path, what="TOML")
 
 
 def read_failure(path: Path) -> KeptFailure:

@@ -53,6 +53,7 @@ FOLDERS = {
     "simharness profile-network --out": ("simharness profile-network movenet --out {}", ""),
     "simharness profile-network --store": ("simharness profile-network movenet --out new --store {}", ""),
     "simharness rehearse --out": ("simharness rehearse ring5 --volume 4x3 --out {}", ""),
+    "simharness shrink --out": ("simharness shrink quickstart --out {}", ""),
     "simharness validate --out": ("simharness validate shelf --out {}", ""),
 }
 """Options that name a folder, a call with each, and the folder in it that the command writes."""
@@ -63,7 +64,7 @@ ELSEWHERE = {"simharness report --digest"}
 READ = {
     "calibration", "detections", "videos", "folder", "recording", "fit_on", "rival", "scenario", "suite", "file",
     "study", "stores", "room", "scenes", "other_scenes", "poses", "pictures", "times", "detector", "pose", "skeleton",
-    "package",
+    "package", "source",
 }  # fmt: skip
 """Parameters whose files are read alone."""
 
@@ -126,7 +127,7 @@ def test_a_folder_of_the_user_is_never_replaced(call, tmp_path, option):
     folder = tmp_path / "mine" / inside.replace("HASH", fingerprint(load(Path("quickstart"))))
     folder.mkdir(parents=True)
     Store(tmp_path / "store")  # that merge can read
-    names = ["ik.mot", "rehearsal.html", "validation.html", "profile.html"]
+    names = ["ik.mot", "failures.html", "rehearsal.html", "validation.html", "profile.html"]
     for name in names:
         (folder / name).write_text(MINE)
     result = call(line, "mine")
