@@ -60,6 +60,9 @@ def joint_p(changes: Floats, others: Sequence[float] = (), *, draws: int = DRAWS
         others: p-values of k tests that are not sign-flip tests of a mean.
         draws: number of random sign flips, for more than ``EXACT`` scenes.
         seed: seed of the draws.
+
+    Raises:
+        ValueError: a p-value that is not between 0 and 1.
     """
     p = _flipped_p(changes, draws, seed)
     observed = np.concatenate([p[:, 0], np.asarray(others, float)])
