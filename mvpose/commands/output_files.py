@@ -66,7 +66,7 @@ def make_folder(folder: Path, *, option: str = "--out") -> None:
 
 
 def check_place(path: Path | None, *, option: str, mark: bytes) -> None:
-    """Check before a run that :func:`write_text` can write a file; create its folder.
+    """Check before a run that :func:`write_text` can write a file. Nothing stays behind.
 
     Args:
         path: the file; None: nothing is written.
@@ -82,9 +82,9 @@ def check_place(path: Path | None, *, option: str, mark: bytes) -> None:
     try:
         if path.is_file() and path.stat().st_size and mark not in read_bytes(path, what="an earlier result"):
             raise ValueError(f"{option} {path}: exists, and this command did not write it; give another name")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path.parent):
-            pass
+        place = next(each for each in path.absolute().parents if each.exists())
+        with tempfile.TemporaryDirectory(dir=place) as trial:
+            (Path(trial) / path.absolute().relative_to(place)).parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ValueError(f"{option} {path}: cannot be written: {error.strerror}") from None
 
