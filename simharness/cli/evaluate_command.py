@@ -152,33 +152,6 @@ def evaluate_poses(
     print_evaluation(evaluation, Console())
 
 
-@app.command()
-@grouped()
-def twin(
-    recording: RecordingFile,
-    folder: RecordingFolder = None,
-    twins: int = option(10, "Number of twins, of different seeds.", metavar="N", min=2, max=10_000),
-    json_file: JsonFile = None,
-) -> None:
-    """Compare a recording with simulated copies of it (twins): PCP of four variants, with intervals."""
-    with PROGRAM.exit_on_error():
-        start = perf_counter()
-        check_place(json_file, option="--json", mark=PROVENANCE)
-        from simharness.cli.score_tables import print_twin_comparison
-        from simharness.reality.detector_fit.fit import fit
-        from simharness.reality.recording_file import read_recording
-        from simharness.reality.twin import TwinModel, compare, simulate_twins
-
-        recorded = read_recording(recording, folder)
-        with reporter() as bars:
-            with bars.stage("fit", 1):
-                model = TwinModel.of_fit(recorded, fit(recorded))
-            comparison = compare(recorded, simulate_twins(model, count=twins, reporter=bars), reporter=bars)
-        if json_file is not None:
-            _write(comparison.summary(), json_file, seeds=comparison.seeds, variants=comparison.real, start=start)
-    print_twin_comparison(comparison, Console())
-
-
 @app.command("seeds")
 @grouped()
 def evaluate_seeds(

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rich.box import SIMPLE_HEAD, Box
+from rich.box import Box
 from rich.console import Console, Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table
@@ -21,7 +21,6 @@ from simharness.scoring.tracking.identity_figures import DISTANCE
 if TYPE_CHECKING:
     from simharness.reality.evaluation import Evaluation, PublishedPcp
     from simharness.reality.seed_evaluation import SeedEvaluation
-    from simharness.reality.twin import TwinComparison
 
 _UNLIMITED = 10_000  # columns of a terminal in which everything fits
 
@@ -105,32 +104,6 @@ def print_evaluation(evaluation: "Evaluation", console: Console) -> None:
         notes,
     ]
     console.print(Group(*(Padding(block, (0, 0, 1, 0)) for block in blocks)))
-
-
-def print_twin_comparison(comparison: "TwinComparison", console: Console) -> None:
-    """Print the PCP of every variant in reality and in simulation side by side."""
-    from simharness.reality.twin import TOLERANCE
-
-    title = f"{comparison.name}: PCP in reality and in simulation, with 95 % intervals; median MPJPE"
-    table = _table(title, "variant", ("real", "simulated", "change", "mm, real", "mm, sim."), box=SIMPLE_HEAD)
-    for name, real in comparison.real.items():
-        simulated = comparison.simulated[name]
-        errors = [comparison.summaries[which][name]["mpjpe_mm"]["median"] for which in ("real", "simulated")]
-        table.add_row(
-            name,
-            str(real),
-            str(simulated),
-            f"{simulated.pcp - real.pcp:+.1f}",
-            *("–" if error is None else f"{error:.1f}" for error in errors),
-        )
-    console.print(table)
-    order = "same" if comparison.same_order else "different"
-    console.print(
-        f"{len(comparison.seeds)} twins of {comparison.frames} frames. Largest "
-        f"difference {comparison.largest_difference:.1f} points (limit: {TOLERANCE:g}), {order} order.",
-        style="dim",
-        highlight=False,
-    )
 
 
 def print_seed_evaluation(result: "SeedEvaluation", console: Console) -> None:

@@ -55,7 +55,6 @@ CHECK_OF_TRACKING = "simharness check ci_tracking --workers 2"
 CHECK_OF_REPAIR = "simharness check ci_repair --workers 2"
 SHELF = (
     "simharness evaluate shelf FOLDER",
-    "simharness evaluate twin shelf FOLDER",
     "simharness fit-detector shelf FOLDER --out fitted.toml",
     "simharness validate shelf FOLDER",
     "simharness validate shelf FOLDER --rival results/validation/OTHER/validation.json",

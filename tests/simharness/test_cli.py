@@ -48,7 +48,7 @@ def test_version(simharness):
     assert result.stdout.startswith("simharness 0.")
 
 
-EVALUATIONS = ("evaluate shelf", "evaluate recording", "evaluate seeds", "evaluate twin")
+EVALUATIONS = ("evaluate shelf", "evaluate recording", "evaluate seeds")
 COMMANDS = ("", "run", "render", "evaluate", *EVALUATIONS, "fit-detector shelf")
 
 
@@ -181,7 +181,6 @@ def test_many_seeds_of_a_scenario(simharness, tmp_path, monkeypatch):
 
 def test_a_detector_is_fitted_to_data_that_are_there(simharness, tmp_path):
     assert_refused(simharness("fit-detector", "shelf", str(tmp_path / "none")), "none: no such folder")
-    assert_refused(simharness("evaluate", "twin", "shelf", str(tmp_path / "none")), "none: no such folder")
 
 
 @pytest.mark.slow

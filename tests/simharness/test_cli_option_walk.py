@@ -82,7 +82,6 @@ BASES = {
     "plan": "lab --out {out}",
     "evaluate recording": "{lab}/hall.toml",
     "evaluate poses": "{lab}/hall.toml {lab}/people",
-    "evaluate twin": "{lab}/hall.toml",
     "evaluate seeds": "{lab}/tiny.toml --seeds 2",
 }
 """Words that come first."""
@@ -199,7 +198,6 @@ ROWS = {
     "evaluate recording": JSON
     | {"head": Row("--head 2019"), "method": Row("--method fast"), "lag": Row("--lag 0", "--method track-fast")},
     "evaluate poses": JSON | {"head": Row("--head 2019"), "first": Row("--first 1")},
-    "evaluate twin": JSON | {"twins": Row("--twins 3")},
     "evaluate seeds": JSON | {"overrides": RESULT["set"], "seeds": Row("--seeds 3")},
 }
 """Options by command and name of the parameter."""
@@ -272,7 +270,6 @@ def _stand_ins(study):
     printed = ("plot_comparison", "print_agreement", "print_annotation", "print_measurement", "print_priors")
     profile = SimpleNamespace(text="", measured=figures, bias=np.zeros(1), detector=None, kind="")
     checked_profile = SimpleNamespace(summary=dict, scenes=(), detectors=(), variants=(), verdicts={})
-    compared = SimpleNamespace(summary=dict, seeds=(), real={})
     return {
         "simharness.outputs.run.result_folder": {"run": None},
         "simharness.gate.suite": {"baseline_of": (), "check": checked, "run_suite": measured},
@@ -288,8 +285,7 @@ def _stand_ins(study):
         "simharness.reality.detector_fit.fit": {"fit": fitted, "write_profile": ()},
         "simharness.reality.detector_fit.fit_table": dict.fromkeys(printed, ()),
         "simharness.reality.detector_fit.half_check": {"check_halves": figures},
-        "simharness.reality.twin": {"TwinModel.of_fit": (), "simulate_twins": ((),), "compare": compared},
-        "simharness.cli.score_tables": {"print_twin_comparison": ()},
+        "simharness.reality.twin": {"TwinModel.of_fit": (), "simulate_twins": ((),)},
         "simharness.reality.validation.validation": {
             "simulate_predictions": SimulatedTwins([], None), "validate": validated, "predict_halves": []
         },

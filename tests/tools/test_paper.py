@@ -244,7 +244,7 @@ class TestFiles:
     @pytest.mark.parametrize(
         ("key", "change", "message"),
         [
-            ("campus", lambda summary: summary.update(command="simharness evaluate twin FOLDER"), "evaluate seeds"),
+            ("campus", lambda summary: summary.update(command="simharness evaluate poses FOLDER"), "evaluate seeds"),
             ("voxelpose", lambda summary: summary.update(command=None), "expected a file of simharness evaluate shelf"),
             ("voxelpose", lambda summary: summary.update(head="2019"), "the head voxelpose, got 2019"),
             ("2019", lambda summary: summary.update(head="voxelpose"), "the head 2019, got voxelpose"),

@@ -8,10 +8,8 @@ import numpy as np
 from rich.console import Console
 from small_recording import PERSON, Fixed, small_recording
 
-from simharness.cli.score_tables import print_evaluation, print_twin_comparison
+from simharness.cli.score_tables import print_evaluation
 from simharness.reality.evaluation import evaluate
-from simharness.reality.seed_evaluation import PcpInterval
-from simharness.reality.twin import TwinComparison
 
 
 def printed(evaluation):
@@ -45,21 +43,6 @@ def test_several_variants_have_a_common_table_with_rows_of_the_paper():
         ["paper", "98.1", "91.1", "92.8", "94.0"],
         ["custom", "0.0", "0.0", "–", "0.0"],
     ]
-
-
-def test_a_twin_comparison_fits_80_columns_and_names_the_limit():
-    real, simulated = {"no-matching": PcpInterval(97.0, 96.0, 98.0)}, {"no-matching": PcpInterval(95.5, 95.0, 96.0)}
-    errors = {"no-matching": {"mpjpe_mm": {"median": 41.25}}}
-    summaries = {"real": errors, "simulated": {"no-matching": {"mpjpe_mm": {"median": None}}}}
-    comparison = TwinComparison("shelf", 300, (0, 1), "voxelpose", real, simulated, summaries)
-    stream = io.StringIO()
-    print_twin_comparison(comparison, Console(file=stream, width=80))
-    text = stream.getvalue()
-    assert max(map(len, text.splitlines())) <= 80
-    row = next(line.split() for line in text.splitlines() if line.split()[:1] == ["no-matching"])
-    assert row == ["no-matching", "97.0", "(96.0–98.0)", "95.5", "(95.0–96.0)", "-1.5", "41.2", "–"]
-    assert "2 twins of 300 frames." in " ".join(text.split())
-    assert "Largest difference 1.5 points (limit: 2), same order." in " ".join(text.split())
 
 
 class Renaming(Fixed):

@@ -1,18 +1,16 @@
-"""Twins of a recording, and the comparison of variants in reality and in simulation."""
+"""Twins of a recording."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from turning_people import walkers
 
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.reality.annotation_errors import AnnotationModel
 from simharness.reality.detector_fit.detector_measurement import agreement
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS
-from simharness.reality.seed_evaluation import PcpInterval
-from simharness.reality.twin import TwinComparison, TwinModel, compare, detected_twin, simulate_twins
+from simharness.reality.twin import TwinModel, detected_twin, simulate_twins
 from simharness.scenario.sections.detector_section import BiasSection, DetectorSection
 
 DETECTOR = DetectorSection.model_validate(
@@ -137,48 +135,3 @@ def test_a_twin_measures_as_its_recording(filmed):
     assert np.nanmedian(np.linalg.norm((after - before)[..., LIMB_JOINTS, :], axis=-1)) < 0.04
     raised = (after - before)[..., 11:13, 2] - (after - before)[..., 5:7, 2]  # hips, relative to the shoulders
     assert abs(np.nanmedian(raised)) < 0.012
-
-
-class TestComparison:
-    def test_a_recording_does_not_differ_from_itself(self):
-        real = walkers(noise=6.0, frames=6)
-        comparison = compare(real, [real, real], variants=("fast", "no-matching"))
-        assert comparison.largest_difference == pytest.approx(0.0, abs=1e-9)
-        assert comparison.same_order
-        assert comparison.seeds == (0, 1)
-        assert set(comparison.real) == set(comparison.simulated) == {"fast", "no-matching"}
-        summary = comparison.summary()
-        assert (summary["name"], summary["frames"], summary["apart"]) == ("walkers", 6, pytest.approx(0.0, abs=1e-9))
-        for name in ("fast", "no-matching"):
-            errors = [summary["summaries"][which][name]["mpjpe_mm"]["mean"] for which in ("real", "simulated")]
-            assert errors[0] == pytest.approx(errors[1])
-
-    def test_a_worse_twin_scores_less(self):
-        real, worse = walkers(frames=6), walkers(frames=6, noise=60.0)
-        comparison = compare(real, [worse], variants=("fast",), head="2019")
-        assert comparison.head == "2019"
-        assert comparison.real["fast"].pcp == 100.0
-        difference = comparison.real["fast"].pcp - comparison.simulated["fast"].pcp
-        assert difference > 10
-        assert comparison.largest_difference == pytest.approx(difference)
-
-    def test_only_scored_actors_count(self):
-        """Actor 1 is where nobody is detected."""
-        real = walkers(frames=4, actors=(0,))
-        truth = real.truth.copy()
-        truth[:, 1] += 3.0
-        assert compare(replace(real, truth=truth), [real], variants=("fast",)).real["fast"].pcp == 100.0
-
-    def test_without_twins_there_is_nothing_to_compare(self):
-        with pytest.raises(ValueError, match="walkers: expected one or more twins to compare with, got none"):
-            compare(walkers(), [])
-
-    def test_the_order_counts_only_for_clear_differences_in_reality(self):
-        def comparison(real, simulated):
-            scores = [{name: PcpInterval(pcp, pcp, pcp) for name, pcp in each.items()} for each in (real, simulated)]
-            return TwinComparison("x", 1, (0, 1), "voxelpose", *scores, {})
-
-        assert comparison({"a": 90.0, "b": 80.0}, {"a": 70.0, "b": 60.0}).same_order
-        assert not comparison({"a": 90.0, "b": 80.0}, {"a": 60.0, "b": 70.0}).same_order
-        assert comparison({"a": 80.05, "b": 80.0}, {"a": 60.0, "b": 70.0}).same_order
-        assert comparison({"a": 90.0, "b": 80.0}, {"a": 93.0, "b": 81.0}).largest_difference == 3.0
