@@ -51,7 +51,7 @@ def recording_group(help_text: str) -> typer.Typer:
     )
 
 
-app = recording_group("Score methods on a recording with truth, or compare a recording with simulation.")
+app = recording_group("Score methods on a recording with truth, or a scenario by the rules of recordings.")
 
 Head = Annotated[
     HeadMapping,
