@@ -96,16 +96,17 @@ def render(
 
 def _tables(summary: Mapping[str, Any]) -> "list[ScoreTable]":
     """Return the headline scores of a run, and those of identities, and of feet and hands, where there are any."""
-    from simharness.outputs.run.headline import COLUMNS, WHOLE_BODY_COLUMNS, has_whole_body
+    from simharness.outputs.run.headline import COLUMNS, scored_columns
     from simharness.outputs.run.identity_plots import IDENTITY_COLUMNS, has_identities
+    from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES
 
     variants: Mapping[str, Any] = summary["variants"]
     title = f"{summary['name']}: {summary['frames']} frames, seed {summary['seed']}"
     tables = [_table(title, COLUMNS, variants)]
     if tracked := {name: scores for name, scores in variants.items() if has_identities(scores)}:
         tables.append(_table("identities, within 0.5 m", IDENTITY_COLUMNS, tracked))
-    if has_whole_body(summary):
-        tables.append(_table("feet and hands", WHOLE_BODY_COLUMNS, variants))
+    if columns := scored_columns(summary, WHOLE_BODY_SCORES):
+        tables.append(_table("feet and hands", columns, variants))
     return tables
 
 

@@ -26,8 +26,8 @@ class VariantScores:
     """``Estimate.timings`` of every timed frame, seconds by stage."""
     tracking: Mapping[str, Any] | None = None
     """Scores over time, where people are tracked: :mod:`simharness.scoring.tracking.identity_figures`."""
-    whole_body: Mapping[str, float | None] | None = None
-    """Scores of feet and hands, where the detector reports them: :mod:`simharness.scoring.feet_and_hands`."""
+    scores: Mapping[str, float | None] | None = None
+    """Scores of a trial by their keys in :mod:`simharness.scoring.catalogue`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "timings", tuple(self.timings))
@@ -52,8 +52,8 @@ class VariantScores:
             ``pcp`` and ``pcp_parts`` (percent; means over the actors, so that all actors have equal weight in however
             many frames they are present), ``pcp_actors``, ``precision`` and ``recall`` of people, ``ghosts_per_frame``,
             ``missed_per_frame``, ``mpjpe_mm`` over all one-to-one pairs, ``matching`` over all pairs of detections,
-            ``timings_ms`` by stage, ``tracking`` where there are scores over time, and ``whole_body`` where there are
-            scores of feet or hands. None where a score does not apply; never NaN.
+            ``timings_ms`` by stage, ``tracking`` where there are scores over time, and ``scores`` of a trial, by key.
+            None where a score does not apply; never NaN.
         """
         scored, frames = self.frames, len(self.frames)
         found, people = int(scored.found.sum()), int(scored.present.sum())
@@ -61,7 +61,7 @@ class VariantScores:
         errors = scored.error.ravel() * 1000.0
         errors = errors[np.isfinite(errors)]
         table = self.pcp_table(actors=actors)
-        more = {"tracking": self.tracking, "whole_body": self.whole_body}
+        more = {"tracking": self.tracking, "scores": self.scores}
         return {
             "pcp": _mean(row["all"] for row in table),
             "pcp_parts": {group: _mean(row[group] for row in table) for group in GROUPS},

@@ -1,13 +1,12 @@
 """Headline scores of a summary: titles, units and number formats."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from mvpose.report.tables import NOTHING
 from simharness.runtime.number_text import fixed
-from simharness.scoring.catalogue import SCORES
-from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES
+from simharness.scoring.catalogue import SCORES, ScoreInfo
 
 
 @dataclass(frozen=True)
@@ -52,15 +51,11 @@ COLUMNS: tuple[Column, ...] = (
 )
 
 
-def _whole_body(key: str) -> Column:
-    info = SCORES[key]
-    return Column(info.title, info.unit, info.about, lambda scores: scores["whole_body"][key], info.digits)
+def scored_columns(summary: Mapping[str, Any], keys: Iterable[str] = SCORES) -> tuple[Column, ...]:
+    """Return the scores of a run that any of its variants has, in the order of the keys."""
+    known = [scores.get("scores", {}) for scores in summary["variants"].values()]
+    return tuple(_column(SCORES[key]) for key in keys if any(each.get(key) is not None for each in known))
 
 
-WHOLE_BODY_COLUMNS = tuple(map(_whole_body, WHOLE_BODY_SCORES))
-"""Scores of feet and hands, for runs whose detector reports them."""
-
-
-def has_whole_body(summary: Mapping[str, Any]) -> bool:
-    """Return whether a summary has scores of feet and hands."""
-    return all("whole_body" in scores for scores in summary["variants"].values())
+def _column(info: ScoreInfo) -> Column:
+    return Column(info.title, info.unit, info.about, lambda scores: scores.get("scores", {}).get(info.key), info.digits)

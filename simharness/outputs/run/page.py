@@ -17,11 +17,12 @@ from simharness.outputs import TEMPLATES
 from simharness.outputs.blame_section import blame_section
 from simharness.outputs.run import plots, standard_figures
 from simharness.outputs.run.figures import draw_figures
-from simharness.outputs.run.headline import COLUMNS, WHOLE_BODY_COLUMNS, has_whole_body
+from simharness.outputs.run.headline import COLUMNS, scored_columns
 from simharness.outputs.run.identity_plots import TRACKING_COLUMNS, tracked_variants
 from simharness.outputs.run.pictures import PagePicture, RunFilm
 from simharness.outputs.run.standard_figures import person_errors, presence
 from simharness.scenario.toml_files import dumps
+from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES
 from simharness.scoring.pairing import pair
 from simharness.scoring.pcp import GROUPS, Part
 from simharness.study.causes.cause_shares import Blame
@@ -65,7 +66,8 @@ def render(
         objects=_objects(record),
         scores=scores,
         columns=COLUMNS,
-        whole_body_columns=WHOLE_BODY_COLUMNS if has_whole_body(summary) else (),
+        whole_body_columns=scored_columns(summary, WHOLE_BODY_SCORES),
+        all_columns=scored_columns(summary),
         groups=GROUPS,
         people=_people_table(record, main),
         pictures=pictures,

@@ -15,7 +15,7 @@ from mvpose.files.atomic_files import atomic_folder
 from simharness.outputs.run.pictures import draw_pictures, filmed_frames, make_film, outlines
 from simharness.scenario.load import fingerprint
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES
+from simharness.scoring.catalogue import SCORES
 from simharness.scoring.score_summary import VariantScores, summarize
 from simharness.scoring.tracking.identity_figures import tracking_summary
 from simharness.scoring.tracking.tracked_frames import ids_of
@@ -108,9 +108,8 @@ def _record(result: TrialResult, about: Mapping[str, Any]) -> Record:
             over_time = tracking_summary(truth, result.estimates[variant], timed.time)
             scores[variant] = replace(scored, tracking=over_time)
     for variant, assessment in result.assessments.items():
-        if variant in result.whole:
-            limbs = {key: assessment.scores[key] for key in WHOLE_BODY_SCORES}
-            scores[variant] = replace(scores[variant], whole_body=limbs)
+        others = {key: value for key, value in assessment.scores.items() if SCORES[key].unit != "ms"}  # times vary
+        scores[variant] = replace(scores[variant], scores=others)
     summary = summarize(
         scenario.name,
         scores,

@@ -1,11 +1,13 @@
 """Page of a run: its arithmetic, and its safety against markup in a scenario."""
 
 import re
+from copy import deepcopy
 
 import numpy as np
 import pytest
 
 from mvpose import Detections, Estimate, Matching
+from simharness.outputs.run.headline import scored_columns
 from simharness.outputs.run.page import joint_errors, person_errors, render
 from simharness.outputs.run.result_folder import score_table
 from simharness.scenario.sections.cameras_section import CamerasSection
@@ -87,6 +89,18 @@ def test_the_numbers_of_the_page_are_those_of_the_summary():
     assert "91.7" in page  # recall: 11 of 12
     assert "0.250" in page  # missed a frame
     assert "75.0" in page  # person 0 was found in 3 of 4 frames
+
+
+def test_every_score_that_a_variant_has_is_on_the_page():
+    record = make_record()
+    one, other = deepcopy(record.summary["variants"]["full"]), {"scores": {"jitter_mm": 0.5}}
+    one["scores"] = {"pcp": 12.34, "jitter_mm": None, "ankle": 1.0}
+    columns = scored_columns({"variants": {"full": one, "other": other}})
+    assert [column.title for column in columns] == ["PCP", "Jitter"]  # keys of no known score are left out
+    assert [[column.number(scores) for column in columns] for scores in (one, other)] == [["12.3", "–"], ["–", "0.5"]]
+    record.summary["variants"]["full"] = one
+    assert '<th scope="row">PCP, %</th><td>12.3</td><td class="words">correct body parts' in render(record)
+    assert "All scores" not in render(make_record())
 
 
 def test_nobody_misses_people_who_are_absent():
