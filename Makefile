@@ -66,11 +66,11 @@ else
 endif
 
 paper-campus: $(RUN)
-	$(BIN)/simharness evaluate seeds scenarios/campus.toml $(TWINS) \
+	$(BIN)/python -m tools.paper_tables.seed_scores scenarios/campus.toml $(TWINS) \
 		--json results/campus/variants.json > results/campus/variants.txt
 
 paper-shelf: $(RUN)
-	$(BIN)/simharness evaluate seeds scenarios/shelf.toml --set appearance.source=pictures --set rate=5 $(TWINS) \
+	$(BIN)/python -m tools.paper_tables.seed_scores scenarios/shelf.toml --set appearance.source=pictures --set rate=5 $(TWINS) \
 		--json results/shelf/variants.json > results/shelf/variants.txt
 
 # What a frame costs, beside the paper and the code of others: a minute, on a machine that has nothing else to do.

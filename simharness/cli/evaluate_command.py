@@ -14,7 +14,7 @@ from mvpose.commands.errors import failing
 from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.output_files import PROVENANCE, check_place, write_json
 from mvpose.commands.progress import reporter
-from simharness.cli.program import PROGRAM, JsonFile, Overrides, RecordingFile, RecordingFolder, ScenarioFile, made_here
+from simharness.cli.program import PROGRAM, JsonFile, RecordingFile, RecordingFolder, made_here
 
 if TYPE_CHECKING:
     from mvpose.estimators import Estimator
@@ -150,30 +150,6 @@ def evaluate_poses(
         if json_file is not None:
             _write(evaluation.summary(), json_file, seeds=(), variants=evaluation.variants, start=start)
     print_evaluation(evaluation, Console())
-
-
-@app.command("seeds")
-@grouped()
-def evaluate_seeds(
-    scenario: ScenarioFile,
-    overrides: Overrides = None,
-    seeds: int = option(10, "Number of seeds.", metavar="N", min=2, max=10_000),
-    json_file: JsonFile = None,
-) -> None:
-    """Score a scenario at many seeds by the protocol of the data sets: PCP of all people and of each person."""
-    with PROGRAM.exit_on_error():
-        start = perf_counter()
-        check_place(json_file, option="--json", mark=PROVENANCE)
-        from simharness.cli.score_tables import print_seed_evaluation
-        from simharness.reality.seed_evaluation import evaluate_seeds as evaluate_at_seeds
-        from simharness.scenario.load import load
-
-        loaded = load(scenario, overrides=overrides or ())
-        with reporter() as bars:
-            result = evaluate_at_seeds(loaded, seeds, reporter=bars)
-        if json_file is not None:
-            _write(result.summary(), json_file, seeds=result.seeds, variants=loaded.method.variants, start=start)
-    print_seed_evaluation(result, Console())
 
 
 def _estimator(name: str, *, lag: float, period: float) -> "Estimator":

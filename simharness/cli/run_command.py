@@ -2,13 +2,15 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 
-from mvpose.commands.option_groups import grouped, option
+from mvpose.commands.option_groups import given, grouped, option
+from mvpose.commands.programs import note
 from mvpose.commands.progress import reporter
 from mvpose.commands.terminal import say
 from simharness.cli.program import PROGRAM, BlameSeeds, Overrides, ScenarioFile, Seed, Workers
@@ -132,21 +134,47 @@ def export(
     seed: Seed = None,
     every: int = option(1, "Write every Nth frame only.", metavar="N"),
     pictures: bool = option(True, "Write the pictures.", "--pictures/--no-pictures"),
+    also: str = option(
+        "", "Also write [cyan]depth,ids,parts,coco[/] (true keypoints in the pictures), or some.", metavar="FILES"
+    ),
+    sequences: int | None = option(
+        None,
+        "Write so many sequences, of the seed and the following ones, and describe them all. Those that are there are "
+        "kept.",
+        metavar="N",
+        min=1,
+        max=100_000,
+    ),
+    workers: Workers = 1,
 ) -> None:
     """Write a scenario as a benchmark in the layout of CMU Panoptic: pictures, truth, calibration, detections.
 
     The detections are OpenPose files. The sequence appears in FOLDER/NAME when
     it is complete, and replaces an earlier export; manifest.json describes it.
+    With --sequences NAME holds one for each seed, with splits and checksums.
     """
     with PROGRAM.exit_on_error():
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)
         from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
+        from simharness.outputs.benchmark.sequences import export_benchmark
 
-        plan = ExportPlan(folder / loaded.name, every=every, pictures=pictures)
+        if sequences is None and given("workers"):
+            raise ValueError("--workers: share sequences; give --sequences as well")
+        wanted = frozenset(filter(None, map(str.strip, also.split(","))))
+        plan = partial(ExportPlan, every=every, pictures=pictures, also=wanted)
+        command, made = PROGRAM.command_line(), folder / loaded.name
         with reporter() as bars:
-            made = export_sequence(loaded, plan, reporter=bars, command=PROGRAM.command_line())
+            if sequences is None:
+                export_sequence(loaded, plan(made), reporter=bars, command=command)
+            else:
+                done = export_benchmark(
+                    loaded, made, plan, sequences=sequences, workers=workers, reporter=bars, command=command
+                )
+                typer.echo(f"{done.made} sequences written, {done.kept} kept")
+                for number, reason in done.impossible.items():
+                    note(f"seed {number} is left out: {reason}")
     files = [file for file in made.rglob("*") if file.is_file()]
     megabytes = sum(file.stat().st_size for file in files) / 1e6
     typer.echo(f"{len(files)} files, {megabytes:.1f} MB, in {made}")

@@ -20,7 +20,6 @@ from simharness.scoring.tracking.identity_figures import DISTANCE
 
 if TYPE_CHECKING:
     from simharness.reality.evaluation import Evaluation, PublishedPcp
-    from simharness.reality.seed_evaluation import SeedEvaluation
 
 _UNLIMITED = 10_000  # columns of a terminal in which everything fits
 
@@ -104,27 +103,6 @@ def print_evaluation(evaluation: "Evaluation", console: Console) -> None:
         notes,
     ]
     console.print(Group(*(Padding(block, (0, 0, 1, 0)) for block in blocks)))
-
-
-def print_seed_evaluation(result: "SeedEvaluation", console: Console) -> None:
-    """Print PCP by variant, of all people and of each person, and the scores of identities of variants with any."""
-    first, *others = result.scenario.method.variants
-    people = range(result.scenario.people.count)
-    rows = []
-    for name in (first, *others):
-        difference = "" if name == first else result.difference(name, first)
-        scores = [result.pcp(name, [person]) for person in people]
-        rows.append((name, str(result.pcp(name)), str(difference), *(f"{each.pcp:.1f}" for each in scores)))
-    title = (
-        f"{result.scenario.name}: PCP over {len(result.seeds)} seeds with 95 % intervals: of all people, minus "
-        f"{first} on the same detections, and of each person"
-    )
-    ScoreTable(title, ("variant",), ("all", f"minus {first}", *map(str, people)), rows).print_to(console)
-    trackings = {name: [each.tracking for each in result.variant_scores(name)] for name in (first, *others)}
-    tracked = {name: known for name, each in trackings.items() if (known := [one for one in each if one is not None])}
-    if tracked:
-        console.print(_identities_table(tracked))
-        console.print(_ONLY_ANNOTATED.strip(), style="dim", highlight=False)
 
 
 def _paper(evaluation: "Evaluation") -> "Mapping[str, PublishedPcp]":

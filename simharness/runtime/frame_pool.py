@@ -75,6 +75,7 @@ def map_jobs(
     *,
     workers: int = 1,
     progress: Callable[[int], None] = lambda frames: None,
+    unit: str = "frame",
 ) -> list[Result]:
     """Call ``function`` with the arguments of each job and return the results in the order of the jobs.
 
@@ -83,6 +84,7 @@ def map_jobs(
         jobs: arguments of each call; the first are its frames. Long jobs should come first.
         workers: as :func:`map_frames`.
         progress: called with the number of frames of each finished job.
+        unit: what the numbers count that stand for frames, for messages.
 
     Raises:
         ValueError: as :func:`map_frames`.
@@ -91,8 +93,8 @@ def map_jobs(
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
     if workers == 1 or len(jobs) < 2:
-        return list(_map_in_process(function, jobs, progress))
-    return _map_in_pool(function, jobs, min(workers, len(jobs)), progress)
+        return list(_map_in_process(function, jobs, progress, unit))
+    return _map_in_pool(function, jobs, min(workers, len(jobs)), progress, unit)
 
 
 def chunks_of(frames: range, workers: int) -> list[range]:
@@ -115,7 +117,7 @@ def worker_context() -> BaseContext:
 
 
 def _map_in_process(
-    function: Callable[..., Result], jobs: Sequence[_Job], progress: Callable[[int], None]
+    function: Callable[..., Result], jobs: Sequence[_Job], progress: Callable[[int], None], unit: str
 ) -> Iterator[Result]:
     with threadpoolctl.threadpool_limits(1):
         for job in jobs:
@@ -124,12 +126,12 @@ def _map_in_process(
             except RunError:
                 raise
             except Exception as error:
-                raise RunError(_failure(job[0], error)) from error
+                raise RunError(_failure(job[0], error, unit)) from error
             progress(len(job[0]))
 
 
 def _map_in_pool(
-    function: Callable[..., Result], jobs: Sequence[_Job], workers: int, progress: Callable[[int], None]
+    function: Callable[..., Result], jobs: Sequence[_Job], workers: int, progress: Callable[[int], None], unit: str
 ) -> list[Result]:
     context = worker_context()
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_install, initargs=(function,)) as pool:
@@ -141,7 +143,7 @@ def _map_in_pool(
                 future.result()
                 progress(len(futures[future]))
         except BrokenProcessPool as error:
-            span = _span(range(min(job[0].start for job in jobs), max(job[0].stop for job in jobs)))
+            span = _span(range(min(job[0].start for job in jobs), max(job[0].stop for job in jobs)), unit)
             raise RunError(
                 f"a worker process died within {span}; it may have run out of memory: try fewer workers, "
                 "or --workers 1 to run in this process"
@@ -149,18 +151,18 @@ def _map_in_pool(
         except RunError:
             raise
         except Exception as error:
-            raise RunError(_failure(futures[future], error)) from error
+            raise RunError(_failure(futures[future], error, unit)) from error
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
     return [future.result() for future in futures]
 
 
-def _failure(chunk: range, error: Exception) -> str:
-    return f"{_span(chunk)}: {type(error).__name__}: {error}"
+def _failure(chunk: range, error: Exception, unit: str) -> str:
+    return f"{_span(chunk, unit)}: {type(error).__name__}: {error}"
 
 
-def _span(chunk: range) -> str:
-    return f"frame {chunk.start}" if len(chunk) == 1 else f"frames {chunk.start} to {chunk.stop - 1}"
+def _span(chunk: range, unit: str) -> str:
+    return f"{unit} {chunk.start}" if len(chunk) == 1 else f"{unit}s {chunk.start} to {chunk.stop - 1}"
 
 
 _installed: Callable[..., Any] | None = None  # function of a worker process; None in the parent

@@ -18,6 +18,9 @@ ALONE = {
     "simharness run quickstart --set detector.skeleton=halpe26": RAYS,
     "simharness run quickstart --set people.count=6 --set cameras.count=3 --seed 1 --workers 2": ONE_WORKER,
     "simharness export gathering benchmark": f"{PICTURES} --every 2",
+    "simharness export gathering benchmark --sequences 20 --workers 2 --also depth,ids,coco": (
+        f"{PICTURES} --every 2 --sequences 2 --workers 1"
+    ),
     "simharness render gathering --video --overlay truth,detections,estimates": PICTURES,
     "simharness render gathering --set sensor.profile=webcam --set sensor.jpeg=60": PICTURES,
     "simharness run passage": RAYS,
@@ -44,7 +47,6 @@ NAMES = (  # mentioned
     "simharness export",
     "simharness fit-detector",
     "simharness profile-network",
-    "simharness evaluate seeds",
     "simharness shrink results/failures/NAME.toml",  # tests/simharness/hunt/test_kept_failure.py
 )
 CHECKS = (
@@ -138,6 +140,7 @@ POWER = "python -m benchmarks.validation FOLDER"  # half an hour, and the data o
 LOOP = "python -m benchmarks.fit FOLDER"  # half an hour; tests/benchmarks/fit/test_closed_loop.py
 OUT_OF_SAMPLE = "python -m benchmarks.fit FOLDER --out-of-sample"  # tests/benchmarks/fit/test_closed_loop.py
 HUNT = "python -m benchmarks.hunt benchmarks/hunt/room.toml FOLDER --trials 96 --method lhs"  # tests/benchmarks/hunt
+SEED_SCORES = "python -m tools.paper_tables.seed_scores"  # tests/tools/test_seed_scores.py
 GALLERY = "python -m tools.gallery results/gallery"  # tests/tools/test_gallery.py; minutes of rendering
 # Without arguments these begin to bake the body.
 BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")
@@ -167,6 +170,7 @@ KNOWN = {
     HUNT,
     *BAKE,
     GALLERY,
+    SEED_SCORES,
     CI,
     *PYTEST,
     *SHELL,

@@ -11,7 +11,6 @@ from mvpose.commands.errors import RunError
 from simharness.cli import app
 from simharness.reality.recording_file import read_recording
 from simharness.scenario.presets import read_profile
-from simharness.trial.identity import PROVENANCE
 
 QUICKSTART = str(Path(__file__).parents[2] / "scenarios" / "quickstart.toml")
 TINY = [
@@ -48,7 +47,7 @@ def test_version(simharness):
     assert result.stdout.startswith("simharness 0.")
 
 
-EVALUATIONS = ("evaluate shelf", "evaluate recording", "evaluate seeds")
+EVALUATIONS = ("evaluate shelf", "evaluate recording", "evaluate poses")
 COMMANDS = ("", "run", "render", "evaluate", *EVALUATIONS, "fit-detector shelf")
 
 
@@ -159,24 +158,6 @@ def test_a_run_prints_the_scores_and_the_path_of_the_report(simharness, tmp_path
     for variant in ("full", "no-3dps"):
         assert variant in summary["variants"]
         assert variant in result.stdout
-
-
-def test_many_seeds_of_a_scenario(simharness, tmp_path, monkeypatch):
-    file = tmp_path / "seeds.json"
-    quick = [*TINY, *OUTSIDE, "--set", "rendering.renderer=rays", "--set", 'method.variants=["fast", "no-3dps"]']
-    monkeypatch.setattr("sys.argv", ["simharness", "evaluate", "seeds", QUICKSTART])
-    result = simharness("evaluate", "seeds", QUICKSTART, *quick, "--seeds", "2", "--json", str(file))
-    assert result.exit_code == 0
-    assert "PCP over 2 seeds" in result.stdout
-    summary = json.loads(file.read_text())
-    assert summary["seeds"] == [7, 8]
-    assert summary["command"] == f"simharness evaluate seeds {QUICKSTART}"
-    assert summary.keys() >= set(PROVENANCE)
-    assert summary["variants"] == ["fast", "no-3dps"]
-    assert 0 < summary["seconds"] < 600
-    for variant in ("fast", "no-3dps"):
-        scores = summary["pcp"][variant]
-        assert scores["low"] <= scores["pcp"] <= scores["high"]
 
 
 def test_a_detector_is_fitted_to_data_that_are_there(simharness, tmp_path):

@@ -82,7 +82,6 @@ BASES = {
     "plan": "lab --out {out}",
     "evaluate recording": "{lab}/hall.toml",
     "evaluate poses": "{lab}/hall.toml {lab}/people",
-    "evaluate seeds": "{lab}/tiny.toml --seeds 2",
 }
 """Words that come first."""
 
@@ -96,7 +95,14 @@ ROWS = {
         "also": Row("--also depth"),
         "every": Row("--every 2"),
     },
-    "export": OVERRIDES | {"every": Row("--every 2", "--no-pictures"), "pictures": Row("--no-pictures")},
+    "export": OVERRIDES
+    | {
+        "every": Row("--every 2", "--no-pictures"),
+        "pictures": Row("--no-pictures"),
+        "also": Row("--also depth,coco", "--no-pictures"),
+        "sequences": Row("--sequences 2", "--no-pictures"),
+        "workers": Row("--workers 2", "--sequences 2 --no-pictures"),
+    },
     "show": OVERRIDES,
     "schema": {"out": Row("--out {out}/schema.json")},
     "mjcf": RUN,
@@ -198,7 +204,6 @@ ROWS = {
     "evaluate recording": JSON
     | {"head": Row("--head 2019"), "method": Row("--method fast"), "lag": Row("--lag 0", "--method track-fast")},
     "evaluate poses": JSON | {"head": Row("--head 2019"), "first": Row("--first 1")},
-    "evaluate seeds": JSON | {"overrides": RESULT["set"], "seeds": Row("--seeds 3")},
 }
 """Options by command and name of the parameter."""
 
@@ -225,7 +230,6 @@ COMBINATIONS = [
     (f"study {BASES['study']} --seeds 3", "--set seeds=2"),
     (f"study {BASES['study']} --variant fast", "--set method.variants=['full']"),
     (f"run {BASES['run']} --set people.count=3", "--set people.count=1"),
-    (f"evaluate seeds {BASES['evaluate seeds']} --set people.count=2", "--set people.count=1"),
 ]
 """Combinations in which one option might be ignored."""
 

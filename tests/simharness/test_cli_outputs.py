@@ -31,7 +31,6 @@ FILES = {
     "simharness fit-detector --json": "simharness fit-detector shelf --json {}",
     "simharness evaluate recording --json": "simharness evaluate recording shelf --json {}",
     "simharness evaluate poses --json": "simharness evaluate poses shelf people --json {}",
-    "simharness evaluate seeds --json": "simharness evaluate seeds quickstart --json {}",
     "simharness validate --json": "simharness validate shelf --out new --json {}",
 }
 """Options that name a file, and a call with each."""

@@ -15,7 +15,16 @@ from simharness.cli import app
 from simharness.reality.evaluation import ABLATION
 from simharness.trial.identity import PROVENANCE, provenance
 from tools.paper_tables.__main__ import main
-from tools.paper_tables.tables import COMPARISON, INPUTS, VARIANTS, paper_tables, read_inputs, write_tables
+from tools.paper_tables.seed_scores import main as seed_scores
+from tools.paper_tables.tables import (
+    COMPARISON,
+    INPUTS,
+    SEED_SCORES,
+    VARIANTS,
+    paper_tables,
+    read_inputs,
+    write_tables,
+)
 from tools.paper_tables.text import markdown
 
 ON_SHELF = [name for name in VARIANTS if name != "appearance"]
@@ -24,7 +33,7 @@ OPTIONS = {"voxelpose": "--shelf", "2019": "--shelf-2019", "campus": "--campus-t
 
 
 def source(command, seeds):
-    return provenance(command=f"simharness evaluate {command}", seeds=seeds, variants=VARIANTS, seconds=700.0)
+    return provenance(command=command, seeds=seeds, variants=VARIANTS, seconds=700.0)
 
 
 def recorded(head, rng):
@@ -32,11 +41,14 @@ def recorded(head, rng):
     actors = {name: rng.uniform(60, 90, 3).tolist() for name in ON_SHELF}
     variants = {name: {"pcp": float(np.mean(pcp)), "pcp_actors": pcp} for name, pcp in actors.items()}
     summary = {"name": "shelf", "head": head, "frames": 300, "seeds": 0, "variants": variants}
-    return {**source(f"shelf FOLDER --head {head}", ()), **summary}
+    return {**source(f"simharness evaluate shelf FOLDER --head {head}", ()), **summary}
 
 
 def twin(name, rng):
-    """Return a summary as ``evaluate seeds`` writes it, with random numbers; one difference rounds to -0.0."""
+    """Return a summary as ``tools.paper_tables.seed_scores`` writes it, with random numbers.
+
+    One difference rounds to -0.0.
+    """
 
     def score(middle):
         low, high = np.sort(rng.uniform(0.1, 3, 2)) * [-1, 1]
@@ -47,7 +59,7 @@ def twin(name, rng):
     summary["pcp"] = {variant: score(rng.uniform(60, 90)) for variant in VARIANTS}
     summary["ahead_of_full"] = {variant: score(rng.uniform(-9, 1)) for variant in VARIANTS[1:]}
     summary["ahead_of_full"]["fast"]["pcp"] = -0.04
-    return {**source(f"seeds scenarios/{name}.toml --seeds 4", seeds), **summary}
+    return {**source(f"{SEED_SCORES} scenarios/{name}.toml --seeds 4", seeds), **summary}
 
 
 @pytest.fixture
@@ -244,7 +256,7 @@ class TestFiles:
     @pytest.mark.parametrize(
         ("key", "change", "message"),
         [
-            ("campus", lambda summary: summary.update(command="simharness evaluate poses FOLDER"), "evaluate seeds"),
+            ("campus", lambda summary: summary.update(command="simharness evaluate poses FOLDER"), SEED_SCORES),
             ("voxelpose", lambda summary: summary.update(command=None), "expected a file of simharness evaluate shelf"),
             ("voxelpose", lambda summary: summary.update(head="2019"), "the head voxelpose, got 2019"),
             ("2019", lambda summary: summary.update(head="voxelpose"), "the head 2019, got voxelpose"),
@@ -253,7 +265,7 @@ class TestFiles:
             ("2019", lambda summary: summary.pop("frames"), "frames"),
             ("2019", lambda summary: summary["variants"].pop("fast"), "lacks the variants fast"),
             ("shelf", lambda summary: [summary["pcp"].pop(name) for name in ("full", "fast")], "variants full, fast"),
-            ("shelf", lambda summary: summary["ahead_of_full"].pop("fast"), "not as simharness evaluate seeds"),
+            ("shelf", lambda summary: summary["ahead_of_full"].pop("fast"), f"not as {SEED_SCORES}"),
             ("shelf", lambda summary: summary["pcp"]["fast"].update(low=None), "PCP of fast"),
             (
                 "shelf",
@@ -292,8 +304,8 @@ class TestFiles:
 def test_the_examples_in_messages_name_all_variants():
     for wanted in INPUTS.values():
         words = shlex.split(wanted.makes)
-        assert words[:3] == ["simharness", *wanted.command.split()]
-        if wanted.command == "evaluate shelf":
+        assert words[:3] == wanted.command.split()
+        if wanted.command != SEED_SCORES:
             assert [value for option, value in pairwise(words) if option == "--method"] == ON_SHELF
         else:
             (variants,) = (word for word in words if word.startswith("method.variants="))
@@ -309,11 +321,12 @@ def test_what_the_commands_write_is_read(tmp_path, monkeypatch, shared_data):
 
     small = ("--seeds", "2", "--set", "duration=0.6", "--set", "rate=5", "--set", "rendering.renderer=rays")
     for key, wanted in INPUTS.items():
-        words = [str(tmp_path / f"{key}.json") if word == "FILE" else word for word in shlex.split(wanted.makes)[1:]]
-        if wanted.command == "evaluate seeds":
-            run(*(word.replace("source=pictures", "source=drawn") for word in words), *small)
+        words = [str(tmp_path / f"{key}.json") if word == "FILE" else word for word in shlex.split(wanted.makes)]
+        if wanted.command == SEED_SCORES:
+            drawn = [word.replace("source=pictures", "source=drawn") for word in words[3:]]
+            assert seed_scores([*drawn, *small]) == 0
         else:
-            run(*(str(shared_data / "shelf") if word == "FOLDER" else word for word in words))
+            run(*(str(shared_data / "shelf") if word == "FOLDER" else word for word in words[1:]))
     numbers = paper_tables(read_inputs({key: tmp_path / f"{key}.json" for key in INPUTS}))
     assert len(tables(markdown(numbers))) == 4
     assert [numbers["inputs"][key]["seeds"] for key in ("voxelpose", "campus")] == [[], [0, 1]]

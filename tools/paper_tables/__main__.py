@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             type=Path,
             required=True,
             metavar="FILE",
-            help=f"{wanted.contents}, all variants of table 2; written by simharness {wanted.command} --json",
+            help=f"{wanted.contents}, all variants of table 2; written by {wanted.command} --json",
         )
     parser.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="folder of tables.md and tables.json")
     options = parser.parse_args(words)

@@ -1,7 +1,7 @@
 """Numbers of tables 1 and 2 of the paper (Dong et al., CVPR 2019): as printed, on real data, and on simulated twins.
 
-The inputs are files of ``simharness evaluate shelf`` and ``simharness evaluate seeds``; their provenance is kept. Table
-1 compares methods, table 2 compares variants of one method.
+The inputs are files of ``simharness evaluate shelf`` and of :mod:`tools.paper_tables.seed_scores`; their provenance is
+kept. Table 1 compares methods, table 2 compares variants of one method.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from mvpose.commands.output_files import write_text
 from mvpose.presets import NEED_DESCRIPTORS
 from simharness.reality.evaluation import ABLATION, PublishedPcp
 from simharness.trial.identity import PROVENANCE
+from tools.paper_tables.seed_scores import COMMAND
 from tools.paper_tables.text import markdown
 
 VARIANTS = ("full", "appearance", "geometry", "no-3dps", "no-matching", "hungarian", "fast")
@@ -56,7 +57,7 @@ class _Input:
     Attributes:
         option: option of the command line that names the file.
         contents: what the file holds.
-        command: subcommand of ``simharness`` that writes such files.
+        command: command that writes such files, without arguments.
         key: JSON key that distinguishes the file from other files of that command.
         value: expected value of the key.
         makes: example of the whole command.
@@ -71,13 +72,14 @@ class _Input:
 
 
 _METHODS = " ".join(f"--method {name}" for name in VARIANTS if name not in NEED_DESCRIPTORS)
+SEED_SCORES = f"python -m {COMMAND}"
 _SEEDS = f"--set 'method.variants={json.dumps(VARIANTS, separators=(',', ':'))}'"
 
 INPUTS = {
     "voxelpose": _Input(
         option="--shelf",
         contents="real Shelf with the VoxelPose head",
-        command="evaluate shelf",
+        command="simharness evaluate shelf",
         key="head",
         value="voxelpose",
         makes=f"simharness evaluate shelf FOLDER --head voxelpose {_METHODS} --json FILE",
@@ -85,7 +87,7 @@ INPUTS = {
     "2019": _Input(
         option="--shelf-2019",
         contents="real Shelf with the 2019 head",
-        command="evaluate shelf",
+        command="simharness evaluate shelf",
         key="head",
         value="2019",
         makes=f"simharness evaluate shelf FOLDER --head 2019 {_METHODS} --json FILE",
@@ -93,18 +95,18 @@ INPUTS = {
     "campus": _Input(
         option="--campus-twin",
         contents="twin of Campus",
-        command="evaluate seeds",
+        command=SEED_SCORES,
         key="name",
         value="campus",
-        makes=f"simharness evaluate seeds scenarios/campus.toml {_SEEDS} --json FILE",
+        makes=f"{SEED_SCORES} scenarios/campus.toml {_SEEDS} --json FILE",
     ),
     "shelf": _Input(
         option="--shelf-twin",
         contents="twin of Shelf",
-        command="evaluate seeds",
+        command=SEED_SCORES,
         key="name",
         value="shelf",
-        makes=f"simharness evaluate seeds scenarios/shelf.toml --set appearance.source=pictures {_SEEDS} --json FILE",
+        makes=f"{SEED_SCORES} scenarios/shelf.toml --set appearance.source=pictures {_SEEDS} --json FILE",
     ),
 }
 """Input files of the tables: real Shelf with each head mapping, and both twins."""
@@ -256,19 +258,17 @@ def _read(wanted: _Input, file: Path) -> dict[str, Any]:
         raise ValueError(f"{where}: expected a JSON object, got {type(summary).__name__}; {remedy}")
     if missing := [key for key in (*PROVENANCE, "frames", "head") if key not in summary]:
         raise ValueError(f"{where}: lacks the keys {', '.join(missing)}; {remedy}")
-    command = " ".join(shlex.split(str(summary["command"]))[1:3])
+    command = " ".join(shlex.split(str(summary["command"]))[:3])
     if command != wanted.command:
-        raise ValueError(
-            f"{where}: expected a file of simharness {wanted.command}, got one of {summary['command']}; {remedy}"
-        )
+        raise ValueError(f"{where}: expected a file of {wanted.command}, got one of {summary['command']}; {remedy}")
     if summary.get(wanted.key) != wanted.value:
         raise ValueError(f"{where}: expected the {wanted.key} {wanted.value}, got {summary.get(wanted.key)}; {remedy}")
-    check = _check_recorded if command == "evaluate shelf" else _check_twin
+    check = _check_twin if command == SEED_SCORES else _check_recorded
     try:
         if missing := check(summary):
             raise ValueError(f"{where}: lacks the variants {', '.join(missing)}; {remedy}")
     except (AttributeError, KeyError, TypeError) as error:
-        raise ValueError(f"{where}: is not as simharness {command} writes it ({error!r}); {remedy}") from None
+        raise ValueError(f"{where}: is not as {command} writes it ({error!r}); {remedy}") from None
     return summary
 
 

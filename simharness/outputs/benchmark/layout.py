@@ -1,7 +1,7 @@
 """Layout of an exported sequence, that of the CMU Panoptic toolbox: folders, file names, and the manifest.
 
     calibration_NAME.json, calibration_believed_NAME.json
-    hdImgs/00_00/00_00_00000000.jpg
+    hdImgs/00_00/00_00_00000000.jpg, depth/00_00/00_00_00000000.png, ids/..., parts/..., coco/00_00.json
     hdPose3d_stage1_coco19/body3DScene_00000000.json
     openpose/00_00/00_00_00000000_keypoints.json
     manifest.json, scenario.toml, recording.toml, truth.npz
@@ -85,6 +85,10 @@ class Layout:
     def picture(self, camera: str, frame: int) -> Path:
         """Return the path of the picture of a camera in a frame."""
         return self.folder / PICTURES.format(camera=camera, frame=frame)
+
+    def channel(self, channel: str, camera: str, frame: int) -> Path:
+        """Return the path of a channel of a picture, such as depth."""
+        return self.folder / channel / camera / f"{camera}_{frame:08d}.png"
 
     def bodies(self, frame: int) -> Path:
         """Return the path of the true poses of a frame."""

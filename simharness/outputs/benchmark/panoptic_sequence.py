@@ -27,7 +27,9 @@ from mvpose.formats.people import write_people
 from mvpose.formats.people.panoptic_poses import body_scene
 from mvpose.recording import People
 from mvpose.skeleton import PANOPTIC19
+from simharness.outputs.benchmark.coco_truth import COCO, write_coco
 from simharness.outputs.benchmark.layout import FORMAT, Layout, confidences, manifest
+from simharness.outputs.benchmark.render import CHANNELS, channel_image, write_image
 from simharness.reality.annotation_errors import annotate_simulation
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_files import dumps, dumps_keys
@@ -49,7 +51,7 @@ class ExportPlan:
     """Content and place of an exported sequence.
 
     Raises:
-        ValueError: the folder exists and is no export, or cannot be created; ``every`` below 1.
+        ValueError: the folder exists and is no export, or cannot be created; ``every`` below 1, or unknown ``also``.
     """
 
     folder: Path
@@ -58,15 +60,25 @@ class ExportPlan:
     """Step between written frames; files are numbered by frame."""
     pictures: bool = True
     """Whether pictures are written."""
+    also: frozenset[str] = frozenset()
+    """More files for each camera: the channels of :mod:`.render` as PNG, and "coco", true keypoints in the pictures."""
 
     def __post_init__(self) -> None:
         if self.every < 1:
             raise ValueError(f"--every must be 1 or more, got {self.every}")
+        if unknown := self.also - {*CHANNELS, COCO}:
+            expected = ", ".join((*CHANNELS, COCO))
+            raise ValueError(f"--also: unknown {', '.join(sorted(unknown))}; expected any of {expected}")
         check_writable(self.folder, FORMAT, option="")
 
 
 def export_sequence(
-    scenario: Scenario, plan: ExportPlan, *, reporter: Reporter | None = None, command: str | None = None
+    scenario: Scenario,
+    plan: ExportPlan,
+    *,
+    reporter: Reporter | None = None,
+    command: str | None = None,
+    request: Mapping[str, Any] | None = None,
 ) -> Path:
     """Write a scenario as a sequence in the layout of the CMU Panoptic toolbox (:mod:`.layout`).
 
@@ -78,6 +90,7 @@ def export_sequence(
         plan: content and place of the sequence.
         reporter: receiver of progress.
         command: command of the user, for the manifest.
+        request: key of the manifest by which the sequence is known to be what a benchmark needs.
 
     Returns:
         The folder of the sequence.
@@ -94,7 +107,8 @@ def export_sequence(
     names = hd_names([camera.name for camera in exposures.believed_rig])
     true_rig, believed_rig = renamed(exposures.true_rig, names), renamed(exposures.believed_rig, names)
     joints = sequence.of_skeleton(PANOPTIC19)
-    picture_source = picture_source_of(scenario, Playback(trial.scene)) if plan.pictures else None
+    channels = sorted(plan.also - {COCO})
+    source = picture_source_of(scenario, Playback(trial.scene)) if plan.pictures or channels else None
     frames = range(0, scenario.frames, plan.every)
     with Stages(reporter).stage("write", len(frames)) as advance, atomic_folder(plan.folder, FORMAT) as partial:
         layout = Layout(partial, scenario.name)
@@ -116,12 +130,17 @@ def export_sequence(
             _write_json(layout.bodies(frame), bodies)
             shown = current.detections if current.whole is None else current.whole.detections
             _write_people(layout, names, frame, shown)
-            if picture_source is not None:
+            if source is not None:
                 for view, name in enumerate(names):
-                    _write_picture(
-                        layout.picture(name, frame), picture_source.picture(exposures, frame, view, finer=_FINER)
-                    )
+                    if plan.pictures:
+                        picture = source.picture(exposures, frame, view, finer=_FINER)
+                        _write_picture(layout.picture(name, frame), picture)
+                    for channel in channels:
+                        image = channel_image(source, trial, frame, view, channel)
+                        write_image(layout.channel(channel, name, frame), image)
             advance(1)
+        if COCO in plan.also:
+            write_coco(layout, believed_rig, {frame: detected[frame].truth for frame in frames}, sequence.ids.tolist())
         description = manifest(
             trial,
             frames=frames,
@@ -130,7 +149,7 @@ def export_sequence(
             believed=faulty,
             command=command,
             seconds=round(time.perf_counter() - start, 3),
-        )
+        ) | {"request": request or {}}
         layout.manifest.write_text(json.dumps(description, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     return plan.folder
 

@@ -110,9 +110,9 @@ def render(scenario: Scenario, plan: RenderPlan, *, out: Path, reporter: Reporte
                 write(name, frame, picture)
             for view, name in enumerate(names[:-1]):
                 for channel in sorted(plan.channels):
-                    _write(
+                    write_image(
                         partial / name / f"{frame:04d}.{channel}.png",
-                        _channel(picture_source, trial, frame, view, channel),
+                        channel_image(picture_source, trial, frame, view, channel),
                     )
             advance(1)
     return folder
@@ -163,7 +163,7 @@ def _pictures(
         yield pictures
 
 
-def _channel(
+def channel_image(
     picture_source: ScenePictures, trial: Trial, frame: int, view: int, channel: str
 ) -> NDArray[np.unsignedinteger]:
     """Return a channel of one picture as integers for PNG (see ``RenderPlan``); zeros where no picture is delivered."""
@@ -180,8 +180,9 @@ def _channel(
     return (image.parts + 1).astype(np.uint8)
 
 
-def _write(path: Path, picture: NDArray[np.unsignedinteger]) -> None:
-    path.parent.mkdir(exist_ok=True)
+def write_image(path: Path, picture: NDArray[np.unsignedinteger]) -> None:
+    """Write a PNG, and its folder where it is missing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     if not cv2.imwrite(str(path), picture):
         raise RuntimeError(f"OpenCV cannot write a picture of shape {picture.shape} to {path}")
 
@@ -193,7 +194,7 @@ class _PngWriter:
         self._folder = folder
 
     def __call__(self, name: str, frame: int, rgb: Rgb) -> None:
-        _write(self._folder / name / f"{frame:04d}.png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR).astype(np.uint8))
+        write_image(self._folder / name / f"{frame:04d}.png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR).astype(np.uint8))
 
 
 class _VideoWriter:

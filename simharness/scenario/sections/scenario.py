@@ -36,7 +36,7 @@ class AnnotationSection(Section):
     """Errors of an annotated truth, as published data sets have them; the default is the exact truth.
 
     The truth of recordings is clicked by people. These errors change only the truth by which a recording is scored:
-    that of ``simharness export`` and of ``simharness evaluate seeds``.
+    that of ``simharness export``.
     """
 
     shift: Spread = key(

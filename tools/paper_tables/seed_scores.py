@@ -1,24 +1,41 @@
-"""Evaluation of a scenario at many seeds by the protocol of recorded data."""
+"""Scores of a scenario at many seeds by the protocol of recorded data, for the twins in the paper's tables.
 
+``python -m tools.paper_tables.seed_scores SCENARIO --seeds N --set KEY=VALUE --json FILE`` prints a table and writes a
+file, which :mod:`tools.paper_tables` reads.
+"""
+
+import argparse
 import itertools
+import shlex
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 
 from mvpose.arrays import Floats
-from mvpose.commands.progress import Reporter, Silence
+from mvpose.commands.output_files import write_json
+from mvpose.commands.progress import Reporter, Silence, reporter
 from mvpose.skeleton import HeadMapping
+from simharness.cli.score_tables import ScoreTable
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation_errors import annotate_simulation
 from simharness.reality.evaluation import Evaluation, score_estimates
+from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.pcp import Part
 from simharness.scoring.score_summary import VariantScores
 from simharness.statistics.intervals import mean_interval
 from simharness.statistics.resampling import block_weights, blocks, interval, pseudo_values, resampled
+from simharness.trial.identity import provenance
 from simharness.trial.run_trial import TrialResult, run_trial
+
+COMMAND = "tools.paper_tables.seed_scores"
+"""Module that is run."""
 
 _ATTEMPTS = 3  # seeds tried for each one requested, because randomly drawn people may not fit beside clutter
 _RESAMPLES = 1000
@@ -200,3 +217,51 @@ def _pcp(counts: Floats) -> Floats:
         share = counts[..., 0] / counts[..., 1]
         known = np.isfinite(share)
         return np.asarray(100 * np.where(known, share, 0.0).sum(axis=-1) / known.sum(axis=-1))
+
+
+def table(result: SeedEvaluation) -> ScoreTable:
+    """Return the table of PCP by variant, of all people and of each person."""
+    first, *others = result.scenario.method.variants
+    people = range(result.scenario.people.count)
+    rows = []
+    for name in (first, *others):
+        difference = "" if name == first else result.difference(name, first)
+        scores = [result.pcp(name, [person]) for person in people]
+        rows.append((name, str(result.pcp(name)), str(difference), *(f"{each.pcp:.1f}" for each in scores)))
+    title = (
+        f"{result.scenario.name}: PCP over {len(result.seeds)} seeds with 95 % intervals: of all people, minus "
+        f"{first} on the same detections, and of each person"
+    )
+    return ScoreTable(title, ("variant",), ("all", f"minus {first}", *map(str, people)), rows)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return 2 where the scenario cannot be read or built."""
+    words, start = list(sys.argv[1:] if arguments is None else arguments), perf_counter()
+    parser = argparse.ArgumentParser(prog=f"python -m {COMMAND}", description="Score a scenario at many seeds.")
+    parser.add_argument("scenario", help="scenario file, or the name of a shipped scenario")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="change a key of the scenario")
+    parser.add_argument("--seeds", type=int, default=10, metavar="N", help="number of seeds (default: 10)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="file of all results")
+    options = parser.parse_args(words)
+    try:
+        scenario = load(options.scenario, overrides=options.set)
+        with reporter() as bars:
+            result = evaluate_seeds(scenario, options.seeds, reporter=bars)
+        if options.json is not None:
+            made = provenance(
+                command=shlex.join(["python", "-m", COMMAND, *words]),
+                seeds=result.seeds,
+                variants=scenario.method.variants,
+                seconds=perf_counter() - start,
+            )
+            write_json({**made, **result.summary()}, options.json)
+    except ValueError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    table(result).print_to(Console())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

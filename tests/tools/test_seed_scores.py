@@ -1,13 +1,16 @@
-"""Evaluation of a scenario at many seeds by the protocol of recordings."""
+"""Scores of a scenario at many seeds by the protocol of recordings."""
+
+import json
 
 import numpy as np
 import pytest
 
-from simharness.reality.seed_evaluation import annotate, evaluate_seeds, pcp_interval
 from simharness.scenario.load import load
 from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.score_summary import VariantScores
+from simharness.trial.identity import PROVENANCE
 from simharness.trial.run_trial import run_trial
+from tools.paper_tables.seed_scores import annotate, evaluate_seeds, main, pcp_interval
 
 SHORT = ["duration=0.4", 'method.variants=["fast", "no-3dps"]']
 
@@ -74,3 +77,26 @@ def test_seeds_are_paired_between_variants(scenario):
     assert summary["seeds"] == list(result.seeds)
     assert len(summary["pcp_people"]["fast"]) == 4
     assert len(result.pooled("fast").frames) == sum(each.annotated for each in result.evaluations.values())
+
+
+def test_the_command_prints_a_table_and_writes_all_results(tmp_path, capsys):
+    file = tmp_path / "seeds.json"
+    quick = [
+        "duration=0.4",
+        "rate=5",
+        "people.count=2",
+        "rendering.renderer=rays",
+        'method.variants=["fast", "no-3dps"]',
+    ]
+    words = [word for each in quick for word in ("--set", each)]
+    assert main(["quickstart", *words, "--seeds", "2", "--json", str(file)]) == 0
+    assert "PCP over 2 seeds" in capsys.readouterr().out
+    summary = json.loads(file.read_text())
+    assert summary["seeds"] == [7, 8]
+    assert summary["command"].startswith("python -m tools.paper_tables.seed_scores quickstart --set ")
+    assert summary.keys() >= set(PROVENANCE)
+    assert summary["variants"] == ["fast", "no-3dps"]
+    for scores in summary["pcp"].values():
+        assert scores["low"] <= scores["pcp"] <= scores["high"]
+    assert main(["nobody"]) == 2
+    assert capsys.readouterr().err.startswith("error: ")
