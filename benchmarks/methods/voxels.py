@@ -60,7 +60,7 @@ class VoxelFusion:
         joint, peaks, heights, supports = _peaks(
             rays.view, rays.origins, rays.directions, rays.weights, widths, rig.centers, inside
         )
-        labels = _people(rays.view, joint, supports)
+        labels = _people(rays.view, joint, heights, supports)
         count = int(labels.max(initial=-1)) + 1
         joints = np.full((count, len(detections.skeleton), 3), np.nan)
         scores = np.zeros(joints.shape[:2])
@@ -206,20 +206,22 @@ def _peaks(
     return np.array(joint), places, np.array(height), supports
 
 
-def _people(view: Integers, joint: Integers, supports: Floats) -> Integers:
+def _people(view: Integers, joint: Integers, heights: Floats, supports: Floats) -> Integers:
     """Return the person of each detection, (m,), from 0; -1 for one that shares no joints with another view.
 
-    Two poses belong together as far as they support the same peaks; of each peak, a pose supports one joint. Poses are
-    joined in the order of that support, with one pose of a view in a person.
+    Two poses belong together as far as they support the same peaks, of which each keypoint votes for the highest that
+    it supports. Poses are joined in the order of that support, with one pose of a view in a person.
     """
     m = len(view)
     labels = np.arange(m)
     common, count = np.zeros((m, m)), np.zeros((m, m), np.int64)
     for j in np.unique(joint):
-        of_joint = supports[joint == j]
-        both = np.minimum(of_joint[:, :, None], of_joint[:, None, :]).max(axis=0)
-        common += both
-        count += both > 0.0
+        rows = np.flatnonzero(joint == j)
+        values = np.where(supports[rows] > 0.0, heights[rows, None], 0.0)  # (k, m)
+        highest = np.where(values.max(axis=0) > 0.0, rows[values.argmax(axis=0)], -1)
+        same = (highest[:, None] == highest) & (highest >= 0)
+        common += np.where(same, heights[highest], 0.0)
+        count += same
     common[(view[:, None] == view[None, :]) | (count < COMMON)] = 0.0
     rows, columns = np.nonzero(np.triu(common))
     for index in np.argsort(-common[rows, columns], kind="stable"):
