@@ -39,6 +39,10 @@ ASSIGNED = 5
 _MOST = 20_000  # bundles of one limb, a bound on time in crowds before many cameras
 _TRUNK = ("shoulder", "hip")
 
+REDUNDANT = (("shoulder", "shoulder"), ("hip", "hip"), ("shoulder", "hip"), ("nose", "shoulder"), ("ear", "shoulder"))
+"""Parts that limbs join besides the bones of the skeleton: the trunk, and a head that is seen from behind, as the part
+affinity fields of OpenPose join them."""
+
 
 class LimbAssociation:
     """Limb bundles over all views, assembled to people."""
@@ -67,17 +71,18 @@ estimator = LimbAssociation()
 def _limbs(skeleton: Skeleton) -> tuple[Integers, Floats]:
     """Return the limbs (L, 2) and how far from the trunk each is, 0 to 1, (L,).
 
-    The bones of the skeleton, and those that close the trunk, as the skeleton of the authors has them.
+    They are the bones of the skeleton and :data:`REDUNDANT` ones, of each side.
     """
     bones = set(map(frozenset, skeleton.edges))
-    for part in _TRUNK:
-        both = frozenset(k for k, name in enumerate(skeleton.parts) if name == part)
-        if len(both) == 2:
-            bones.add(both)
-    for side in ("left_", "right_"):
-        ends = [skeleton.joints.index(side + part) for part in _TRUNK if side + part in skeleton.joints]
-        if len(ends) == 2:
-            bones.add(frozenset(ends))
+    sides = [[f"left_{part}", f"right_{part}", part] for part in dict.fromkeys(sum(REDUNDANT, ()))]
+    rows = {names[2]: [skeleton.joints.index(name) for name in names if name in skeleton.joints] for names in sides}
+    for part, other in REDUNDANT:
+        if part == other:
+            bones.update([frozenset(rows[part])] if len(rows[part]) == 2 else [])
+        elif len(rows[part]) == len(rows[other]):
+            bones.update(map(frozenset, zip(rows[part], rows[other], strict=True)))
+        else:
+            bones.update(frozenset((one, two)) for one in rows[part] for two in rows[other])
     depth = np.full(len(skeleton), len(skeleton))
     depth[[k for k, part in enumerate(skeleton.parts) if part in _TRUNK]] = 0
     for _ in skeleton.joints:

@@ -99,7 +99,7 @@ class Pose2Sim:
         )
         matched[matched < LEAST_AFFINITY] = 0
         proposals: Floats = np.asarray(self.association.person_index_per_cam(matched, ends, FEWEST), float)
-        return proposals.reshape(-1, len(rig))
+        return proposals.reshape(-1, len(rig)) if proposals.size else np.zeros((0, len(rig)))
 
     def _triangulated(self, rig: Rig, view: Integers, pixels: Floats, scores: Floats) -> Floats:
         """Return a joint, (3,), from the most views (n,) that agree; NaN where no two do."""

@@ -1,0 +1,1 @@
+"""Leaderboard: methods of others beside those of mvpose, on the same detections."""

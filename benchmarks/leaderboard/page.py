@@ -1,0 +1,156 @@
+"""Page of the leaderboard: one HTML file from the figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from markupsafe import Markup
+
+from benchmarks.leaderboard.entries import Entry
+from benchmarks.leaderboard.figures import ALL, DIFFERENCE, OVERALL, SIGNIFICANT, Figure, best_of_ours, by_method
+from mvpose.report.documents import fill_template, program_version
+from mvpose.report.tables import NOTHING, Cell, Table
+from simharness.outputs.study.plots import curve
+from simharness.outputs.study.tables import ends, number
+from simharness.runtime.number_text import fixed, signed
+from simharness.scoring.catalogue import SCORES
+from simharness.statistics.intervals import Interval
+
+_TEMPLATES = Path(__file__).parent / "templates"
+
+TITLES: Mapping[str, str] = {
+    "conditions": "Twelve conditions",
+    "views": "Number of views",
+    "shelf": "Real Shelf",
+}
+"""Headings of the parts."""
+
+
+def render(parts: Mapping[str, Sequence[Figure]], entries: Sequence[Entry], skipped: Mapping[str, str]) -> str:
+    """Return the page.
+
+    Args:
+        parts: figures by part, some of :data:`TITLES`.
+        entries: methods that ran.
+        skipped: methods and parts that did not run, with reasons.
+    """
+    return fill_template(
+        "leaderboard.html",
+        folder=_TEMPLATES,
+        program="simharness",
+        code=program_version(),
+        name="Leaderboard",
+        entries=entries,
+        skipped=skipped,
+        parts=[
+            {
+                "key": key,
+                "title": TITLES[key],
+                "best": best_of_ours(figures, entries),
+                "overall": overall_table(figures, entries),
+                "settings": setting_table(figures, entries),
+                "plots": [Markup(plot) for plot in _plots(figures, entries)] if key == "views" else [],
+                "seeds": max(each.n for each in figures),
+            }
+            for key, figures in parts.items()
+        ],
+    )
+
+
+def overall_table(figures: Sequence[Figure], entries: Sequence[Entry]) -> Table:
+    """Return scores over all settings: a row for each method, the one with the highest PCP first."""
+    heads = [Cell(SCORES[key].title, SCORES[key].unit) for key in OVERALL]
+    heads.insert(1, Cell("PCP minus the best of mvpose", "points"))
+    found = by_method(figures)
+    rows = []
+    for entry in _ranked(figures, entries):
+        cells = [cell_of(found[entry.name].get((ALL, key))) for key in OVERALL]
+        cells.insert(1, cell_of(found[entry.name].get((ALL, DIFFERENCE))))
+        rows.append((entry.name, tuple(cells)))
+    return Table(tuple(heads), tuple(rows))
+
+
+def setting_table(figures: Sequence[Figure], entries: Sequence[Entry]) -> Table:
+    """Return PCP by setting: a row for each method, in the order of the table over all settings.
+
+    The highest value of a setting is bold; the shade grows with the distance from it, fully at 20 points.
+    """
+    found = by_method(figures)
+    settings = list(dict.fromkeys(each.setting for each in figures if each.setting != ALL))
+    best = {
+        setting: max(each.value for each in figures if each.setting == setting and each.score == "pcp")
+        for setting in settings
+    }
+    rows = []
+    for entry in _ranked(figures, entries):
+        cells = []
+        for setting in settings:
+            figure = found[entry.name].get((setting, "pcp"))
+            plain = cell_of(figure)
+            behind = best[setting] - figure.value if figure is not None else 0.0
+            cells.append(Cell(plain.text, plain.small, min(1.0, max(0.0, behind / 20.0)), strong=behind == 0.0))
+        rows.append((entry.name, tuple(cells)))
+    return Table(tuple(Cell(setting.replace("_", " ")) for setting in settings), tuple(rows))
+
+
+def cell_of(figure: Figure | None) -> Cell:
+    """Return the cell of a figure, with its interval in small letters; differences have signs."""
+    if figure is None or math.isnan(figure.value):
+        return Cell(NOTHING)
+    if figure.score == DIFFERENCE:
+        texts = [signed(value, 1).replace("-", "−") for value in (figure.value, figure.low, figure.high)]
+        outside = figure.low > 0 or figure.high < 0 if math.isnan(figure.p) else figure.p < SIGNIFICANT
+        return Cell(texts[0], f"{texts[1]} to {texts[2]}", strong=outside)
+    info = SCORES[figure.score]
+    return Cell(number(figure.value, info), ends(_interval(figure), info))
+
+
+def _interval(figure: Figure) -> Interval:
+    return Interval(figure.value, figure.low, figure.high, figure.n)
+
+
+def _ranked(figures: Sequence[Figure], entries: Sequence[Entry]) -> list[Entry]:
+    values = {each.method: each.value for each in figures if each.setting == ALL and each.score == "pcp"}
+    return sorted((entry for entry in entries if entry.name in values), key=lambda entry: -values[entry.name])
+
+
+def _plots(figures: Sequence[Figure], entries: Sequence[Entry]) -> list[str]:
+    """Return PCP against the number of views: of ours, and of the others beside the best of ours."""
+    found = by_method(figures)
+    settings = list(dict.fromkeys(each.setting for each in figures if each.setting != ALL))
+    best = best_of_ours(figures, entries)
+    ours = [entry.name for entry in entries if entry.ours]
+    others = [best, *(entry.name for entry in entries if not entry.ours)]
+    lines = {
+        name: [_interval(found[name][setting, "pcp"]) for setting in settings] for name in dict.fromkeys(ours + others)
+    }
+    return [
+        curve(
+            f"views-{title.replace(' ', '-')}",
+            factor="cameras.count",
+            values=[int(setting) for setting in settings],
+            numeric=True,
+            lines={name: lines[name] for name in names},
+            score=SCORES["pcp"],
+            title=title,
+            beside=list(lines.values()),
+        )
+        for title, names in (("mvpose", ours), (f"others, and {best}", others))
+    ]
+
+
+def text_rows(figures: Sequence[Figure], entries: Sequence[Entry]) -> list[list[str]]:
+    """Return the rows of the table on the terminal: method, PCP, difference, precision, recall, error and time."""
+    found = by_method(figures)
+    rows = []
+    for entry in _ranked(figures, entries):
+        cells = [entry.name]
+        for key in ("pcp", DIFFERENCE, "precision", "recall", "mpjpe_mm", "time_ms"):
+            figure = found[entry.name].get((ALL, key))
+            shown = cell_of(figure)
+            small = f"\n{shown.small}" if key in ("pcp", DIFFERENCE) and shown.small else ""
+            cells.append(fixed(figure.value, 1) if figure and key == "time_ms" else shown.text + small)
+        rows.append(cells)
+    return rows
