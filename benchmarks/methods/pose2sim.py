@@ -83,7 +83,7 @@ class Pose2Sim:
             rows = np.flatnonzero(detections.view == view)
             poses = np.concatenate([pixels[rows], detections.scores[rows, :, None]], axis=2)
             poses[~np.isfinite(poses).all(axis=2)] = [np.nan, np.nan, 0.0]
-            of_views.append(poses.reshape(len(rows), -1).tolist())
+            of_views.append(poses.reshape(len(rows), 3 * pixels.shape[1]).tolist())
         ends = np.cumsum([0, *map(len, of_views)])
         if ends[-1] == 0:
             return np.zeros((0, len(rig)))

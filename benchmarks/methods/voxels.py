@@ -7,10 +7,10 @@ the 2D people that a joint projects onto say to whom it belongs. So a keypoint m
 detection has to be matched as a whole.
 
 The volume is the same, and visited sparsely: a peak that two views support lies near a crossing of two rays, so from
-one crossing in each voxel the peak is climbed to, by mean shift, and its place does not depend on the grid. Heat maps
-are Gaussians at the keypoints, as high as their scores and as wide as those that VoxelPose trains with. Left out: depth
-pictures, which the paper may use to mask voxels, limits of the room, and heat maps of a network with several modes. The
-thresholds of peaks are this file's own, from the geometry of a crossing; the paper's were not at hand.
+each crossing the peak is climbed to, by mean shift, and its place does not depend on a grid. Heat maps are Gaussians at
+the keypoints, as high as their scores and as wide as those that VoxelPose trains with. Left out: depth pictures, which
+the paper may use to mask voxels, limits of the room, and heat maps of a network with several modes. The thresholds of
+peaks are this file's own, from the geometry of a crossing; the paper's were not at hand.
 """
 
 from __future__ import annotations
@@ -22,9 +22,6 @@ from mvpose import Detections, Estimate, Rig
 from mvpose.arrays import Floats, Integers
 from mvpose.kernels import njit
 from mvpose.rays import viewing_rays
-
-VOXEL = 0.05
-"""Edge of a voxel, metres: between the coarse (0.1) and the fine grid (0.03) of VoxelPose."""
 
 FINEST = 0.0005
 """Step at which the way to a peak ends, metres."""
@@ -43,7 +40,7 @@ SUPPORT = 0.1
 """Least value of a heat map, relative to the score of its keypoint, that supports a peak: two deviations away."""
 
 SAME = 0.1
-"""Distance below which two peaks of one joint are one, metres: two voxels."""
+"""Distance below which two peaks of one joint are one, metres: a voxel of the coarse grid of VoxelPose."""
 
 COMMON = 3
 """Joints that the 2D poses of two views must support together to be one person's."""
@@ -154,7 +151,6 @@ def _peaks(
     point, best, strongest = np.empty(3), np.zeros(views), np.zeros(views, np.int64)
     ends, rays, even = np.empty((2, 3)), np.empty((2, 3)), np.ones(2)
     for j in range(joints):
-        first = len(joint)
         for one in range(m):
             if weights[one, j] <= 0.0:
                 continue
@@ -172,16 +168,7 @@ def _peaks(
                 )
                 if np.exp(-0.5 * off * off) < SUPPORT:
                     continue
-                known = False
-                for k in range(first, len(joint)):
-                    known = known or np.sqrt(((place[k] - point) ** 2).sum()) < 0.5 * VOXEL
-                if known:
-                    continue
                 if not _climb(point, j, view, origins, directions, weights, widths, best, strongest):
-                    continue
-                for k in range(first, len(joint)):
-                    known = known or np.sqrt(((place[k] - point) ** 2).sum()) < SAME
-                if known:
                     continue
                 seeing, supporting, mine = 0, 0, np.zeros(m)
                 for v in range(views):
@@ -199,11 +186,26 @@ def _peaks(
                     place.append(point.copy())
                     height.append(best.sum() / max(seeing, 1))
                     support.append(mine)
-    k = len(joint)
-    places, supports = np.empty((k, 3)), np.empty((k, m))
-    for index in range(k):
-        places[index], supports[index] = place[index], support[index]
-    return np.array(joint), places, np.array(height), supports
+    kept = _highest(np.array(joint), place, np.array(height))
+    places, supports = np.empty((len(kept), 3)), np.empty((len(kept), m))
+    for row in range(len(kept)):
+        places[row], supports[row] = place[kept[row]], support[kept[row]]
+    return np.array(joint)[kept], places, np.array(height)[kept], supports
+
+
+@njit(cache=True)
+def _highest(joint: Integers, place: list[Floats], height: Floats) -> Integers:
+    """Return the peaks that are not near a higher one of the same joint, (k,), the highest first."""
+    kept, count = np.empty(len(joint), np.int64), 0
+    for row in np.argsort(-height, kind="mergesort"):
+        near = False
+        for index in range(count):
+            if joint[kept[index]] == joint[row]:
+                near = near or np.sqrt(((place[kept[index]] - place[row]) ** 2).sum()) < SAME
+        if not near:
+            kept[count] = row
+            count += 1
+    return kept[:count]
 
 
 def _people(view: Integers, joint: Integers, heights: Floats, supports: Floats) -> Integers:
