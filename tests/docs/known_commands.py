@@ -141,6 +141,7 @@ LOOP = "python -m benchmarks.fit FOLDER"  # half an hour; tests/benchmarks/fit/t
 OUT_OF_SAMPLE = "python -m benchmarks.fit FOLDER --out-of-sample"  # tests/benchmarks/fit/test_closed_loop.py
 HUNT = "python -m benchmarks.hunt benchmarks/hunt/room.toml FOLDER --trials 96 --method lhs"  # tests/benchmarks/hunt
 SEED_SCORES = "python -m tools.paper_tables.seed_scores"  # tests/tools/test_seed_scores.py
+LEADERBOARD = "python -m benchmarks.leaderboard FOLDER --shelf SHELF"  # ten minutes; tests/benchmarks/leaderboard
 GALLERY = "python -m tools.gallery results/gallery"  # tests/tools/test_gallery.py; minutes of rendering
 # Without arguments these begin to bake the body.
 BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")
@@ -168,6 +169,7 @@ KNOWN = {
     LOOP,
     OUT_OF_SAMPLE,
     HUNT,
+    LEADERBOARD,
     *BAKE,
     GALLERY,
     SEED_SCORES,
