@@ -51,13 +51,8 @@ class VoxelFusion:
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Estimate the people of one frame."""
-        rays = viewing_rays(rig, detections)
-        widths = np.array([WIDTH * camera.size[0] for camera in rig])[rays.view] * rays.pixel
-        inside = np.array([[*camera.R[2], camera.t[2], _field(camera.K, camera.size)] for camera in rig])
-        joint, peaks, heights, supports = _peaks(
-            rays.view, rays.origins, rays.directions, rays.weights, widths, rig.centers, inside
-        )
-        labels = _people(rays.view, joint, heights, supports)
+        joint, places, heights, supports = peaks(rig, detections)
+        labels = _people(detections.view, joint, heights, supports)
         count = int(labels.max(initial=-1)) + 1
         joints = np.full((count, len(detections.skeleton), 3), np.nan)
         scores = np.zeros(joints.shape[:2])
@@ -69,11 +64,19 @@ class VoxelFusion:
                 mine = np.flatnonzero((joint == j) & (value > 0.0))
                 if len(mine):
                     best = mine[value[mine].argmax()]
-                    joints[person, j], scores[person, j] = peaks[best], heights[best]
+                    joints[person, j], scores[person, j] = places[best], heights[best]
         return estimate_of(joints, scores, labels, detections.skeleton)
 
 
 estimator = VoxelFusion()
+
+
+def peaks(rig: Rig, detections: Detections) -> tuple[Integers, Floats, Floats, Floats]:
+    """Return the peaks of the volume: joint (k,), place (k, 3), height (k,), and support by each detection (k, m)."""
+    rays = viewing_rays(rig, detections)
+    widths = np.array([WIDTH * camera.size[0] for camera in rig])[rays.view] * rays.pixel
+    inside = np.array([[*camera.R[2], camera.t[2], _field(camera.K, camera.size)] for camera in rig])
+    return _peaks(rays.view, rays.origins, rays.directions, rays.weights, widths, rig.centers, inside)
 
 
 def _field(K: Floats, size: tuple[int, int]) -> float:

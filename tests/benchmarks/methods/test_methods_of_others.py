@@ -9,6 +9,7 @@ from scipy.optimize import least_squares
 import simharness
 from benchmarks.method.scenes import Conditions, film, ring
 from benchmarks.methods.points import nearest_point, pixel_error, ray_distance
+from benchmarks.methods.voxels import SAME, peaks
 from mvpose import COCO17, Detections, Rig
 from mvpose.rays import viewing_rays
 from simharness.trial.run_trial import run_trial
@@ -103,6 +104,21 @@ def test_a_limb_far_from_the_rays_of_others_is_another_persons():
     estimate = written("limbs").estimate(scene.rig, changed(scene.detections, keypoints))
     np.testing.assert_allclose(estimate.joints, scene.joints, atol=1e-6)
     assert estimate.matching.labels[1] == -1
+
+
+@pytest.mark.parametrize("people", [1, 3])
+def test_peaks_of_a_joint_are_apart_and_as_high_as_the_scores_of_keypoints(people):
+    scene = film(ring(5, people), people, conditions=EXACT)
+    joint, places, heights, supports = peaks(scene.rig, scene.detections)
+    for j in range(len(COCO17)):
+        of_joint = places[joint == j]
+        apart = np.linalg.norm(of_joint[:, None] - of_joint, axis=2) + np.eye(len(of_joint))
+        assert apart.min() >= SAME
+        if people == 1:
+            np.testing.assert_allclose(of_joint, scene.joints[:, j], atol=1e-4)
+            np.testing.assert_allclose(heights[joint == j], scene.detections.scores[:, j].mean(), rtol=1e-3)
+    assert ((supports > 0).sum(axis=1) >= 2).all()
+    assert (supports <= scene.detections.scores[:, joint].T + 1e-12).all()
 
 
 @pytest.mark.slow
