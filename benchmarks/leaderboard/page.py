@@ -10,9 +10,9 @@ from markupsafe import Markup
 
 from benchmarks.leaderboard.entries import Entry
 from benchmarks.leaderboard.figures import ALL, DIFFERENCE, OVERALL, SIGNIFICANT, Figure, best_of_ours, by_method
+from benchmarks.leaderboard.views_plot import views_plot
 from mvpose.report.documents import fill_template, program_version
 from mvpose.report.tables import NOTHING, Cell, Table
-from simharness.outputs.study.plots import curve
 from simharness.outputs.study.tables import ends, number
 from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES
@@ -123,21 +123,20 @@ def _plots(figures: Sequence[Figure], entries: Sequence[Entry]) -> list[str]:
     best = best_of_ours(figures, entries)
     ours = [entry.name for entry in entries if entry.ours]
     others = [best, *(entry.name for entry in entries if not entry.ours)]
-    lines = {
-        name: [_interval(found[name][setting, "pcp"]) for setting in settings] for name in dict.fromkeys(ours + others)
-    }
+    views = [int(setting) for setting in settings]
+    shown = list(dict.fromkeys(ours + others))
+    lines = {name: [_interval(found[name][setting, "pcp"]) for setting in settings] for name in shown}
+    means = [each.mean for line in lines.values() for each in line]
     return [
-        curve(
-            f"views-{title.replace(' ', '-')}",
-            factor="cameras.count",
-            values=[int(setting) for setting in settings],
-            numeric=True,
-            lines={name: lines[name] for name in names},
-            score=SCORES["pcp"],
+        views_plot(
+            f"views-{title}",
+            {name: lines[name] for name in names},
+            views,
             title=title,
-            beside=list(lines.values()),
+            colors={name: index for index, name in enumerate(names)},
+            span=(min(means), max(means)),
         )
-        for title, names in (("mvpose", ours), (f"others, and {best}", others))
+        for title, names in (("mvpose", ours), ("others", others))
     ]
 
 

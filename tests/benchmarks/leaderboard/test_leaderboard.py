@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +17,12 @@ from benchmarks.leaderboard.entries import ENTRIES, Entry, chosen
 from benchmarks.leaderboard.figures import ALL, DIFFERENCE, OVERALL, Figure, best_of_ours, study_figures, write_csv
 from benchmarks.leaderboard.page import cell_of, overall_table, render, setting_table, text_rows
 from benchmarks.leaderboard.shelf import evaluated, pcp, recording_figures
+from benchmarks.leaderboard.views_plot import views_plot
 from benchmarks.method.scenes import Conditions, film, ring
 from mvpose import COCO17
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.statistics.intervals import mean_interval
+from simharness.statistics.intervals import Interval, mean_interval
 from simharness.statistics.many_tests import holm
 from simharness.statistics.paired_tests import paired
 from simharness.trial.stages.estimators import load_estimator
@@ -191,6 +193,17 @@ def test_the_page_names_methods_numbers_and_what_is_missing(trials):
     for text in ("Leaderboard", "Twelve conditions", "87.5", "−3.2", "plain baseline", "it is &lt;not&gt; there"):
         assert text in page
     assert "Real Shelf" not in page
+
+
+def test_the_plot_has_a_line_for_each_method_also_where_nothing_is_wrong():
+    level = {"full": [90.0, 100.0], "ransac": [50.0, 99.0]}
+    lines = {name: [Interval(pcp, pcp - 1, min(pcp + 1, 100.0), 6) for pcp in of] for name, of in level.items()}
+    given = {"title": "others", "colors": {"full": 0, "ransac": 7}, "span": (50.0, 100.0)}
+    svg = views_plot("x", lines, [2, 8], **given)
+    assert svg.startswith("<svg")
+    assert "NaN" not in svg
+    texts = re.findall(r">([^<>]+)</text>", svg)
+    assert {"full", "ransac", "others", "50", "90", "99", "99.9"} <= set(texts)
 
 
 def test_wrong_arguments_are_one_message(tmp_path, capsys):
