@@ -1,10 +1,9 @@
 """``simharness evaluate``: scores of the method on recordings and on their simulated twins."""
 
 import enum
-from collections.abc import Iterable
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -106,7 +105,7 @@ def evaluate_recording(
         with failing(), reporter() as bars, bars.stage("evaluate", len(data) * len(pipelines)) as advance:
             evaluation = evaluate(data, pipelines, head=head.value, progress=lambda *_: advance(1))
         if json_file is not None:
-            _write(evaluation.summary(), json_file, seeds=(), variants=pipelines, start=start)
+            write_json({**made_here(start, seeds=(), variants=pipelines), **evaluation.summary()}, json_file)
     print_evaluation(evaluation, Console())
 
 
@@ -148,7 +147,8 @@ def evaluate_poses(
             first = read_keys(find_recording(recording)).detections.first
         evaluation = evaluate_people(data, people, first=first, head=head.value)
         if json_file is not None:
-            _write(evaluation.summary(), json_file, seeds=(), variants=evaluation.variants, start=start)
+            made = made_here(start, seeds=(), variants=evaluation.variants)
+            write_json({**made, **evaluation.summary()}, json_file)
     print_evaluation(evaluation, Console())
 
 
@@ -160,8 +160,3 @@ def _estimator(name: str, *, lag: float, period: float) -> "Estimator":
     if ":" not in name:
         return preset(name, lag=lag, period=period)
     return user_estimator("--method", name)
-
-
-def _write(summary: dict[str, Any], path: Path, *, seeds: Iterable[int], variants: Iterable[str], start: float) -> None:
-    """Write a summary with its provenance; keys of the summary itself take precedence."""
-    write_json({**made_here(start, seeds=seeds, variants=variants), **summary}, path)

@@ -14,9 +14,11 @@ from rich.table import Table
 from rich.text import Text
 
 from mvpose.commands.terminal import plain_table
+from simharness.scoring.catalogue import ScoreInfo
 from simharness.scoring.pcp import GROUPS
 from simharness.scoring.score_summary import STAGES
 from simharness.scoring.tracking.identity_figures import DISTANCE
+from simharness.statistics.intervals import mean_interval
 
 if TYPE_CHECKING:
     from simharness.reality.evaluation import Evaluation, PublishedPcp
@@ -65,6 +67,16 @@ class ScoreTable:
         for row in self.rows:
             table.add_row(*map(Text, (*row[:count], *row[count + start : count + end])))
         return table
+
+
+def mean_cell(values: Sequence[float | None], score: ScoreInfo) -> str:
+    """Return the text of the mean of a score over scenes, with the ends of its interval below."""
+    interval, digits = mean_interval(values, unit=score.unit), score.digits
+    if not interval.n:
+        return "–"
+    # The ends stand on two lines, because six scores with intervals on one line do not fit 80 columns.
+    ends = f"\n{interval.low:.{digits}f}–\n{interval.high:.{digits}f}" if interval.n > 1 else ""
+    return f"{interval.mean:.{digits}f}{ends}"
 
 
 _ONLY_ANNOTATED = (

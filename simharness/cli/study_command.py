@@ -234,31 +234,19 @@ def _table(results: "Results", title: str, trials: "pl.DataFrame", scores: Seque
     """Return mean scores with intervals over seeds, a row for each variant; with one factor, for each setting."""
     import polars as pl
 
-    from simharness.cli.score_tables import ScoreTable
+    from simharness.cli.score_tables import ScoreTable, mean_cell
     from simharness.outputs.study.tables import by_seed
     from simharness.scoring.catalogue import SCORES
-    from simharness.statistics.intervals import mean_interval
 
     factors = results.info["factors"] if len(results.info["factors"]) == 1 else []
     keys = [*(("case",) if any(results.trials["case"]) else ()), *factors, "variant"]
     lines = []
     for group in trials.select(keys).unique(maintain_order=True).iter_rows():
         rows = trials.filter(*(pl.col(key).eq_missing(value) for key, value in zip(keys, group, strict=True)))
-        cells = [
-            _cell(mean_interval(list(by_seed(rows, score).values()), unit=SCORES[score].unit), SCORES[score].digits)
-            for score in scores
-        ]
+        cells = [mean_cell(list(by_seed(rows, score).values()), SCORES[score]) for score in scores]
         lines.append((*("–" if value is None else str(value) for value in group), *cells))
     headings = [f"{SCORES[score].title}\n{SCORES[score].unit}" for score in scores]
     return ScoreTable(title, [key.replace(".", ".\n") for key in keys], headings, lines)
-
-
-def _cell(interval: Any, digits: int) -> str:
-    if not interval.n:
-        return "–"
-    # The ends stand on two lines, because six scores with intervals on one line do not fit 80 columns.
-    ends = f"\n{interval.low:.{digits}f}–\n{interval.high:.{digits}f}" if interval.n > 1 else ""
-    return f"{interval.mean:.{digits}f}{ends}"
 
 
 def _counts(info: dict[str, Any], what: str) -> str:

@@ -167,10 +167,10 @@ def evaluate_people(
             f"which has the frames {recording.frames.min()} to {recording.frames.max()}; estimate all of them, or give "
             "the number of the first estimated frame as --first"
         )
-    return score_estimates(recording, {FILES: [_estimate(people, row) for row in rows.tolist()]}, head=head)
+    return score_estimates(recording, {FILES: [estimate_of(people, row) for row in rows.tolist()]}, head=head)
 
 
-def _estimate(people: People, row: int) -> Estimate:
+def estimate_of(people: People, row: int) -> Estimate:
     """Return the people of a frame, with their identities."""
     if people.skeleton != COCO17:
         raise ValueError(f"people must be on the skeleton {COCO17.name}, got {people.skeleton.name}")

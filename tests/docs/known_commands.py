@@ -47,6 +47,7 @@ NAMES = (  # mentioned
     "simharness export",
     "simharness fit-detector",
     "simharness profile-network",
+    "simharness score",
     "simharness shrink results/failures/NAME.toml",  # tests/simharness/hunt/test_kept_failure.py
 )
 CHECKS = (
@@ -140,6 +141,8 @@ POWER = "python -m benchmarks.validation FOLDER"  # half an hour, and the data o
 LOOP = "python -m benchmarks.fit FOLDER"  # half an hour; tests/benchmarks/fit/test_closed_loop.py
 OUT_OF_SAMPLE = "python -m benchmarks.fit FOLDER --out-of-sample"  # tests/benchmarks/fit/test_closed_loop.py
 HUNT = "python -m benchmarks.hunt benchmarks/hunt/room.toml FOLDER --trials 96 --method lhs"  # tests/benchmarks/hunt
+# tests/simharness/outputs/benchmark/test_submission.py
+SCORED = ("simharness score SUBMISSION benchmark/gathering", "simharness score FILE benchmark/passage")
 SEED_SCORES = "python -m tools.paper_tables.seed_scores"  # tests/tools/test_seed_scores.py
 LEADERBOARD = "python -m benchmarks.leaderboard FOLDER --shelf SHELF"  # ten minutes; tests/benchmarks/leaderboard
 GALLERY = "python -m tools.gallery results/gallery"  # tests/tools/test_gallery.py; minutes of rendering
@@ -173,6 +176,7 @@ KNOWN = {
     *BAKE,
     GALLERY,
     SEED_SCORES,
+    *SCORED,
     CI,
     *PYTEST,
     *SHELL,

@@ -18,6 +18,7 @@ COMMANDS = {
     "validate": ["validate", "{}"],
     "report": ["report", "{}"],
     "shrink": ["shrink", "{}"],
+    "score": ["score", "{}", "{}"],
     "merge": ["merge", "{}", "--into", "store"],
 }
 PLACES = ["missing.toml", "a folder", "", " ", "名前", "x" * 300, "a/../../b\tc", "-", "folder/\x01"]

@@ -31,8 +31,10 @@ from simharness.cli import app
 from simharness.gate.baseline import Measurement
 from simharness.gate.compare import Comparison, GateResult
 from simharness.gate.trial_command import TrialKey
+from simharness.outputs.benchmark.submission import Submission
 from simharness.reality.validation.validation import SimulatedTwins
 from simharness.scenario.sections.gate_section import GateSection
+from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import mean_interval
 from simharness.study.causes.cause_shares import Blame
 from simharness.study.study_folder import Tables, read_study, write_study
@@ -82,6 +84,7 @@ BASES = {
     "plan": "lab --out {out}",
     "evaluate recording": "{lab}/hall.toml",
     "evaluate poses": "{lab}/hall.toml {lab}/people",
+    "score": "{lab}/people {lab}/benchmark",
 }
 """Words that come first."""
 
@@ -204,6 +207,7 @@ ROWS = {
     "evaluate recording": JSON
     | {"head": Row("--head 2019"), "method": Row("--method fast"), "lag": Row("--lag 0", "--method track-fast")},
     "evaluate poses": JSON | {"head": Row("--head 2019"), "first": Row("--first 1")},
+    "score": JSON | {"split": Row("--split test")},
 }
 """Options by command and name of the parameter."""
 
@@ -273,6 +277,7 @@ def _stand_ins(study):
     fitted = SimpleNamespace(real=figures, calibrated=figures, annotation=figures)
     printed = ("plot_comparison", "print_agreement", "print_annotation", "print_measurement", "print_priors")
     profile = SimpleNamespace(text="", measured=figures, bias=np.zeros(1), detector=None, kind="")
+    submission = Submission({"a": dict.fromkeys(SCORES, 1.0)}, {"a": "test"})
     checked_profile = SimpleNamespace(summary=dict, scenes=(), detectors=(), variants=(), verdicts={})
     return {
         "simharness.outputs.run.result_folder": {"run": None},
@@ -289,6 +294,7 @@ def _stand_ins(study):
         "simharness.reality.detector_fit.fit": {"fit": fitted, "write_profile": ()},
         "simharness.reality.detector_fit.fit_table": dict.fromkeys(printed, ()),
         "simharness.reality.detector_fit.half_check": {"check_halves": figures},
+        "simharness.outputs.benchmark.submission": {"score_submission": submission},
         "simharness.reality.twin": {"TwinModel.of_fit": (), "simulate_twins": ((),)},
         "simharness.reality.validation.validation": {
             "simulate_predictions": SimulatedTwins([], None), "validate": validated, "predict_halves": []

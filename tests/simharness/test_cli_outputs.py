@@ -31,6 +31,7 @@ FILES = {
     "simharness fit-detector --json": "simharness fit-detector shelf --json {}",
     "simharness evaluate recording --json": "simharness evaluate recording shelf --json {}",
     "simharness evaluate poses --json": "simharness evaluate poses shelf people --json {}",
+    "simharness score --json": "simharness score people benchmark --json {}",
     "simharness validate --json": "simharness validate shelf --out new --json {}",
 }
 """Options that name a file, and a call with each."""
@@ -62,7 +63,7 @@ ELSEWHERE = {"simharness report --digest"}
 READ = {
     "calibration", "detections", "videos", "folder", "recording", "fit_on", "rival", "scenario", "suite", "file",
     "study", "stores", "room", "scenes", "other_scenes", "poses", "pictures", "times", "detector", "pose", "skeleton",
-    "package", "source",
+    "package", "source", "predictions", "benchmark",
 }  # fmt: skip
 """Parameters whose files are read alone."""
 

@@ -43,19 +43,11 @@ def write_coco(layout: Layout, rig: Rig, truth: Mapping[int, Truth], people: Seq
                 seen = true.visibility[view, person]
                 flag = np.where(seen == Visibility.VISIBLE, 2, np.where(seen == Visibility.OUTSIDE, 0, 1))
                 places = np.where(flag[:, None] > 0, true.pixels[view, person], 0.0).round(2)
-                annotations.append(
-                    {
-                        "id": len(annotations) + 1,
-                        "image_id": frame,
-                        "category_id": _CATEGORY["id"],
-                        "track_id": int(people[person]),
-                        "keypoints": np.column_stack([places, flag]).ravel().tolist(),
-                        "num_keypoints": int((flag > 0).sum()),
-                        "bbox": true.boxes[view, person].round(2).tolist(),
-                        "area": round(float(area[person]), 2),
-                        "iscrowd": 0,
-                    }
-                )
+                keypoints = np.column_stack([places, flag]).ravel().tolist()
+                box = {"bbox": true.boxes[view, person].round(2).tolist(), "area": round(float(area[person]), 2)}
+                who = {"id": len(annotations) + 1, "image_id": frame, "category_id": 1, "track_id": int(people[person])}
+                joints = {"keypoints": keypoints, "num_keypoints": int((flag > 0).sum()), "iscrowd": 0}
+                annotations.append(who | joints | box)
         path = layout.folder / COCO / f"{camera.name}.json"
         path.parent.mkdir(exist_ok=True)
         content = {"images": images, "annotations": annotations, "categories": [_CATEGORY]}

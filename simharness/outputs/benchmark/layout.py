@@ -4,7 +4,7 @@
     hdImgs/00_00/00_00_00000000.jpg, depth/00_00/00_00_00000000.png, ids/..., parts/..., coco/00_00.json
     hdPose3d_stage1_coco19/body3DScene_00000000.json
     openpose/00_00/00_00_00000000_keypoints.json
-    manifest.json, scenario.toml, recording.toml, truth.npz
+    manifest.json, scenario.toml, recording.toml, truth.npz, exact.npz
 
 The believed calibration, ``openpose`` and the files of the last line are additions of simharness; the rest is the
 toolbox's layout (https://github.com/CMU-Perceptual-Computing-Lab/panoptic-toolbox).
@@ -81,6 +81,11 @@ class Layout:
     def truth(self) -> Path:
         """True joints of the recording."""
         return self.folder / "truth.npz"
+
+    @property
+    def exact(self) -> Path:
+        """Given rig and detections, and exact truth, for ``simharness score``."""
+        return self.folder / "exact.npz"
 
     def picture(self, camera: str, frame: int) -> Path:
         """Return the path of the picture of a camera in a frame."""
@@ -178,6 +183,7 @@ def manifest(
             "scenario": "scenario.toml",
             "recording": "recording.toml",
             "truth": "truth.npz",
+            "exact": "exact.npz",
         },
         **{key: _described()[key] for key in ("units", "axes", "calibration", "bodies")},
         "confidence": {"joint, by the number of pictures that show it": CONFIDENCES, **_described()["confidence"]},

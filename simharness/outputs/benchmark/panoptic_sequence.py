@@ -30,6 +30,7 @@ from mvpose.skeleton import PANOPTIC19
 from simharness.outputs.benchmark.coco_truth import COCO, write_coco
 from simharness.outputs.benchmark.layout import FORMAT, Layout, confidences, manifest
 from simharness.outputs.benchmark.render import CHANNELS, channel_image, write_image
+from simharness.outputs.benchmark.submission import write_exact
 from simharness.reality.annotation_errors import annotate_simulation
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_files import dumps, dumps_keys
@@ -139,6 +140,7 @@ def export_sequence(
                         image = channel_image(source, trial, frame, view, channel)
                         write_image(layout.channel(channel, name, frame), image)
             advance(1)
+        write_exact(layout.exact, result.recording, frames)
         if COCO in plan.also:
             write_coco(layout, believed_rig, {frame: detected[frame].truth for frame in frames}, sequence.ids.tolist())
         description = manifest(

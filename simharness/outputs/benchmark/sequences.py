@@ -129,15 +129,10 @@ def _describe(scenario: Scenario, folder: Path, command: str | None) -> None:
         digest.update(np.rint(np.nan_to_num(truth.joints, nan=-9.0) / _TRUTH_STEP).astype(np.int32).tobytes())
         counts = {"frames": made["frames"]["count"], "cameras": len(made["cameras"]), "people": len(made["people"])}
         sequences.append({"name": place.name, "seed": made["seed"], "split": SPLITS[made["seed"] % 10], **counts})
-    about: dict[str, Any] = {
-        "format": "simharness benchmark",
-        "version": 1,
-        "name": scenario.name,
-        "description": scenario.description,
-        "sequences": sequences,
-        "truth_sha256": digest.hexdigest(),
-        "provenance": provenance(command=command, seeds=[each["seed"] for each in sequences], variants=[], seconds=0.0),
-    }
+    seeds = [each["seed"] for each in sequences]
+    about: dict[str, Any] = {"format": "simharness benchmark", "version": 1, "name": scenario.name}
+    about |= {"description": scenario.description, "sequences": sequences, "truth_sha256": digest.hexdigest()}
+    about["provenance"] = provenance(command=command, seeds=seeds, variants=[], seconds=0.0)
     write_atomic(folder / "benchmark.json", _json(about))
     metadata = json.loads(read_bytes(_DATA / "croissant.json", what="the metadata"))
     metadata |= {"name": scenario.name, "description": scenario.description or f"Scenario {scenario.name}"}

@@ -25,7 +25,9 @@ from simharness.world.humans.shape import LIMBS, LIMITS, Shape
 from simharness.world.motion.mocap.reenactment import follow
 from simharness.world.motion.poses.kinematics import Kinematics
 
-_TRUNK = (0.15, 0.9)  # metres: least and greatest trunk of children and adults, with much tolerance
+TRUNK = (0.15, 0.9)
+"""Least and greatest trunk of children and adults, with much tolerance, metres."""
+
 _APART = 0.001  # metres: least distance between left and right
 _POSES = 120  # most poses, spread over the recording, in which lengths are compared
 
@@ -79,7 +81,7 @@ def check_people(people: People) -> None:
         )
     for person in range(len(people)):
         joints = people.joints[:, person]
-        trunk, (shortest, longest) = body_lengths(joints)["trunk"], _TRUNK
+        trunk, (shortest, longest) = body_lengths(joints)["trunk"], TRUNK
         if not shortest <= trunk <= longest:
             raise ValueError(
                 f"the trunk of person {person} is {trunk:.3g} m long from hips to shoulders, expected {shortest:g} to "

@@ -192,7 +192,7 @@ class TestManifest:
         assert load(folder / "scenario.toml") == trial.scenario
 
     def test_all_files_are_listed(self, content, folder):
-        single = ("calibration", "calibration_believed", "scenario", "recording", "truth")
+        single = ("calibration", "calibration_believed", "scenario", "recording", "truth", "exact")
         named = {content["files"][key] for key in single} | {"manifest.json", ".written"}
         numbers = range(content["frames"]["first"], 3, content["frames"]["every"])
         assert len(numbers) == content["frames"]["count"] == 3
