@@ -1,4 +1,4 @@
-"""Real Shelf: every method on the same detections of five cameras, with intervals by blocks of frames.
+"""Real Shelf: every method on the same detections, with all cameras and with fewer, and intervals by blocks of frames.
 
 A finished method is kept, so that an interrupted evaluation goes on with the next one.
 """
@@ -9,6 +9,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Sequence
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,15 @@ import numpy as np
 from benchmarks.leaderboard.entries import Entry
 from benchmarks.leaderboard.figures import ALL, DIFFERENCE, Figure, best_of_ours
 from mvpose import preset
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
+from mvpose.estimators import Estimator
 from mvpose.files.atomic_files import write_atomic
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.evaluation import evaluate
+from simharness.scoring.frame_scores import FrameScores, score_frames
 from simharness.scoring.pcp import Part
 from simharness.statistics.resampling import block_weights, blocks, interval, resampled
+from simharness.trial.conditioned_trial import estimate_frames
 from simharness.trial.identity import code, estimator_code
 from simharness.trial.stages.estimators import user_estimator
 
@@ -50,7 +54,11 @@ def evaluated(
 
 
 def _result(recording: AnnotatedRecording, entry: Entry, folder: Path) -> dict[str, Any]:
-    """Return correct and counted parts of each frame and actor (T, A), scores and times of a method, JSON-ready."""
+    """Return the results of a method, JSON-ready.
+
+    ``time`` (T,), seconds; ``correct`` and ``counted``, parts of each frame and actor (T, A), with all cameras; the
+    same in ``fewer`` by number of cameras, as sums over all sets of that many; and ``summary`` with all cameras.
+    """
     digests = code()
     identity = [recording.name, len(recording), digests.method, digests.scores]
     identity.append("" if entry.ours else estimator_code(entry.place))
@@ -61,16 +69,38 @@ def _result(recording: AnnotatedRecording, entry: Entry, folder: Path) -> dict[s
         return kept
     estimator = preset(entry.name) if entry.ours else user_estimator(entry.name, entry.place)
     evaluation = evaluate(recording, {entry.name: estimator})
-    parts = evaluation.variants[entry.name].frames.parts[:, list(recording.scored)]
-    annotated = np.isfinite(recording.truth).any(axis=(1, 2, 3))
+    annotated = np.asarray(np.isfinite(recording.truth).any(axis=(1, 2, 3)))
+    cameras = range(len(recording.rig))
     result = {
         "time": recording.time[annotated].tolist(),
-        "correct": (parts == Part.CORRECT).sum(axis=2).tolist(),
-        "counted": (parts != Part.UNDEFINED).sum(axis=2).tolist(),
+        **_counts([evaluation.variants[entry.name].frames], recording.scored),
+        "fewer": {
+            str(count): _counts(
+                [_scored(recording.subset(views), estimator, annotated) for views in combinations(cameras, count)],
+                recording.scored,
+            )
+            for count in range(len(cameras) - 1, 1, -1)
+        },
         "summary": evaluation.summary()["variants"][entry.name],
     }
     write_atomic(file, json.dumps(result).encode())
     return result
+
+
+def _scored(recording: AnnotatedRecording, estimator: Estimator, annotated: Bools) -> FrameScores:
+    """Return the scores of a method in the annotated frames (F,); missing joints of the face are filled from others."""
+    estimates = estimate_frames(estimator, recording.rig, recording.timed_detections)
+    joints = [each.joints for each, known in zip(estimates, annotated, strict=True) if known]
+    return score_frames(recording.truth[annotated], joints, filled=True)
+
+
+def _counts(scores: Sequence[FrameScores], actors: Sequence[int]) -> dict[str, Any]:
+    """Return correct and counted parts of each frame and actor, (T, A), as sums over recordings of the same frames."""
+    parts = np.stack([each.parts[:, list(actors)] for each in scores])
+    return {
+        "correct": (parts == Part.CORRECT).sum(axis=(0, 3)).tolist(),
+        "counted": (parts != Part.UNDEFINED).sum(axis=(0, 3)).tolist(),
+    }
 
 
 def recording_figures(results: dict[str, dict[str, Any]], entries: Sequence[Entry]) -> list[Figure]:
@@ -91,6 +121,9 @@ def recording_figures(results: dict[str, dict[str, Any]], entries: Sequence[Entr
         for actor, value in enumerate(pcp(result, whole)[0]):
             of_actor = (float(value), float(ends[0][actor]), float(ends[1][actor]))
             found.append(Figure(name, f"actor {actor + 1}", "pcp", *of_actor, count))
+        for cameras, fewer in result["fewer"].items():
+            low, high = (float(end) for end in interval(pcp(fewer, weights).mean(axis=1), blocks=count))
+            found.append(Figure(name, f"{cameras} cameras", "pcp", float(pcp(fewer, whole).mean()), low, high, count))
         found += _others(name, result["summary"], count)
     best = best_of_ours(found, entries)
     for name, result in results.items():

@@ -144,7 +144,9 @@ HUNT = "python -m benchmarks.hunt benchmarks/hunt/room.toml FOLDER --trials 96 -
 # tests/simharness/outputs/benchmark/test_submission.py
 SCORED = ("simharness score SUBMISSION benchmark/gathering", "simharness score FILE benchmark/passage")
 SEED_SCORES = "python -m tools.paper_tables.seed_scores"  # tests/tools/test_seed_scores.py
-LEADERBOARD = "python -m benchmarks.leaderboard FOLDER --shelf SHELF"  # ten minutes; tests/benchmarks/leaderboard
+LEADERBOARD = (
+    "python -m benchmarks.leaderboard FOLDER --shelf SHELF"  # a quarter of an hour; tests/benchmarks/leaderboard
+)
 GALLERY = "python -m tools.gallery results/gallery"  # tests/tools/test_gallery.py; minutes of rendering
 # Without arguments these begin to bake the body.
 BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")

@@ -145,7 +145,9 @@ def result(correct, counted=10, frames=50):
     }
     correct = np.broadcast_to(correct, (frames, 2))
     time = (np.arange(frames) / 25.0).tolist()
-    return {"time": time, "correct": correct.tolist(), "counted": [[counted, counted]] * frames, "summary": summary}
+    counts = {"correct": correct.tolist(), "counted": [[counted, counted]] * frames}
+    fewer = {"2": {"correct": (3 * correct - 1).tolist(), "counted": [[3 * counted, 3 * counted]] * frames}}
+    return {"time": time, **counts, "fewer": fewer, "summary": summary}
 
 
 def test_pcp_of_a_recording_is_that_of_its_parts_with_equal_weight_of_actors():
@@ -156,6 +158,7 @@ def test_pcp_of_a_recording_is_that_of_its_parts_with_equal_weight_of_actors():
     figures = recording_figures({"full": result([10, 5]), "ransac": result([9, 5])}, [FULL, RANSAC])
     assert figure(figures, "full", ALL, "pcp").value == pytest.approx(75.0)
     assert figure(figures, "ransac", "actor 1", "pcp").value == pytest.approx(90.0)
+    assert figure(figures, "full", "2 cameras", "pcp").value == pytest.approx((29 + 14) / 60 * 100)
     found = figure(figures, "ransac", ALL, DIFFERENCE)
     assert [found.value, found.low, found.high] == pytest.approx([-5.0, -5.0, -5.0])  # the same in all blocks
     assert found.n == 2
@@ -179,6 +182,11 @@ def test_finished_methods_of_a_recording_are_kept(tmp_path):
     first = evaluated(recording, [FAST, RANSAC], tmp_path, steps.append)
     assert steps == [1, 1]
     assert figure(first, "ransac", ALL, "pcp").value == 100.0
+    assert [figure(first, "fast", f"{count} cameras", "pcp").value for count in (2, 3)] == [100.0, 100.0]
+    (kept,) = tmp_path.glob("fast-*.json")
+    assert (
+        np.sum(json.loads(kept.read_text())["fewer"]["2"]["counted"]) == 6 * 3 * 2 * 10
+    )  # sets, frames, people, parts
     assert len(COCO17) == scenes[0].joints.shape[1]
     files = {file: file.stat().st_mtime_ns for file in tmp_path.iterdir()}
     assert len(files) == 2
