@@ -142,7 +142,7 @@ LOOP = "python -m benchmarks.fit FOLDER"  # half an hour; tests/benchmarks/fit/t
 OUT_OF_SAMPLE = "python -m benchmarks.fit FOLDER --out-of-sample"  # tests/benchmarks/fit/test_closed_loop.py
 HUNT = "python -m benchmarks.hunt benchmarks/hunt/room.toml FOLDER --trials 96 --method lhs"  # tests/benchmarks/hunt
 # tests/simharness/outputs/benchmark/test_submission.py
-SCORED = ("simharness score SUBMISSION benchmark/gathering", "simharness score FILE benchmark/passage")
+SCORED = ("simharness score SUBMISSION benchmark/gathering", "simharness score FILE benchmark/gathering")
 SEED_SCORES = "python -m tools.paper_tables.seed_scores"  # tests/tools/test_seed_scores.py
 LEADERBOARD = (
     "python -m benchmarks.leaderboard FOLDER --shelf SHELF"  # a quarter of an hour; tests/benchmarks/leaderboard
