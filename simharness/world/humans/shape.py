@@ -1,6 +1,7 @@
 """Shape parameters of a human body.
 
-Limb lengths: stretch a rest body along its limb bones, using the skinning weights.
+Limb lengths and widths: stretch a rest body along its limb bones, and chest and pelvis sideways, with the skinning
+weights.
 
 In anny the limb lengths follow from the other phenotypes, and the forearms of its women are too short. So limb
 lengths are separate parameters here.
@@ -25,8 +26,15 @@ _CHAINS: Mapping[str, tuple[str, tuple[str, ...], str]] = MappingProxyType(
         "shank": ("Leg", (), "Foot"),
     }
 )
-LIMBS: tuple[str, ...] = tuple(_CHAINS)
-"""Limbs with a length factor, which holds for both sides."""
+# For every width: the bones that are stretched sideways, and the bone at its ends.
+_WIDTHS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
+    {
+        "shoulders": (("Spine1", "LeftShoulder", "RightShoulder"), "Arm"),
+        "hips": (("Hips", "LHipJoint", "RHipJoint"), "UpLeg"),
+    }
+)
+STRETCHED: tuple[str, ...] = (*_CHAINS, *_WIDTHS)
+"""Limbs and widths with a length factor, which holds for both sides."""
 
 
 def limb_stretches(
@@ -36,7 +44,7 @@ def limb_stretches(
 
     Args:
         heads: start points of the bones, (B, 3) metres.
-        factors: length factor of every limb in ``LIMBS``.
+        factors: factor of every length in ``STRETCHED``.
         bones: bone names, parents before children.
         parents: index of the parent of every bone, -1 for the pelvis.
 
@@ -47,16 +55,21 @@ def limb_stretches(
     index = {bone: i for i, bone in enumerate(bones)}
     for limb, (first, others, last) in _CHAINS.items():
         for side in ("Left", "Right"):
-            axis = heads[index[side + last]] - heads[index[side + first]]
-            stretch = np.eye(3) + (factors[limb] - 1) * np.outer(axis, axis) / (axis @ axis)
-            for bone in (first, *others):
-                linear[index[side + bone]] = stretch
+            along = heads[index[side + last]] - heads[index[side + first]]
+            linear[[index[side + bone] for bone in (first, *others)]] = _stretch(along, factors[limb])
+    for width, (stretched, last) in _WIDTHS.items():
+        across = heads[index["Left" + last]] - heads[index["Right" + last]]
+        linear[[index[bone] for bone in stretched]] = _stretch(across, factors[width])
     moved = heads.copy()
     for child, parent in enumerate(parents):
         if parent >= 0:
             moved[child] = moved[parent] + linear[parent] @ (heads[child] - heads[parent])
     shift = moved - np.einsum("brc,bc->br", linear, heads)
     return np.concatenate([linear, shift[..., None]], axis=2).astype(np.float32), moved
+
+
+def _stretch(axis: Floats, factor: float) -> Floats:
+    return np.eye(3) + (factor - 1) * np.outer(axis, axis) / (axis @ axis)
 
 
 def stretch_vertices(
@@ -76,7 +89,7 @@ LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
         "weight": (-0.5, 2.5),
         "height": (0.0, 1.0),
         "proportions": (0.0, 1.0),
-        **dict.fromkeys(("upper_arm", "forearm", "thigh", "shank"), (0.6, 1.6)),
+        **dict.fromkeys(STRETCHED, (0.6, 1.6)),
     }
 )
 """Least and greatest value of every shape parameter."""
@@ -95,6 +108,7 @@ class Shape:
         height: 0 to 1, not in metres; :func:`simharness.world.humans.population.fit_shape` finds it for a stature.
         proportions: 0 ideal to 1 uncommon.
         upper_arm, forearm, thigh, shank: factors on the limb lengths of anny.
+        shoulders, hips: factors on the widths of its chest and pelvis.
 
     Raises:
         ValueError: a value is out of its range in ``LIMITS``.
@@ -110,6 +124,8 @@ class Shape:
     forearm: float = 1.0
     thigh: float = 1.0
     shank: float = 1.0
+    shoulders: float = 1.0
+    hips: float = 1.0
 
     def __post_init__(self) -> None:
         for entry in fields(self):

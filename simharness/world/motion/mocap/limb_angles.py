@@ -67,7 +67,7 @@ def arm_angles(upper: Floats, fore: Floats, hand: Floats | None, thumb: Floats |
 def thigh_and_shank(thigh: Floats, shank: Floats) -> Floats:
     """Return hip flexion, abduction and rotation and knee flexion, (T, 4), from directions (T, 3)."""
     flexion, abduction = np.arctan2(thigh[:, 0], -thigh[:, 2]), np.arcsin(np.clip(thigh[:, 1], -1, 1))
-    inner = _into(_turn(-_Y, flexion) @ _turn(_X, abduction), shank)
+    inner = into(_turn(-_Y, flexion) @ _turn(_X, abduction), shank)
     knee = np.arctan2(np.hypot(inner[:, 0], inner[:, 1]), -inner[:, 2])
     # The twist of a straight knee is undetermined; it fades in as the knee bends.
     rotation = np.arctan2(inner[:, 1] * np.sin(knee), 0.02 + np.maximum(-inner[:, 0], 0.0) * np.sin(knee))
@@ -129,7 +129,8 @@ def smooth_step(normal: Floats, right: Floats, values: Floats, *, weight: float)
             banded[j - i, i::count] = normal[:, i, j]
     for gap in range(3):
         banded[gap * count] += weight**2 * np.repeat(smooth[gap], count)
-    right = right - weight**2 * _apply(smooth, values)
+    curvature = np.pad(np.diff(values, 2, axis=0), ((2, 2), (0, 0)))
+    right = right - weight**2 * np.diff(curvature, 2, axis=0)[:frames]
     return np.asarray(solveh_banded(banded, right.ravel(), lower=True)).reshape(frames, count)
 
 
@@ -144,17 +145,6 @@ def _second_differences(frames: int) -> Floats:
     return bands
 
 
-def _apply(bands: Floats, values: Floats) -> Floats:
-    """Return the symmetric matrix with lower bands (3, T) times values (T, n)."""
-    result = bands[0][:, None] * values
-    for gap in (1, 2):
-        weight = bands[gap][: len(values) - gap, None] if len(values) > gap else np.zeros((0, 1))
-        if len(weight):
-            result[gap:] += weight * values[:-gap]
-            result[:-gap] += weight * values[gap:]
-    return result
-
-
 def _euler(upper: Floats, fore: Floats) -> Floats:
     """Return the two solutions for shoulder flexion, abduction, rotation and elbow flexion, (2, T, 4)."""
     sets = []
@@ -162,7 +152,7 @@ def _euler(upper: Floats, fore: Floats) -> Floats:
         flexion, abduction = np.arctan2(upper[:, 0], -upper[:, 2]), np.arcsin(np.clip(upper[:, 1], -1, 1))
         if over:
             flexion, abduction = flexion + np.pi, np.pi - abduction
-        inner = _into(_turn(-_Y, flexion) @ _turn(_X, abduction), fore)
+        inner = into(_turn(-_Y, flexion) @ _turn(_X, abduction), fore)
         elbow = np.arccos(np.clip(-inner[:, 2], -1, 1))
         sets.append(np.stack([flexion, abduction, np.arctan2(-inner[:, 1], inner[:, 0]), elbow], axis=-1))
     return np.stack(sets)
@@ -200,6 +190,6 @@ def _turn(axis: Floats, angle: Floats) -> Floats:
     return Rotation.from_rotvec(angle[:, None] * axis).as_matrix()
 
 
-def _into(turn: Floats, vector: Floats) -> Floats:
+def into(turn: Floats, vector: Floats) -> Floats:
     """Transform vectors (T, 3) into rotated frames (T, 3, 3)."""
     return (turn.swapaxes(1, 2) @ vector[..., None])[..., 0]

@@ -3,7 +3,7 @@
 Files are of any format of :mod:`mvpose.formats.people` that is read. All joints of COCO-17 have to be known in all
 frames, because bodies cannot be nowhere.
 
-Bodies that re-enact them have their limb lengths.
+Bodies that re-enact them have their limb lengths, and their shoulders and hips are as wide.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from mvpose.recording import People
 from mvpose.skeleton import COCO17
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.world.humans.body import body_model, make_body
-from simharness.world.humans.shape import LIMBS, LIMITS, Shape
+from simharness.world.humans.shape import LIMITS, STRETCHED, Shape
 from simharness.world.motion.mocap.reenactment import follow
 from simharness.world.motion.poses.kinematics import Kinematics
 
@@ -104,7 +104,7 @@ def recorded_shape(shape: Shape, people: People, person: int) -> Shape:
     lengths are compared while the body performs the recorded poses, and corrected once.
 
     Args:
-        shape: drawn shape; parameters other than stature and limb lengths are kept.
+        shape: drawn shape; parameters other than stature, limb lengths and widths are kept.
         people: people who are re-enacted.
         person: column of the person in them.
     """
@@ -124,14 +124,15 @@ _ENDS = {
     "thigh": ("hip", "knee"),
     "shank": ("knee", "ankle"),
 }
-_RAISED = 1.037  # trunk length at rest, with the arms of an A pose, over that with hanging arms: shoulders rise
-_ROUNDS = 3  # of limb factors: lengths between COCO-17 joints are almost proportional to them
+_WIDTHS = {"shoulders": "shoulder", "hips": "hip"}
+_AT_REST = {"trunk": 1.037, "hips": 1.038}  # lengths with raised arms and legs astride over those of a standing person
+_ROUNDS = 6  # of factors: limb lengths between COCO-17 joints are almost proportional to them, widths less so
 
 
 def body_lengths(joints: ArrayLike) -> dict[str, float]:
-    """Return the median lengths of trunk, upper arm, forearm, thigh and shank, metres.
+    """Return the median lengths of trunk, upper arm, forearm, thigh and shank, and the widths of shoulders and hips.
 
-    The trunk reaches from mid-hips to mid-shoulders; the length of a limb is that of both sides.
+    In metres. The trunk reaches from mid-hips to mid-shoulders; the length of a limb is that of both sides.
 
     Args:
         joints: COCO-17 joints over time, (T, 17, 3) metres.
@@ -145,19 +146,22 @@ def body_lengths(joints: ArrayLike) -> dict[str, float]:
     lengths = {"trunk": float(np.median(np.linalg.norm(trunk, axis=-1)))}
     for limb, (start, end) in _ENDS.items():
         lengths[limb] = float(np.median(np.linalg.norm(place(end) - place(start), axis=-1)))
+    for width, name in _WIDTHS.items():
+        lengths[width] = float(np.median(np.linalg.norm(np.subtract(*place(name)), axis=-1)))
     return lengths
 
 
 def resize(shape: Shape, lengths: Mapping[str, float]) -> Shape:
-    """Return the shape with stature and limb lengths changed so that its body has the lengths, as far as any body has.
+    """Return the shape with stature, limb lengths and widths changed so that its body has them, as far as any body has.
 
     Args:
         shape: initial shape; its other parameters are kept.
-        lengths: trunk and limb lengths with hanging arms, see :func:`body_lengths`.
+        lengths: trunk, limbs and widths with hanging arms, see :func:`body_lengths`.
     """
+    lengths = {name: value * _AT_REST.get(name, 1.0) for name, value in lengths.items()}
 
     def trunk(height: float) -> float:
-        return _at_rest(replace(shape, height=height))["trunk"] - _RAISED * lengths["trunk"]
+        return _at_rest(replace(shape, height=height))["trunk"] - lengths["trunk"]
 
     low, high = LIMITS["height"]
     if trunk(low) >= 0:
@@ -169,8 +173,8 @@ def resize(shape: Shape, lengths: Mapping[str, float]) -> Shape:
     shape = replace(shape, height=height)
     for _ in range(_ROUNDS):
         present = _at_rest(shape)
-        factors = {limb: getattr(shape, limb) * lengths[limb] / present[limb] for limb in LIMBS}
-        shape = replace(shape, **{limb: float(np.clip(value, *LIMITS[limb])) for limb, value in factors.items()})
+        factors = {name: getattr(shape, name) * lengths[name] / present[name] for name in STRETCHED}
+        shape = replace(shape, **{name: float(np.clip(value, *LIMITS[name])) for name, value in factors.items()})
     return shape
 
 

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import DOFS, SIDES
 from simharness.world.motion.mocap.foot_contact import FootPath, detect_stances, make_sole, plant_foot
-from simharness.world.motion.mocap.limb_angles import ARM, arm_angles, thigh_and_shank
+from simharness.world.motion.mocap.limb_angles import ARM, arm_angles, into, thigh_and_shank
 from simharness.world.motion.mocap.skeleton import JointMap, RecordedMotion, map_joints
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.inverse_kinematics import pelvis_height
@@ -118,7 +118,7 @@ def tilt_pelvis(pelvis: Floats, segments: dict[tuple[str, str], Floats], *, rate
 def _hip_and_knee(pelvis: Floats, segments: dict[tuple[str, str], Floats], side: str) -> Floats:
     """Return the recorded hip flexion, abduction and rotation and knee flexion, (N, 4)."""
     mirror = _MIRROR if side == "right" else np.ones(3)
-    thigh, shank = (_into(pelvis, segments[side, part]) * mirror for part in ("thigh", "shank"))
+    thigh, shank = (into(pelvis, segments[side, part]) * mirror for part in ("thigh", "shank"))
     unit = [vector / np.linalg.norm(vector, axis=1, keepdims=True) for vector in (thigh, shank)]
     return thigh_and_shank(*unit)
 
@@ -215,11 +215,11 @@ def _leg(kinematics: Kinematics, side: str, position: Floats, pelvis: Floats, st
         """Return leg angles with the foot as near as possible to orientations (N, 3, 3), and the actual ones."""
         turn = wanted
         for _ in range(_REFITS):
-            ankle = _into(pelvis, step.ankle(turn) - position)
+            ankle = into(pelvis, step.ankle(turn) - position)
             angles = chain.solve(to_pelvis @ wanted, ankle, start=angles, turn_weight=_TURN_WEIGHT)
             reached, place = chain.forward(angles)
             turn = pelvis @ reached
-            if np.abs(place - _into(pelvis, step.ankle(turn) - position)).max() < _TOLERANCE:
+            if np.abs(place - into(pelvis, step.ankle(turn) - position)).max() < _TOLERANCE:
                 break
         return angles, turn
 
@@ -280,7 +280,7 @@ def _arm(recorded: SourceMotion, trunk: Floats, side: str, angles: Floats, shrug
     def direction(vectors: Floats) -> Floats:
         """Return world vectors (N, 3) as unit vectors in the trunk frame, mirrored to the left side."""
         length = np.linalg.norm(vectors, axis=1, keepdims=True)
-        return _into(trunk, vectors / np.where(length > 0, length, 1.0)) * mirror
+        return into(trunk, vectors / np.where(length > 0, length, 1.0)) * mirror
 
     upper, fore = (direction(recorded.segments[side, part]) for part in ("arm", "forearm"))
     hand = thumb = None
@@ -296,8 +296,3 @@ def _arm(recorded: SourceMotion, trunk: Floats, side: str, angles: Floats, shrug
     angles[:, DOFS.index(f"{side}_clavicle_elevation")] = rise
     columns = [DOFS.index(f"{side}_{name}") for name in ARM]
     angles[:, columns] = arm_angles(aims[0], aims[1], aims[2], aims[3])
-
-
-def _into(turn: Floats, vector: Floats) -> Floats:
-    """Transform vectors (N, 3) into rotated frames (N, 3, 3)."""
-    return (turn.swapaxes(1, 2) @ vector[..., None])[..., 0]

@@ -1,6 +1,6 @@
 """Re-enactment of simulated people from their own COCO-17 joints: places, poses, facing directions and body sizes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -117,6 +117,18 @@ def test_bodies_have_the_recorded_size(recorded):
         for name in wanted:
             assert performed[name] == pytest.approx(wanted[name], rel=0.03), (k, name)
         assert mover.body.stature == pytest.approx(performer(k).body.stature, abs=0.05)
+
+
+@pytest.mark.parametrize(("person", "shoulders", "hips"), [(0, 0.8, 1.25), (1, 1.2, 0.8), (4, 1.3, 0.8)])
+def test_bodies_are_as_wide_as_the_recorded_one(recorded, person, shoulders, hips):
+    wide = Kinematics(make_body(replace(performer(person).body.shape, shoulders=shoulders, hips=hips)))
+    joints = wide.joints(recorded.originals[person])
+    tracks = people_at(RATE, joints[:, None])
+    mover = Kinematics(make_body(recorded_shape(draw_shape(stream(70 + person, "other")), tracks, 0)))
+    performed, wanted = body_lengths(mover.joints(reenact(tracks, 0, mover, time=TIME))), body_lengths(joints)
+    for name in ("shoulders", "hips"):
+        assert performed[name] == pytest.approx(wanted[name], abs=0.003)
+        assert abs(performed[name] - body_lengths(recorded.joints[:, person])[name]) > 0.02
 
 
 def test_feet_stand_on_the_floor(recorded):
