@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Rig
 from mvpose.kernels import njit
-from simharness.detector.draws import ErrorDraws, with_parents
+from simharness.detector.draws import IN_TREE, ErrorDraws, with_parents
 from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE, SIDE, VISIBLE, Conditions, head_bearings
 from simharness.scenario.sections.detector_section import (
     BEARINGS,
@@ -90,10 +90,24 @@ class ReportedJoints:
         unit = self._conditions.unit[:, :, person]
         if not self._border:
             return np.zeros(unit.shape, bool)
-        target = self._target[:, :, person]
-        away = target - np.clip(target, 0.0, self._last)
-        with np.errstate(invalid="ignore"):
-            return np.hypot(away[..., 0], away[..., 1]) <= self._border * unit
+        return beyond_border(self._target[:, :, person], unit, self._last) <= self._border
+
+
+def beyond_border(joints: Floats, unit: Floats, last: Floats) -> Floats:
+    """Return the distance of joints in pictures from the image, (..., J); 0 inside.
+
+    In mean units of the limb joints, also for the face: how far beyond the border a network sees depends on the size of
+    people, not on how exactly joints are annotated.
+
+    Args:
+        joints: (..., J, 2) pixels.
+        unit: OKS sigma x sqrt(area) of each, (..., J) pixels.
+        last: last columns and rows, which pair with the joints.
+    """
+    away = joints - np.clip(joints, 0.0, last)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        far = np.hypot(away[..., 0], away[..., 1]) / unit[..., IN_TREE].mean(axis=-1, keepdims=True)
+    return np.nan_to_num(far, nan=np.inf)
 
 
 def last_pixels(rig: Rig) -> Floats:

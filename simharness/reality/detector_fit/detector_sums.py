@@ -149,7 +149,8 @@ class FrameSums(NamedTuple):
     bones: BoneSums
     """Lengths of limbs."""
     border: Trials
-    """Limb joints outside of the images by distance from the border, (..., B), and those reported, (...)."""
+    """Limb joints outside of the images with a reported parent, and those reported, by distance from the border,
+    (..., B)."""
     outside: Trials
     """The same joints by kind, (..., 9)."""
 

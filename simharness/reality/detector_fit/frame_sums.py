@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Bools, Floats
-from simharness.detector.draws import GROSS, LIMB_OF_JOINT
+from simharness.detector.draws import GROSS, LIMB_OF_JOINT, PARENT
 from simharness.detector.error_classes import MIRROR
 from simharness.detector.viewing_conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.reality.detector_fit import detector_sums
@@ -38,7 +38,7 @@ BONES = ((5, 7), (6, 8), (7, 9), (8, 10), (11, 13), (12, 14), (13, 15), (14, 16)
 NEAR = (*BONES, (5, 11), (6, 12))
 """Limb joints that are one bone apart along the skeleton."""
 
-BORDER = np.linspace(0.0, 6.0, 25)
+BORDER = np.linspace(0.0, 6.0, 49)
 """Edges of the histogram of distances from the border of the image, units."""
 
 APART = np.linspace(0.0, 0.6, 31)
@@ -330,10 +330,11 @@ def _border(labels: LabelledJoints) -> tuple[detector_sums.Trials, detector_sums
     outside = (labels.association.detected & labels.known[:, None])[..., None] & ~labels.inside
     outside[..., : LIMB_JOINTS[0]] = False
     bins = np.digitize(labels.beyond, BORDER[1:-1])[..., None] == np.arange(len(BORDER) - 1)
-    reported = outside & (labels.association.scores > 0)
-    by_distance = (bins & outside[..., None]).sum(axis=(1, 2, 3)).astype(float)
-    border = detector_sums.Trials(by_distance, reported.sum(axis=(1, 2, 3)).astype(float))
-    return border, detector_sums.Trials(_by_kind(outside), _by_kind(reported))
+    shown = labels.association.scores > 0
+    reached = outside & ((PARENT < 0) | shown[..., PARENT])  # the others are lost with their parents
+    border = (bins & which[..., None] for which in (reached, reached & shown))
+    by_distance = (each.sum(axis=(1, 2, 3)).astype(float) for each in border)
+    return detector_sums.Trials(*by_distance), detector_sums.Trials(_by_kind(outside), _by_kind(outside & shown))
 
 
 def _people(labels: LabelledJoints) -> detector_sums.PeopleSums:

@@ -15,6 +15,7 @@ from mvpose import Rig
 from mvpose.arrays import Bools, Floats
 from simharness.detector.draws import PARENT
 from simharness.detector.error_classes import MIRROR, classify, distinguishable, opposite_hits
+from simharness.detector.reported import beyond_border, last_pixels
 from simharness.detector.viewing_conditions import (
     OUTSIDE,
     OVERLAP_MIN,
@@ -70,7 +71,7 @@ class LabelledJoints:
     inside: Bools
     """Joints inside of the image, as the sample places them, (T, V, P, 17)."""
     beyond: Floats
-    """Distance of joints outside of the image from its border, units, (T, V, P, 17)."""
+    """Distance of joints outside of the image from its border, units of limb joints, (T, V, P, 17)."""
     expected: Bools
     """People who should be detected, (T, V, P): known people with half of the limb joints in the picture."""
     error: NDArray[np.int8]
@@ -126,7 +127,7 @@ def label_joints(sample: Sample) -> LabelledJoints:
         occlusion=np.where(occlusion == OUTSIDE, np.int8(VISIBLE), occlusion),
         bearing=bearing_bins(staged, rig),
         inside=inside,
-        beyond=beyond_border(staged, unit, rig),
+        beyond=beyond_border(_project(staged, rig), unit, last_pixels(rig)[:, None]),
         expected=expected_people(sample.known, inside),
         error=error,
         risk=classes.risk,
@@ -220,17 +221,6 @@ def _without_noise(residual: Floats, unit: Floats, consensus: Consensus) -> Floa
         variance = np.nansum(alike, axis=(0, 1, 2)) @ _OF_KIND / known / 2  # of each kind of joint, per axis
     usual = square < _USUAL**2 * variance[list(KIND_OF_JOINT)] * factor
     return np.where(usual[..., None], residual / np.sqrt(factor)[..., None], residual)
-
-
-def beyond_border(joints: Floats, unit: Floats, rig: Rig) -> Floats:
-    """Return the distance of joints (T, P, 17, 3) from the image in units, (T, V, P, 17); 0 inside."""
-    far = []
-    for camera in rig:
-        pixels = camera.project(joints)
-        away = pixels - np.clip(pixels, 0.0, np.array(camera.size) - 1.0)
-        far.append(np.hypot(away[..., 0], away[..., 1]))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.nan_to_num(np.stack(far, axis=1) / unit, nan=np.inf)
 
 
 def bearing_bins(joints: Floats, rig: Rig) -> NDArray[np.int64]:

@@ -202,11 +202,10 @@ def _jitter_mean(sums: FrameSums) -> Floats:
 
 
 def _border(sums: FrameSums) -> Floats:
-    """Return the distance outside of the image, units, within which as many joints lie as are reported, (R,)."""
+    """Return the distance outside of the image, units, that best parts the reported joints from the others, (R,)."""
     n, k = sums.border.n, sums.border.k
-    below = np.concatenate([np.zeros((len(n), 1)), np.cumsum(n, axis=-1)], axis=-1)
-    reach = np.array([np.interp(count, row, BORDER) for count, row in zip(k, below + 1e-9 * BORDER, strict=True)])
-    return np.where(below[:, -1] >= _MIN_OUTSIDE, reach, np.nan)
+    wrong = np.concatenate([np.zeros((len(n), 1)), np.cumsum(n - 2 * k, axis=-1)], axis=-1)
+    return np.where(n.sum(axis=-1) >= _MIN_OUTSIDE, BORDER[wrong.argmin(axis=-1)], np.nan)
 
 
 def _inversion_reach(sums: FrameSums) -> Floats:

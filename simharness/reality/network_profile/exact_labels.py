@@ -15,6 +15,7 @@ from mvpose.skeleton import COCO17
 from simharness.detector.detect import Detected
 from simharness.detector.error_classes import classify
 from simharness.detector.false_positives import MIN_JOINTS
+from simharness.detector.reported import beyond_border, last_pixels
 from simharness.detector.viewing_conditions import OUTSIDE, VISIBLE, Conditions, image_axes, overlaps, pixel_offsets
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.association import Association
@@ -22,7 +23,6 @@ from simharness.reality.detector_fit.consensus import Consensus
 from simharness.reality.detector_fit.joint_labels import (
     LabelledJoints,
     bearing_bins,
-    beyond_border,
     error_classes,
     expected_people,
 )
@@ -203,7 +203,7 @@ def _labels(
         occlusion=np.where(inside, conditions.occlusion, np.int8(VISIBLE)),
         bearing=bearing_bins(sequence.joints, rig),
         inside=inside & known[:, None, :, None],
-        beyond=beyond_border(sequence.joints, conditions.unit, rig),
+        beyond=beyond_border(views.pixels, conditions.unit, last_pixels(rig)[:, None]),
         expected=expected_people(known, inside),
         error=error,
         risk=classes.risk,

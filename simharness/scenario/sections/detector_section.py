@@ -196,7 +196,7 @@ class KeypointsSection(Section):
     drop: DropSection = DropSection()
     face: FaceSection = FaceSection()
     guess: GuessSection = GuessSection()
-    border: Factor = key(0.0, "joints up to this many units outside of the image are reported, at its border")
+    border: Factor = key(0.0, "joints up to this many units of limbs outside of the image are reported at its border")
     reach: float = key(4.29, "largest distance of misses, units", ge=2.35, le=20.0)
     stray: Shares = Shares()  # share of misses that lie anywhere in the person's box
     self_occluded: Factors = Factors()  # on jitter and miss of self-occluded joints
