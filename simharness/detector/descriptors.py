@@ -31,7 +31,7 @@ from mvpose.networks.card import read_card_file
 from mvpose.networks.session import check_content
 from simharness.detector.detection_block import Origin
 from simharness.detector.draws import KeyedDraws
-from simharness.detector.viewing_conditions import bearings, hidden_shares
+from simharness.detector.viewing_conditions import bearings, hidden_shares, unit
 from simharness.types.random_streams import stream
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views
@@ -316,7 +316,7 @@ class DescriptorModel:
         signal = np.einsum("nk,nkd->nd", amount, people)  # of unit length except for chance in few dimensions
         common = stream(seed, "descriptor", "cover").standard_normal(size)
         noise_vector = np.sqrt(self.common) * common + np.sqrt(1 - self.common) * np.asarray(noise, float)
-        return _unit(_unit(signal) + strength * noise_vector)
+        return unit(unit(signal) + strength * noise_vector)
 
 
 def _drawn(seed: int, key: tuple[str | int, ...], size: int) -> Floats:
@@ -327,11 +327,6 @@ def _drawn(seed: int, key: tuple[str | int, ...], size: int) -> Floats:
 def _waves(edges: Floats) -> Floats:
     """Return the means of cos t and cos 2t between edges (b + 1,), (b, 2)."""
     return np.stack([np.diff(np.sin(k * edges)) / (k * np.diff(edges)) for k in (1, 2)], axis=-1)
-
-
-def _unit(vectors: Floats) -> Floats:
-    """Return vectors (n, D) scaled to unit length."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
 def _unevenly(normal: Floats, uneven: float) -> Floats:

@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from mvpose.arrays import Floats
 from mvpose.files.message_text import one_line
 from mvpose.formats.joint_names import KNOWN, to_skeleton
 from mvpose.formats.people import read_people
 from mvpose.recording import People
 from mvpose.skeleton import COCO17
 from simharness.scenario.sections.people_section import PeopleSection
+from simharness.world.humans.anatomy import SIDES
 from simharness.world.humans.body import body_model, make_body
 from simharness.world.humans.shape import LIMITS, STRETCHED, Shape
-from simharness.world.motion.mocap.reenactment import follow
+from simharness.world.motion.mocap.reenactment import across, follow, middle, segment
 from simharness.world.motion.poses.kinematics import Kinematics
 
 TRUNK = (0.15, 0.9)
@@ -118,13 +118,6 @@ def recorded_shape(shape: Shape, people: People, person: int) -> Shape:
     return resize(shape, {name: recorded[name] * wanted[name] / performed[name] for name in recorded})
 
 
-_ENDS = {
-    "upper_arm": ("shoulder", "elbow"),
-    "forearm": ("elbow", "wrist"),
-    "thigh": ("hip", "knee"),
-    "shank": ("knee", "ankle"),
-}
-_WIDTHS = {"shoulders": "shoulder", "hips": "hip"}
 _AT_REST = {"trunk": 1.037, "hips": 1.038}  # lengths with raised arms and legs astride over those of a standing person
 _ROUNDS = 6  # of factors: limb lengths between COCO-17 joints are almost proportional to them, widths less so
 
@@ -138,17 +131,11 @@ def body_lengths(joints: ArrayLike) -> dict[str, float]:
         joints: COCO-17 joints over time, (T, 17, 3) metres.
     """
     joints = np.asarray(joints, float)
-
-    def place(name: str) -> Floats:
-        return np.stack([joints[:, COCO17.index(f"{side}_{name}")] for side in ("left", "right")])
-
-    trunk = place("shoulder").mean(axis=0) - place("hip").mean(axis=0)
-    lengths = {"trunk": float(np.median(np.linalg.norm(trunk, axis=-1)))}
-    for limb, (start, end) in _ENDS.items():
-        lengths[limb] = float(np.median(np.linalg.norm(place(end) - place(start), axis=-1)))
-    for width, name in _WIDTHS.items():
-        lengths[width] = float(np.median(np.linalg.norm(np.subtract(*place(name)), axis=-1)))
-    return lengths
+    spans = {"trunk": [middle(joints, "shoulder") - middle(joints, "hip")]}
+    for limb in ("upper_arm", "forearm", "thigh", "shank"):
+        spans[limb] = [segment(joints, side, limb.removeprefix("upper_")) for side in SIDES]
+    spans |= {width: [across(joints, width.removesuffix("s"))] for width in ("shoulders", "hips")}
+    return {name: float(np.median(np.linalg.norm(span, axis=-1))) for name, span in spans.items()}
 
 
 def resize(shape: Shape, lengths: Mapping[str, float]) -> Shape:

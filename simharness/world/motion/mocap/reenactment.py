@@ -111,6 +111,11 @@ def middle(joints: Floats, name: str) -> Floats:
     return (joint(joints, f"left_{name}") + joint(joints, f"right_{name}")) / 2
 
 
+def across(joints: Floats, name: str) -> Floats:
+    """Return the vector (..., 3) from the right to the left joint of a name."""
+    return joint(joints, f"left_{name}") - joint(joints, f"right_{name}")
+
+
 def segment(joints: Floats, side: str, name: str) -> Floats:
     """Return the vector (..., 3) along a segment of ``SEGMENTS``."""
     start, end = SEGMENTS[name]
@@ -120,13 +125,13 @@ def segment(joints: Floats, side: str, name: str) -> Floats:
 def chest_turn(joints: Floats) -> Floats:
     """Return the orientation of the chest: up from mid-hips to mid-shoulders, left along the shoulders."""
     up = unit(middle(joints, "shoulder") - middle(joints, "hip"))
-    left = _perpendicular(_across(joints, "shoulder"), up)
+    left = _perpendicular(across(joints, "shoulder"), up)
     return np.stack([np.cross(left, up), left, up], axis=-1)
 
 
 def pelvis_turn(joints: Floats) -> Floats:
     """Return the orientation of the pelvis: left along the hips, and pitched between trunk, thighs and vertical."""
-    left = unit(_across(joints, "hip"))
+    left = unit(across(joints, "hip"))
     up = _perpendicular(middle(joints, "shoulder") - middle(joints, "hip"), left)
     along_trunk = np.stack([np.cross(left, up), left, up], axis=-1)
 
@@ -187,10 +192,6 @@ def unit(vector: Floats) -> Floats:
     """Return vectors (..., 3) with unit length; a vector without length stays zero."""
     length = np.linalg.norm(vector, axis=-1, keepdims=True)
     return vector / np.where(length > 0, length, 1.0)
-
-
-def _across(joints: Floats, name: str) -> Floats:
-    return joint(joints, f"left_{name}") - joint(joints, f"right_{name}")
 
 
 def _perpendicular(vector: Floats, axis: Floats) -> Floats:
