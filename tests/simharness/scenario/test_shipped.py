@@ -26,6 +26,7 @@ STUDIES = [
     "clutter",
     "crowd",
     "detector",
+    "failure_modes",
     "look_alike",
     "panoptic",
     "phantoms",
