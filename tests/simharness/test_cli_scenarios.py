@@ -145,7 +145,7 @@ class TestNames:
             ["show"],
             ["study"],
             ["check", "--baseline", "baseline.json"],
-            ["evaluate", "seeds"],
+            ["mjcf"],
         ],
     )
     def test_every_command_refuses_an_unknown_name_with_the_nearest(self, simharness, tmp_path, command):

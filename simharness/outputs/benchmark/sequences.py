@@ -134,7 +134,7 @@ def _describe(scenario: Scenario, folder: Path, command: str | None) -> None:
     about |= {"description": scenario.description, "sequences": sequences, "truth_sha256": digest.hexdigest()}
     about["provenance"] = provenance(command=command, seeds=seeds, variants=[], seconds=0.0)
     write_atomic(folder / "benchmark.json", _json(about))
-    metadata = json.loads(read_bytes(_DATA / "croissant.json", what="the metadata"))
+    metadata = read_json_object(_DATA / "croissant.json", what="the metadata")
     metadata |= {"name": scenario.name, "description": scenario.description or f"Scenario {scenario.name}"}
     metadata["distribution"][0]["sha256"] = hashlib.sha256(_json(about)).hexdigest()
     write_atomic(folder / "croissant.json", _json(metadata))
