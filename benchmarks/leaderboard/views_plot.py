@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from mvpose.report.svg_plots import VARIANT_COLORS, svg_plot
-from simharness.outputs.study.plots import spread_apart
+from simharness.outputs.study.plots import label_lines
 from simharness.statistics.intervals import Interval
 
 _SIZE = (4.8, 3.7)  # inches of 72 px
 _TICKS = (0.0, 50.0, 70.0, 80.0, 90.0, 95.0, 98.0, 99.0, 99.5, 99.8, 99.9)
 _LEAST_WRONG = 0.1  # percent of parts: higher PCP is drawn here, as the scale has no end
 _APART = 0.045  # of lines at one number of views, to see their intervals
-_NAME_HEIGHT = 0.062  # of a name, as a share of the axis
 _DASHES = ("-", (0, (4, 1.6)), (0, (1.4, 1.4)))
 
 
@@ -63,27 +61,9 @@ def views_plot(
         axes.set(xlabel="cameras", ylabel="PCP, % (scale: log of wrong parts)")
         axes.grid(axis="y")
         axes.figure.suptitle(title, fontsize=10, fontweight="bold")
-        _name_lines(axes, ends)
+        label_lines(axes, ends)
     return written[0]
 
 
 def _wrong(pcp: float) -> float:
     return max(100.0 - pcp, _LEAST_WRONG)
-
-
-def _name_lines(axes: Axes, ends: Sequence[tuple[str, str, float, float]]) -> None:
-    """Write the name of each line behind its end; names do not overlap."""
-    bottom, top = (np.log(each) for each in axes.get_ylim())
-    heights = np.array([(np.log(y) - bottom) / (top - bottom) for *_, y in ends])
-    for (name, color, x, y), height in zip(ends, spread_apart(heights, _NAME_HEIGHT), strict=True):
-        axes.annotate(
-            name,
-            (x, y),
-            xytext=(1.05, height),
-            textcoords="axes fraction",
-            va="center",
-            fontsize=8.5,
-            color=color,
-            annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": color, "lw": 0.7, "alpha": 0.7, "shrinkA": 1, "shrinkB": 3},
-        )

@@ -82,7 +82,7 @@ def curve(
             if len(known):
                 ends.append((variant, color, float(at[known[-1]]), float(mean[known[-1]])))
         if len(lines) > 1:
-            _label_lines(axes, ends)
+            label_lines(axes, ends)
         axes.set(xlabel="\n".join(below), ylabel=f"{score.title}, {score.unit}" if score.unit else score.title)
         if title:
             axes.figure.suptitle(title, fontsize=10, fontweight="bold")
@@ -108,15 +108,14 @@ def _beside_each_other(axes: Axes, places: Floats, index: int, count: int, numer
     return places + apart * (np.ptp(places) or 1.0)
 
 
-def _label_lines(axes: Axes, ends: Sequence[tuple[str, Color, float, float]]) -> None:
+def label_lines(axes: Axes, ends: Sequence[tuple[str, Color, float, float]]) -> None:
     """Write the name of each line behind its end, with a thin line to it; names do not overlap.
 
     Args:
         axes: plot with its final limits.
         ends: name, colour, and last point of each line.
     """
-    low, high = axes.get_ylim()
-    heights = np.array([(y - low) / (high - low) for *_, y in ends])
+    heights = (axes.transScale + axes.transLimits).transform(np.reshape([end[-2:] for end in ends], (-1, 2)))[:, 1]
     for (name, color, x, y), height in zip(ends, spread_apart(heights, _NAME_HEIGHT), strict=True):
         axes.annotate(
             name,
