@@ -33,7 +33,7 @@ class Wanted:
     )
     formats: str = option(
         "trc,json",
-        "Formats beside poses.parquet and people.json: trc, c3d, csv, panoptic, bvh, gltf, lengths, rrd.",
+        "Formats beside poses.parquet and people.json: trc, c3d, csv, panoptic, bvh, gltf, lengths.",
         "--format",
         metavar="NAME,...",
     )

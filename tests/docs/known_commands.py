@@ -72,7 +72,6 @@ FROM_PICTURES = (  # run by tests/benchmarks/pictures and tests/simharness/reali
 OWN_STUDY = {
     "simharness study my-lab.toml --workers 2": f"{LAB} --seeds 1",
     "simharness study my-lab.toml --seeds 40": f"{LAB} --seeds 2",
-    "simharness report results/studies/my-lab --rerun my-lab.rrd": "",
     "simharness report STUDY --digest FOLDER": "",
 }
 OWN_GATE = (

@@ -155,18 +155,12 @@ def test_the_custom_study_has_the_described_settings(workplace):
 
 @pytest.mark.slow
 def test_the_custom_study(workplace):
-    first, more, recording, digest = OWN_STUDY
+    first, more, digest = OWN_STUDY
     assert "2 trials: 0 kept from before, 2 run, 0 failed" in done(first, OWN_STUDY[first])
     assert "4 trials: 2 kept from before, 2 run, 0 failed" in done(more, OWN_STUDY[more])
     assert (workplace / "results/studies/my-lab/report.html").is_file()
     done(digest.replace("STUDY", "results/studies/my-lab").replace("FOLDER", "kept"))
     assert {"digest.json", "table.md"} <= {path.name for path in (workplace / "kept").iterdir()}
-    if importlib.util.find_spec("rerun"):
-        done(recording)
-        assert (workplace / "my-lab.rrd").stat().st_size
-    else:
-        result = call(recording)
-        assert (result.exit_code, "needs the rerun SDK" in result.stderr) == (2, True)
 
 
 @pytest.mark.slow

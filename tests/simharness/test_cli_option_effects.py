@@ -9,10 +9,7 @@ from simharness.cli import app
 WITHOUT_EFFECT = [
     ("--lag", ["evaluate", "shelf", "--lag", "0.5"]),
     ("--lag", ["evaluate", "shelf", "--method", "fast", "--method", "full", "--lag", "0"]),
-    ("--out", ["report", "results", "--rerun", "worst.rrd", "--out", "page.html"]),
     ("--out", ["report", "results", "--digest", "digest", "--out", "page.html"]),
-    ("--threshold", ["report", "results", "--rerun", "worst.rrd", "--threshold", "pcp=80"]),
-    ("--trial", ["report", "results", "--trial", "1a"]),
     ("--blame", ["report", "results", "--digest", "digest", "--blame", "2"]),
     ("--blame", ["study", "quickstart", "--shard", "1/2", "--blame", "2"]),
     ("--out", ["study", "quickstart", "--shard", "1/2", "--store", "one", "--out", "two"]),

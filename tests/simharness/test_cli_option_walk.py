@@ -136,9 +136,7 @@ ROWS = {
     "report": {
         "out": Row("--out {out}/page.html"),
         "threshold": Row("--threshold pcp=80"),
-        "rerun": Row("--rerun {out}/worst.rrd"),
         "digest": Row("--digest {out}/digest"),
-        "trial": Row("--trial 00000000000000000000000000000003", "--rerun {out}/worst.rrd"),
         "blame": Row("--blame 2"),
     },
     "study": WORKERS
@@ -289,8 +287,6 @@ def _stand_ins(study):
         "simharness.study.study_run": {"run_study": study, "run_shard": None},
         "simharness.outputs.study.page": {"write_report": "report.html"},
         "simharness.outputs.study.digest": {"write_digest": ()},
-        "simharness.outputs.study.rerun_recording": {"require_sdk": (), "write_rerun": ()},
-        "simharness.outputs.study.skeleton_view_3d": {"replay": ()},
         "simharness.reality.detector_fit.fit": {"fit": fitted, "write_profile": ()},
         "simharness.reality.detector_fit.fit_table": dict.fromkeys(printed, ()),
         "simharness.reality.detector_fit.half_check": {"check_halves": figures},

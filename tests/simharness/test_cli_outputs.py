@@ -25,7 +25,6 @@ FILES = {
     "simharness check --baseline": "simharness check ci --update-baseline --baseline {}",
     "simharness blame --json": "simharness blame quickstart --json {}",
     "simharness report --out": "simharness report study --out {}",
-    "simharness report --rerun": "simharness report study --rerun {}",
     "simharness fit-detector --out": "simharness fit-detector shelf --out {}",
     "simharness fit-detector --figure": "simharness fit-detector shelf --figure {}",
     "simharness fit-detector --json": "simharness fit-detector shelf --json {}",

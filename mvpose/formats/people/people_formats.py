@@ -25,7 +25,6 @@ from mvpose.formats.people import (
     people_json,
     people_npz,
     people_tables,
-    rerun,
     trc,
 )
 from mvpose.formats.people.people_files import Export, Options, PeopleFiles, Up
@@ -68,7 +67,6 @@ FORMATS: dict[str, PeopleFormat] = {
     "bvh": PeopleFormat("person_ID.bvh", bvh.write),
     "gltf": PeopleFormat("people.glb", gltf.write),
     "lengths": PeopleFormat("bone_lengths.csv", people_tables.write_lengths),
-    "rrd": PeopleFormat("people.rrd", rerun.write, requires=("rerun",), install="rerun-sdk"),
 }
 """Registered formats by name. Of a folder with files of several formats the first one is read."""
 

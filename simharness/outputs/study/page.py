@@ -133,7 +133,6 @@ def render_study(
         blame_hint=f"simharness report {results.folder} --blame 10",
         shown=shown,
         times=_times(results, variants),
-        study_folder=results.folder,
         study_file=study_file.read_text(encoding="utf-8") if study_file.is_file() else "",
     )
 

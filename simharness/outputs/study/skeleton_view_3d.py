@@ -6,7 +6,6 @@ averaged along each limb: they make a person of joints recognisable, and measure
 The trial is replayed for pictures: scene, detections and estimates, which tables of scores do not hold.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,9 +18,8 @@ from mvpose.report.view_3d import PYRAMID, Piece3D, Scene3D, Shape3D, Style3D, V
 from mvpose.skeleton import COCO17
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.pairing import pair
-from simharness.trial.run_folder import Record
 from simharness.trial.run_trial import run_trial
-from simharness.trial.stages.build_trial import Trial, build_trial
+from simharness.trial.stages.build_trial import Trial
 from simharness.types.truth import Truth
 
 
@@ -59,21 +57,6 @@ def replay(scenario: Scenario, variant: str) -> Replay:
     return Replay(
         result.trial, variant, recording.time, recording.truth, recording.detections, result.estimates[variant]
     )
-
-
-def replay_run(record: Record) -> Replay:
-    """Restore the worst variant of a stored run, the one with the lowest PCP. Only the scene is built again.
-
-    Args:
-        record: from :func:`simharness.trial.run_folder.read_run`.
-
-    Raises:
-        ValueError: the scenario cannot be built any more, for example because a file that it names is missing.
-    """
-    pcp = {name: scores["pcp"] for name, scores in record.summary["variants"].items()}
-    variant = min(record.estimates, key=lambda name: math.inf if pcp[name] is None else pcp[name])
-    trial = build_trial(record.scenario)
-    return Replay(trial, variant, record.time, record.truth, record.detections, record.estimates[variant])
 
 
 MAX_FRAMES = 60

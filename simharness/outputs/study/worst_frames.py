@@ -60,11 +60,11 @@ class WorstFramePictures:
     """Command that renders the trial again; empty where no command gives the same scenario."""
 
 
-def worst_frames(results: Results, *, count: int = SHOWN) -> list[WorstFrame]:
+def worst_frames(results: Results) -> list[WorstFrame]:
     """Return the frames with the highest cost for the first variant with results, by falling cost.
 
     Only frames with a failure count: an error of 29 mm is none, even where nothing is worse. There is one frame of each
-    setting; where there are fewer settings than ``count``, one frame of each trial.
+    setting; where there are fewer settings than :data:`SHOWN`, one frame of each trial.
     """
     variant = next((name for name in results.info["variants"] if name in set(results.frames["variant"])), None)
     if variant is None:
@@ -90,8 +90,8 @@ def worst_frames(results: Results, *, count: int = SHOWN) -> list[WorstFrame]:
             rest.append(frame)
         else:
             first[str(setting)] = frame
-    chosen = list(first.values())[:count]
-    chosen += rest[: count - len(chosen)]
+    chosen = list(first.values())[:SHOWN]
+    chosen += rest[: SHOWN - len(chosen)]
     return sorted(chosen, key=lambda frame: -frame.cost)
 
 

@@ -221,12 +221,6 @@ class TestJson:
         np.testing.assert_allclose(values[1:, :3].T / 100, [x, -z, y], atol=TENTH_MM)
 
 
-def test_rerun_file_is_written(tmp_path):
-    pytest.importorskip("rerun")
-    (path,) = write_people(recording(), tmp_path, formats=["rrd"])
-    assert path.read_bytes()[:4] in (b"RRF2", b"RRIO")
-
-
 class TestUniformTimes:
     def at(self, steps, period=0.1):
         """A joint that moves at 1 m/s along x, at times ``period * steps``."""

@@ -10,10 +10,8 @@ import numpy as np
 import polars as pl
 import pytest
 from made_study import make_study, pcp_of
-from typer.testing import CliRunner
 
 from mvpose.report.svg_plots import plot_sheet
-from simharness.cli import app
 from simharness.outputs.study.digest import PRINTED, curves, digest, markdown, write_digest
 from simharness.scoring.catalogue import SCORES
 from simharness.scoring.failure_classes import FailureKind
@@ -308,11 +306,6 @@ class TestFiles:
         with pytest.raises(ValueError, match="1 trials failed"):
             write_digest(study, tmp_path / "kept")
         assert not (tmp_path / "kept").exists()
-
-    def test_page_recording_and_digest_are_separate_requests(self, tmp_path):
-        result = CliRunner().invoke(app, ["report", str(tmp_path), "--digest", "a", "--rerun", "b"])
-        assert result.exit_code == 2
-        assert "--rerun and --digest" in result.stderr
 
 
 def test_scores_over_time_are_there_where_a_variant_tracks_people(study, tmp_path):

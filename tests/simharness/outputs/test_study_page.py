@@ -321,8 +321,10 @@ class TestCommand:
         (tmp_path / "file").write_text("not a folder")
         assert "cannot be written" in self.refused(ran.folder, "--out", tmp_path / "file" / "page.html")
 
-    def test_a_trial_without_a_recording(self, ran):
-        assert "add --rerun FILE" in self.refused(ran.folder, "--trial", "0")
+    def test_the_folder_of_a_run(self, tmp_path):
+        for name in ("summary.json", "estimates.npz"):
+            (tmp_path / name).touch()
+        assert f"whose report is {tmp_path / 'report.html'}" in self.refused(tmp_path)
 
 
 def test_a_variant_that_tracks_people_has_curves_over_time(tmp_path, page_of_grid):
