@@ -7,7 +7,7 @@ glass. This needs no support by the renderer, so it works with all of them. Mirr
 
 from collections.abc import Mapping, Sequence
 from collections.abc import Sequence as Many
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.camera import Camera
+from simharness.capture.rendering.lens import lens_of
 from simharness.capture.rendering.renderer import Image, Renderer
 from simharness.capture.sensor import band_cameras, band_times, blur, develop
 from simharness.scenario.sections.cameras_section import SensorSection
@@ -61,6 +62,7 @@ def antialiased(
     finer: int = 2,
     lighting: Lighting | None = None,
     mirrors: Mapping[int, Mirror] = MappingProxyType({}),
+    behind: dict[int, list[Mesh]] | None = None,
 ) -> Rgb:
     """Render an antialiased colour picture, with ``finer`` x ``finer`` samples per pixel.
 
@@ -71,14 +73,18 @@ def antialiased(
         finer: samples per pixel in each direction.
         lighting: lighting of the scene; ``Lighting()`` by default.
         mirrors: glass of the meshes that are mirrors, by mesh index.
+        behind: see :func:`with_mirrors`.
 
     Returns:
         (h, w, 3) uint8.
     """
-    lighting = lighting or Lighting()
-    large = scaled(camera, finer)
-    image = renderer.render(large, meshes, lighting=lighting)
-    rgb = with_mirrors(renderer, large, meshes, mirrors, image, lighting=lighting)
+    lighting, large = lighting or Lighting(), scaled(camera, finer)
+    # Mirrors come before the lens, so that of the whole picture only colours, not depth and ids, have to pass it.
+    lens = lens_of(large) if large.distortion.any() else None
+    pinhole = large if lens is None else lens.pinhole(large)
+    image = renderer.render(pinhole, meshes, lighting=lighting)
+    rgb = with_mirrors(renderer, pinhole, meshes, mirrors, image, behind=behind, lighting=lighting)
+    rgb = rgb if lens is None else lens.colors(rgb)
     return cv2.resize(rgb, camera.size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 
@@ -112,6 +118,14 @@ def stack_bands(bands: Many[Image]) -> Image:
     )
 
 
+@dataclass(frozen=True)
+class _PosedMeshes:
+    """Meshes of a scene at one time, and those behind its mirrors, which the first camera that needs them makes."""
+
+    meshes: list[Mesh]
+    behind: dict[int, list[Mesh]] = field(default_factory=dict)
+
+
 class ScenePictures:
     """Source of the pictures that the cameras deliver, shutter and sensor included.
 
@@ -127,6 +141,7 @@ class ScenePictures:
         self._renderer = renderer
         self._sensor = sensor
         self._seed = seed
+        self._posed: dict[float, _PosedMeshes] = {}
 
     def picture(
         self, exposures: ExposureSchedule, frame: int, view: int, *, finer: int = 1, width: int | None = None
@@ -145,11 +160,13 @@ class ScenePictures:
         if not exposures.delivered[frame, view]:
             return np.zeros((*reduced_size(size, scale)[::-1], 3), np.uint8)
         camera = scaled(exposures.camera(frame, view), scale)
+        middles = self._exposure_times(exposures.time[frame, view])
+        times = np.array([band_times(middle, exposures.readout) for middle in middles])
+        strips, posed = band_cameras(camera, times.shape[1]), self._poses(times)
         exposed = []
-        for middle in self._exposure_times(exposures.time[frame, view]):
-            times = band_times(middle, exposures.readout)
-            bands = zip(self._playback.over(times), band_cameras(camera, len(times)), strict=True)
-            exposed.append(np.concatenate([self._render(state, strip, finer) for state, strip in bands]))
+        for row in times.tolist():
+            bands = zip(row, strips, strict=True)
+            exposed.append(np.concatenate([self._render(posed[time], strip, finer) for time, strip in bands]))
         taken = int(exposures.source[frame, view])
         return develop(blur(exposed), self._sensor, seed=self._seed, view=view, frame=taken, camera=camera, scale=scale)
 
@@ -161,12 +178,22 @@ class ScenePictures:
         """
         if not exposures.delivered[frame, view]:
             raise ValueError(f"view {view} delivers no picture in frame {frame}")
-        camera, scene = exposures.camera(frame, view), self._playback.scene
         times = band_times(exposures.time[frame, view], exposures.readout)
-        bands = zip(self._playback.over(times), band_cameras(camera, len(times)), strict=True)
+        bands = zip(times.tolist(), band_cameras(exposures.camera(frame, view), len(times)), strict=True)
+        posed = self._poses(times)
         return stack_bands(
-            [self._renderer.render(strip, meshes_at(scene, state), color=False, parts=True) for state, strip in bands]
+            [self._renderer.render(strip, posed[time].meshes, color=False, parts=True) for time, strip in bands]
         )
+
+    def _poses(self, times: Floats) -> "dict[float, _PosedMeshes]":
+        """Return the scene at times (...), as the last call made it where it did: cameras share their times."""
+        wanted = np.unique(times).tolist()
+        missing = [time for time in wanted if time not in self._posed]
+        made = {
+            state.time: _PosedMeshes(meshes_at(self._playback.scene, state)) for state in self._playback.over(missing)
+        }
+        self._posed = {time: made.get(time) or self._posed[time] for time in wanted}
+        return self._posed
 
     def _exposure_times(self, middle: float) -> NDArray[np.float64]:
         """Return the times over which one exposure is averaged, seconds."""
@@ -174,14 +201,21 @@ class ScenePictures:
         steps = _BLUR_STEPS if shutter else 1
         return middle + shutter * ((np.arange(steps) + 0.5) / steps - 0.5)
 
-    def _render(self, state: PlaybackState, camera: Camera, finer: int) -> Rgb:
+    def _render(self, posed: "_PosedMeshes", camera: Camera, finer: int) -> Rgb:
         scene = self._playback.scene
         return antialiased(
-            self._renderer, camera, meshes_at(scene, state), finer=finer, lighting=scene.lighting, mirrors=scene.mirrors
+            self._renderer,
+            camera,
+            posed.meshes,
+            finer=finer,
+            lighting=scene.lighting,
+            mirrors=scene.mirrors,
+            behind=posed.behind,
         )
 
 
 _NEAR_GLASS = 0.004  # metres: accuracy of depth from a picture; frames stand out farther
+_TILE = 64  # pixels
 _REFLECTANCE = (0.87, 0.90, 0.89)  # glass is a little green; sRGB
 
 
@@ -191,6 +225,7 @@ def with_mirrors(
     meshes: Sequence[Mesh],
     mirrors: Mapping[int, Mirror],
     image: Image,
+    behind: dict[int, list[Mesh]] | None = None,
     **options: Any,
 ) -> NDArray[np.uint8]:
     """Add reflections to the mirrors of a picture.
@@ -201,17 +236,21 @@ def with_mirrors(
         meshes: meshes that were rendered.
         mirrors: glass of the meshes that are mirrors, by mesh index.
         image: picture with depth and ids.
+        behind: mirror images of the meshes by mesh index, which this function adds where they are missing: cameras that
+            see the same meshes share them.
         options: further arguments of ``renderer.render``; a ``lighting`` among them is reflected too.
 
     Returns:
         Colours, (h, w, 3); the same array if no mirror is visible.
     """
-    rgb = image.rgb
+    rgb, behind = image.rgb, {} if behind is None else behind
     for index, mirror in mirrors.items():
         glass = _glass(camera, image, index, mirror)
         if not glass.any():
             continue
-        behind = [reflected(mesh, mirror) for k, mesh in enumerate(meshes) if k != index]
+        if index not in behind:
+            images = [reflected(mesh, mirror) for k, mesh in enumerate(meshes) if k != index]
+            behind[index] = [mesh for mesh in images if len(mesh.faces)]
         reflected_options = dict(options)
         if "lighting" in reflected_options:
             towards = np.asarray(options["lighting"].direction, float)
@@ -219,8 +258,14 @@ def with_mirrors(
             reflected_options["lighting"] = replace(
                 options["lighting"], direction=tuple(turned.tolist()), mirror=mirror
             )
-        other = renderer.render(camera, [mesh for mesh in behind if len(mesh.faces)], **reflected_options).rgb
-        rgb = np.where(glass[..., None], np.round(other * np.array(_REFLECTANCE)).astype(np.uint8), rgb)
+        rows, columns = window = _window(glass)
+        K = camera.K.copy()
+        K[:2, 2] -= columns.start, rows.start
+        part = replace(camera, K=K, size=(columns.stop - columns.start, rows.stop - rows.start))
+        other = renderer.render(part, behind[index], **reflected_options).rgb
+        seen = glass[window]
+        rgb = rgb.copy()
+        rgb[window][seen] = np.round(other[seen] * np.array(_REFLECTANCE)).astype(np.uint8)
     return rgb
 
 
@@ -234,6 +279,15 @@ def _glass(camera: Camera, image: Image, index: int, mirror: Mirror) -> NDArray[
     points = camera.center + rays * (image.depth[row, column] / (rays @ camera.R[2]))[:, None]
     seen[row, column] = mirror.on_glass(points) & (np.abs(mirror.in_front(points)) < _NEAR_GLASS)
     return seen
+
+
+def _window(glass: NDArray[np.bool_]) -> tuple[slice, slice]:
+    """Return the rows and columns around the pixels (h, w) that show glass, in whole tiles, as most frames do."""
+    spans = []
+    for axis, length in enumerate(glass.shape):
+        shown = np.flatnonzero(glass.any(axis=1 - axis))
+        spans.append(slice(shown[0] // _TILE * _TILE, min((shown[-1] // _TILE + 1) * _TILE, length)))
+    return spans[0], spans[1]
 
 
 def reflected(mesh: Mesh, mirror: Mirror) -> Mesh:

@@ -18,10 +18,7 @@ from simharness.types.lighting import Lighting
 from simharness.types.srgb import from_linear, to_linear
 
 MOST_BYTES = 384 * 2**20
-"""Bytes of the backgrounds that are kept; the one that was not used for the longest time is dropped first."""
-
-
-_BYTES_PER_PIXEL = 4 + 4 + 4 + 2 + 3 + 2 + 4
+"""Bytes of the backgrounds that are kept."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +53,6 @@ class Background:
     """Visible face, (h, w) int32; -1 without a surface."""
     corners: NDArray[np.float64]
     """Homogeneous pixel coordinates of the vertices, (n, 3)."""
-    depth: NDArray[np.float32]
-    """Depth, metres, (h, w) float32; +inf without a surface."""
     labels: NDArray[np.int16]
     """What the faces are labelled with, (k + 1,): see
     :attr:`~simharness.capture.rendering.scene_topology.SceneTopology.mesh`."""
@@ -65,31 +60,46 @@ class Background:
     """Label of each pixel, (h, w)."""
     lit: LitBackground | None = None
     """The same in the light of the latest request."""
+    used: int = 0
+    """Number of the latest request, of all requests to the scene."""
 
     @property
     def nbytes(self) -> int:
         """Bytes of memory, with those of colours, whether they were requested or not."""
-        return self.corners.nbytes + _BYTES_PER_PIXEL * self.triangle.size
+        arrays, colors = [self.inverse_depth, self.triangle, self.corners, self.ids], 3 * self.triangle.size
+        if self.lit is not None:
+            arrays += [self.lit.shadow_place, self.lit.shadow_depth, self.lit.runs]
+        return colors + sum(each.nbytes for each in arrays)
 
 
 class Backgrounds:
-    """Backgrounds of one scene, by the projection and the size of the camera; within a limit of memory."""
+    """Backgrounds of one scene, by the projection and the size of the camera; within a limit of memory.
+
+    Cameras take turns. Where not all of them fit, the newest gives way to the next: if the oldest did, each would be
+    dropped just before its turn. One that two rounds did not need, of a camera that has moved on, goes first.
+    """
 
     def __init__(self) -> None:
         self._kept: OrderedDict[tuple[bytes, tuple[int, int]], Background] = OrderedDict()
+        self._requests = 0
 
     def find(self, projection: NDArray[np.float64], size: tuple[int, int]) -> Background | None:
         """Return the background of a camera, or None if it is not kept."""
         key = projection.tobytes(), size
-        if key in self._kept:
+        self._requests += 1
+        found = self._kept.get(key)
+        if found is not None:
             self._kept.move_to_end(key)
-        return self._kept.get(key)
+            found.used = self._requests
+        return found
 
     def keep(self, projection: NDArray[np.float64], size: tuple[int, int], background: Background) -> None:
         """Keep a background, and drop others where they need too much memory together."""
+        background.used = self._requests
+        while self._kept and background.nbytes + sum(each.nbytes for each in self._kept.values()) > MOST_BYTES:
+            oldest = next(iter(self._kept.values()))
+            self._kept.popitem(last=self._requests - oldest.used <= 2 * (len(self._kept) + 1))
         self._kept[projection.tobytes(), size] = background
-        while len(self._kept) > 1 and sum(each.nbytes for each in self._kept.values()) > MOST_BYTES:
-            self._kept.popitem(last=False)
 
 
 _COLUMNS = 1024  # pixels that are looked up in one row: OpenCV takes no rows of whole pictures

@@ -53,13 +53,17 @@ class Lens:
 
     def distorted(self, image: Image) -> Image:
         """Return the picture through the lens from that of the pinhole camera; black where it images nothing."""
-        rgb = cv2.remap(image.rgb, self.columns, self.rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
         return Image(
-            rgb=rgb.astype(np.uint8, copy=False),
+            rgb=self.colors(image.rgb),
             depth=self._depth(image.depth),
             ids=self._picked(image.ids, -1),
             parts=None if image.parts is None else self._picked(image.parts, -1),
         )
+
+    def colors(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the colours (h, w, 3) through the lens from those of the pinhole camera, else black."""
+        bent = cv2.remap(rgb, self.columns, self.rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+        return bent.astype(np.uint8, copy=False)
 
     def _depth(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
         result = _depth_at(depth, self.columns, self.rows, self.nearest)

@@ -27,9 +27,9 @@ from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
 from simharness.capture.rendering.vertex_kernels import (
     copied_pixels,
     covering_spans,
+    mark_visible,
     picture_spans,
     project_vertices,
-    resolve,
     restore_pixels,
 )
 from simharness.types.lighting import Lighting
@@ -109,12 +109,14 @@ def _picture(scene: _Scene, camera: Camera, color: bool, lighting: Lighting, par
         lit = _lit(background, geometry, view, lighting)
     else:
         rgb = np.zeros((height, width, 3), np.uint8)
-    depth, ids = background.depth.copy(), _ids(background, topology.mesh).copy()
+    ids = _ids(background, topology.mesh).copy()
     spans = covering_spans(projected[2], topology.moving_starts, height, width)
     hidden = copied_pixels(spans, inverse_depth, triangle)
     try:
         draw_projected(topology.faces, projected, NEAR, inverse_depth, triangle, first)
-        resolve(spans, inverse_depth, triangle, topology.mesh, depth, ids)
+        mark_visible(spans, triangle, topology.mesh, ids)
+        with np.errstate(divide="ignore"):
+            depth = np.reciprocal(inverse_depth)  # infinite without a surface
         labels = topology.parts[triangle] if parts else None
         if sources is not None:
             rgb = sources.draw(lit, spans, drawn, view)
@@ -137,10 +139,10 @@ def _background(scene: _Scene, camera: Camera) -> Background:
         inverse_depth, triangle = np.zeros(shape, np.float32), np.full(shape, -1, np.int32)
         faces = still.topology.faces
         corners = rasterise(still.vertices, faces, projection, NEAR, inverse_depth, triangle)
-        depth, labels, ids = np.empty(shape, np.float32), scene.geometry.topology.mesh, np.empty(shape, np.int16)
-        resolve(picture_spans(*shape), inverse_depth, triangle, labels, depth, ids)
+        labels, ids = scene.geometry.topology.mesh, np.empty(shape, np.int16)
+        mark_visible(picture_spans(*shape), triangle, labels, ids)
         rays = np.ascontiguousarray(np.linalg.inv(projection[:, :3]))
-        found = Background(rays, inverse_depth, triangle, corners, depth, labels, ids)
+        found = Background(rays, inverse_depth, triangle, corners, labels, ids)
         scene.backgrounds.keep(projection, camera.size, found)
     return found
 

@@ -170,22 +170,12 @@ def restore_pixels(
 
 
 @njit(cache=True, error_model="numpy")
-def resolve(
-    spans: np.ndarray,
-    inverse_depth: np.ndarray,
-    triangle: np.ndarray,
-    labels: np.ndarray,
-    depth: np.ndarray,
-    seen: np.ndarray,
-) -> None:
-    """Write depth (h, w), +inf without a face, and the label of the visible face, ``labels[-1]`` for none, at spans."""
+def mark_visible(spans: np.ndarray, triangle: np.ndarray, labels: np.ndarray, seen: np.ndarray) -> None:
+    """Write the label of the visible face, ``labels[-1]`` for none, at the pixels of spans of ``seen`` (h, w)."""
     last = np.uint32(len(labels) - 1)
     for n in range(len(spans)):
         y, first, end = spans[n, 0], spans[n, 1], spans[n, 2]
-        depths, nearness = depth[y, first:end], inverse_depth[y, first:end]
         marks, shown = seen[y, first:end], triangle[y, first:end]
-        for x in range(end - first):
-            depths[x] = np.float32(1.0) / nearness[x]
         for x in range(end - first):
             marks[x] = labels[min(np.uint32(shown[x]), last)]  # as unsigned, -1 is the largest index
 
