@@ -82,7 +82,7 @@ def compile_pictures() -> None:
     shown, inverse_depth = np.full((2, 2), -1, np.int32), np.zeros((2, 2), np.float32)
     drawn, view = DrawnPixels(shown, inverse_depth, np.zeros((6, 3))), PixelRays(np.zeros(3), np.eye(3))
     labels, ids = geometry.topology.mesh, np.full((2, 2), -1, np.int16)
-    empty = Background(view.to_rays, inverse_depth, shown, drawn.corners, inverse_depth, labels, ids)
+    empty = Background(view.to_rays, inverse_depth, shown, drawn.corners, labels, ids)
     rgb = scene.draw(scene.background(empty, view), np.zeros((0, 3), np.int32), drawn, view)
     develop(rgb, SensorSection(shot_noise=0.01), seed=0, view=0, frame=0)
 

@@ -66,10 +66,10 @@ class Background:
     @property
     def nbytes(self) -> int:
         """Bytes of memory, with those of colours, whether they were requested or not."""
-        arrays, colors = [self.inverse_depth, self.triangle, self.corners, self.ids], 3 * self.triangle.size
+        count = self.inverse_depth.nbytes + self.triangle.nbytes + self.corners.nbytes + self.ids.nbytes
         if self.lit is not None:
-            arrays += [self.lit.shadow_place, self.lit.shadow_depth, self.lit.runs]
-        return colors + sum(each.nbytes for each in arrays)
+            count += self.lit.shadow_place.nbytes + self.lit.shadow_depth.nbytes + self.lit.runs.nbytes
+        return count + 3 * self.triangle.size
 
 
 class Backgrounds:
