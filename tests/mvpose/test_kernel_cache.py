@@ -475,6 +475,7 @@ def replace(file, old, new):
     file.write_text(text.replace(old, new), encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_lens_with_another_sign_changes_the_camera(tmp_path):
     copy(tmp_path)
     code = """

@@ -106,6 +106,7 @@ def test_kept_trials_are_not_run_again(small, tmp_path, monkeypatch):
         assert_robust(small, variant="fast", seeds=2, keep=tmp_path / "kept", pcp=99.9)
 
 
+@pytest.mark.slow
 def test_the_traceback_ends_at_the_callers_line(tmp_path):
     (tmp_path / "test_users.py").write_text(
         "from simharness import api\n"

@@ -22,6 +22,7 @@ def call(monkeypatch):
     return run
 
 
+@pytest.mark.slow
 def test_table_and_file(call, tmp_path):
     causes = [part for name in ("swaps", "phantoms", "one-more-camera") for part in ("--cause", name)]
     result = call("--seeds", "2", "--variant", "fast", *causes, "--json", str(tmp_path / "blame.json"))

@@ -27,6 +27,7 @@ def call(tmp_path, monkeypatch):
     return call
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_sequence_and_prints_the_folder(call, tmp_path, monkeypatch):
     monkeypatch.setattr("sys.argv", ["simharness", "export", "quickstart.toml", "bench"])
     result = call(QUICKSTART, "bench", *TINY, "--seed", "3")

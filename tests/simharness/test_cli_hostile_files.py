@@ -18,6 +18,7 @@ CONTENTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", CONTENTS)
 def test_a_hostile_scenario_is_refused_in_one_line(tmp_path, content):
     path = tmp_path / "hostile.toml"
@@ -30,6 +31,7 @@ def test_a_hostile_scenario_is_refused_in_one_line(tmp_path, content):
     assert "hostile.toml" in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", ["nested JSON", "pipe"])
 def test_a_hostile_baseline_is_refused_in_one_line(tmp_path, content):
     path = tmp_path / "hostile.json"

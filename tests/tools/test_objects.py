@@ -24,6 +24,7 @@ def test_the_shipped_objects_are_those_that_the_tool_writes(tmp_path):
     assert pictures[0] == pictures[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("write", "folder"), [(write_finishes, FINISHES), (write_pictures, MATERIALS), (write_panoramas, PANORAMAS)]
 )

@@ -4,6 +4,7 @@ import itertools
 import json
 
 import numpy as np
+import pytest
 
 from benchmarks.method.scenes import Conditions
 from benchmarks.tracking.__main__ import SECTIONS, main
@@ -33,6 +34,7 @@ def test_people_stay_as_long_as_asked_on_average_and_their_number_holds():
     assert 1.5 < np.std(people) < 3.0  # Poisson: the root of 5
 
 
+@pytest.mark.slow
 def test_the_sections_run_quickly_and_write_their_figures(tmp_path):
     assert main(["--quick", "--json", str(tmp_path / "figures.json")]) == 0
     figures = json.loads((tmp_path / "figures.json").read_text())

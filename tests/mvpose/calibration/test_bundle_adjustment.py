@@ -266,6 +266,7 @@ def test_the_camera_that_moved_takes_the_whole_correction(filmed):
     assert np.linalg.norm(error[:, 3:6], axis=1).max() < 0.02
 
 
+@pytest.mark.slow
 def test_what_is_held_stays(filmed):
     rig = ring(5)
     wrong = disturbed(rig, 1, 0.1, seed=4)

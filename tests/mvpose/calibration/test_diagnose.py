@@ -74,6 +74,7 @@ def test_inverted_extrinsics_are_named_for_one_camera_and_for_all(recording, vie
     assert diagnosis.alarms[0].probability > 0.95
 
 
+@pytest.mark.slow
 def test_exchanged_cameras_are_named(recording):
     rig, frames = recording
     cameras = list(rig)

@@ -39,6 +39,7 @@ def shape_error(rig):
     return np.degrees(np.arccos(np.clip(cosine, -1, 1))).max(), size * np.linalg.norm(arms - true_arms, axis=1).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("degrees", "metres"), [(2, 0.2), (4, 0.4)])
 def test_cameras_that_are_all_off_agree_with_each_other_after_repair(frames, degrees, metres):
     wrong = disturbed(RIG, degrees, metres, seed=3)
@@ -80,6 +81,7 @@ def test_a_right_rig_hardly_changes(frames):
     assert np.abs(found.offsets).max() < 0.01
 
 
+@pytest.mark.slow
 def test_a_clock_that_is_late_is_found():
     """Camera 2 took its pictures 0.08 s after the time that they carry."""
     period, late = 0.04, 0.08
@@ -139,6 +141,7 @@ def test_a_camera_that_sees_somebody_else_is_held():
     assert found.corrections[:4].any(axis=1).all()
 
 
+@pytest.mark.slow
 def test_the_order_of_cameras_does_not_matter(frames):
     wrong = disturbed(RIG, 2, 0.2, seed=3)
     order = [3, 0, 4, 1, 2]

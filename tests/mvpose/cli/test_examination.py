@@ -92,6 +92,7 @@ class TestCommand:
         assert "the calibration was not examined (ZeroDivisionError: half way)" in line
         assert (lab / "out" / "recording.html").exists()
 
+    @pytest.mark.slow
     def test_it_may_be_left_out(self, lab, monkeypatch):
         monkeypatch.setattr(estimation, "examine", None)
         assert verdicts(estimate(lab, "--no-doctor")) == []

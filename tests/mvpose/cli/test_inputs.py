@@ -120,6 +120,7 @@ class TestSize:
     def test_another_shape_is_refused(self, lab, tmp_path, calibration, size, part):
         refused(estimate(lab, tmp_path / "out", "--size", size, calibration=calibration), part)
 
+    @pytest.mark.slow
     def test_the_doctor_goes_on(self, lab):
         result = run("doctor", lab / "Calib.toml", lab / "openpose", "--size", "1920x1080")
         assert "note: --size 1920x1080: the calibration states 1280x960" in result.stderr

@@ -222,6 +222,7 @@ def test_detection_says_how_to_have_its_default_network(tmp_path):
     ends(call("detect", folder, "--out", tmp_path / "found"), 2, "`mvpose networks get movenet`")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [each.name for each in PUBLISHED])
 def test_published_networks_compute_what_tensorflow_does(name, home):
     """Getting one compares its outputs with those of TensorFlow; other weights would differ."""

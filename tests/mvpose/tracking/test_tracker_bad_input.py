@@ -107,6 +107,7 @@ def test_the_first_frames_may_have_no_picture_at_all():
         assert [_bytes(each) for each in estimates[3:]] == [_bytes(each) for each in expected]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [12.0, 25.0, 60.0])
 @pytest.mark.parametrize("timed", [False, True])
 def test_a_minute_without_pictures_or_people(rate, timed):
@@ -206,6 +207,7 @@ def _wild_stream(seed, count=150):
     return rig, result
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag", [0.0, 0.3, np.inf])
 @pytest.mark.parametrize("preset", ["fast", "full"])
 def test_whatever_comes_estimates_are_finite_and_in_order(preset, lag):

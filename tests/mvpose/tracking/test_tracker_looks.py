@@ -69,6 +69,7 @@ def _shuffled(people, seed, *, spots=SPOTS):
     return {person: spots[order[k]] for k, person in enumerate(people)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("away", [15.0, 60.0, 300.0])
 def test_who_was_away_for_long_comes_back_under_the_same_identity_where_clothes_differ(away):
     kept = []

@@ -85,6 +85,7 @@ def test_saving_changes_neither_the_state_nor_the_tracker(middle, tmp_path):
     assert {name: value.tobytes() for name, value in again.arrays.items()} == before
 
 
+@pytest.mark.slow
 def test_another_process_goes_on_with_the_same_bytes(middle, tmp_path):
     rig, frames, expected, path = middle
     (tmp_path / "rest.pkl").write_bytes(pickle.dumps((rig, frames, str(path))))

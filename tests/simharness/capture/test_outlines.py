@@ -70,6 +70,7 @@ def test_the_box_of_an_outline_is_that_of_the_skin(seed, distortion):
         assert_close(framed_by_outline(body, transforms, camera), framed_by_skin(body.skin(transforms), camera))
 
 
+@pytest.mark.slow
 def test_boxes_end_at_the_image_border():
     """Close up and off centre: the box is that of the part on the image, and ends where the image does.
 

@@ -74,6 +74,7 @@ def test_edges_through_pixel_centres_leave_no_hole():
     np.testing.assert_allclose(image.depth, 2.0, rtol=1e-6)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), detail=st.sampled_from([2, 5, 9]), inside=st.booleans(), turned=st.booleans())
 def test_crumpled_closed_bodies_match_brute_force(seed, detail, inside, turned):

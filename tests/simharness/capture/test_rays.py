@@ -72,6 +72,7 @@ def test_rays_and_pictures_agree_on_97_of_100_labels():
     assert (table.sum(axis=1) > 50).all()  # every label occurs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_rays_and_pictures_agree_in_every_scene(name):
     table = confusion([name])

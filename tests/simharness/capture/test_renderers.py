@@ -242,6 +242,7 @@ def test_the_renderers_agree_on_a_crowd(raster, gl):
     assert seen >= set(range(len(scene)))
 
 
+@pytest.mark.slow
 def test_the_renderers_agree_on_people_of_a_scenario(raster, gl):
     from simharness.capture.joint_visibility import label_joints
     from simharness.capture.picture import meshes_at

@@ -82,6 +82,7 @@ class TestRates:
         clump = (1 + 2 * parameters.get("life", 0.0) / STEP) * (1 + parameters.get("views", 0.0) * (len(rig) - 1))
         assert abs(found.present.sum() - expected) < 4.5 * np.sqrt(clump * expected)
 
+    @pytest.mark.slow
     def test_the_number_in_a_picture_is_poisson_distributed_from_the_first_frame_on(self):
         rig, rate = ring(8), 0.8
         views = filmed(30, 8)
@@ -117,6 +118,7 @@ class TestRates:
         assert np.isfinite(viewed_area(rig)[0]).all()
         assert abs(found.present.sum() - 1500) < 5 * np.sqrt(3 * 1500)
 
+    @pytest.mark.slow
     def test_a_single_frame(self):
         counts = [drawn(ring(), filmed(1), rate=2.0, life=1.0, views=0.2, seed=s).present.sum() for s in range(100)]
         assert abs(np.mean(counts) - 8.0) < 5 * np.sqrt(8.0 * 2 / 100)

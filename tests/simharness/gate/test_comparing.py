@@ -224,6 +224,7 @@ def test_one_case_alone_is_seen_where_two_others_changed_at_random():
     assert ("pcp", "full", "case07") in named(regressions(change))
 
 
+@pytest.mark.slow
 def test_random_changes_are_called_regressions_no_more_often_than_the_level():
     """Small suites with random, skewed changes of every score, with mean zero: one in twenty may fail."""
 

@@ -103,6 +103,7 @@ def test_the_command_shrinks_and_replays(tmp_path):
     assert "does not fail any more" in mended.stdout
 
 
+@pytest.mark.slow
 def test_a_run_is_shrunk_as_its_scenario(tmp_path):
     run = CliRunner().invoke(app, ["run", "quickstart", *SMALL, "--seed", "1", "--out", str(tmp_path / "runs")])
     assert run.exit_code == 0, run.output

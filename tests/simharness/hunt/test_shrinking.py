@@ -45,6 +45,7 @@ def failing_frames(judge):
     return found
 
 
+@pytest.mark.slow
 def test_shrunk_frames_are_minimal_and_fail_as_before(judge):
     found = failing_frames(judge)
     assert len(found) >= 2

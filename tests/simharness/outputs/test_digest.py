@@ -238,6 +238,7 @@ def test_each_case_breaks_by_itself(cases):
     assert digest(of_case(cases, "good"))["by_case"] == {}
 
 
+@pytest.mark.slow
 def test_a_mean_over_cases_or_other_keys_is_labelled(cases):
     numbers = digest(cases)
     pooled, _ = numbers["factors"]

@@ -64,6 +64,7 @@ def test_progress_counts_every_frame_once():
     assert sum(seen) == 23
 
 
+@pytest.mark.slow
 def test_two_workers_give_the_results_of_one():
     function = Scaled(np.random.default_rng(0).normal(size=(23, 5)))
     seen = []

@@ -22,6 +22,7 @@ def test_workers_have_a_parent_that_has_imported_for_them():
     assert {*IMPORTED, "mujoco", "numba", "scipy.optimize"} <= modules
 
 
+@pytest.mark.slow
 def test_the_server_starts_no_threads_but_those_of_openblas():
     """A thread does not survive a fork, and a lock that it holds is never released; OpenBLAS starts its own again."""
     script = f"import os, sys, {', '.join(IMPORTED)}; print(len(os.listdir('/proc/self/task')), *sys.modules)"

@@ -182,6 +182,7 @@ class TestSettings:
 class TestPairing:
     """Settings at one seed share every draw that their factors do not name."""
 
+    @pytest.mark.slow
     def test_the_number_of_cameras_moves_neither_people_nor_things(self):
         # At this seed things would stand elsewhere for 12 cameras if those hung as low as in quickstart.
         few, many = (see(setting("views", {"cameras.count": count}), seed=3) for count in (2, 12))
@@ -189,6 +190,7 @@ class TestPairing:
         assert few.things == many.things
         assert len(few.things) == 7
 
+    @pytest.mark.slow
     def test_a_camera_more_changes_nothing_of_what_the_others_see(self):
         few, many = (see(setting("panoptic", {"cameras.preset": preset})) for preset in ("panoptic3", "panoptic7"))
         assert np.array_equal(few.sequence.joints, many.sequence.joints)

@@ -75,6 +75,7 @@ def test_values_are_added_where_the_score_breaks(tmp_path, study_at, one):
     assert again.plan.sweep.refine == 0
 
 
+@pytest.mark.slow
 def test_an_interrupted_refinement_goes_on_and_ends_with_the_same_values(tmp_path, study_at):
     whole = points(run_study(study_at(3), out=tmp_path / "whole", measure=Knee()))
     with pytest.raises(KeyboardInterrupt):

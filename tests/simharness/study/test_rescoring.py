@@ -137,6 +137,7 @@ def test_a_changed_method_estimates_anew_from_the_stored_detections(run, stages,
     assert without_times(after.people).equals(without_times(before.people))
 
 
+@pytest.mark.slow
 def test_changed_simulation_or_lost_detections_run_everything_again(run, stages, code, tmp_path):
     run()
     calls(stages)

@@ -82,6 +82,7 @@ def test_an_absent_person_stops_no_ray():
     assert not (owners[1] == 1).any()
 
 
+@pytest.mark.slow
 def test_pictures_do_not_show_an_absent_person_nor_a_shadow():
     one, two = trial_of(1, "raster"), trial_of(2, "raster")
     pictures = [

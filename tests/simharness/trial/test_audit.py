@@ -167,6 +167,7 @@ def moved_projections(monkeypatch, pixels):
     monkeypatch.setattr(CaptureFrames, "__call__", wrong)
 
 
+@pytest.mark.slow
 def test_a_wrong_projection_fails_the_trials_of_a_study(tmp_path, monkeypatch):
     path = tmp_path / "tiny.toml"
     path.write_text(

@@ -61,6 +61,7 @@ assert ("mvpose.reconstruction.pictorial", "_structures") in compiled
 """
 
 
+@pytest.mark.slow
 def test_reconstruction_alone_is_compiled_for_what_the_method_gives_it():
     """In a process of its own, in which nothing is compiled yet."""
     subprocess.run([sys.executable, "-c", RECONSTRUCTION], check=True, cwd=Path(__file__).parent)

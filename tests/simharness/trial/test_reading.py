@@ -66,6 +66,7 @@ def test_the_result_does_not_depend_on_the_workers(scenario, tmp_path):
     assert (one / "detections.npz").read_bytes() == (two / "detections.npz").read_bytes()
 
 
+@pytest.mark.slow
 def test_keypoints_are_read_in_the_simulated_boxes(scenario, tmp_path):
     dots(tmp_path / "head.onnx")
     simulated = detected_frames(load(scenario(""), overrides=['method.variants=["full"]']))[1]
@@ -80,6 +81,7 @@ def test_keypoints_are_read_in_the_simulated_boxes(scenario, tmp_path):
         assert (after.truth.error > 0).mean() > 0.5
 
 
+@pytest.mark.slow
 def test_people_are_those_whom_a_network_finds(scenario, tmp_path):
     """A network that finds the true places in one picture in every picture is right there, and nowhere else."""
     full = ['method.variants=["full"]']
@@ -102,6 +104,7 @@ def test_people_are_those_whom_a_network_finds(scenario, tmp_path):
         np.testing.assert_array_equal(before.truth.pixels, after.truth.pixels)
 
 
+@pytest.mark.slow
 def test_people_in_the_boxes_of_a_network_are_those_on_whom_the_keypoints_of_a_head_lie(scenario, tmp_path):
     """A detector of boxes has no keypoints: only those of the head say whom a detection shows."""
     full = ['method.variants=["full"]']

@@ -145,6 +145,7 @@ def test_a_stage_that_fails_leaves_no_result(tmp_path, monkeypatch, stage):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_failed_run_leaves_the_earlier_result_alone(tmp_path, monkeypatch):
     folder = run(tiny(), out=tmp_path)
     before = {path.name: path.read_bytes() for path in folder.iterdir()}

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from mvpose import COCO17
 from simharness.scenario.load import load
@@ -19,6 +20,7 @@ def lengths(joints):
     return np.stack([np.linalg.norm(joints[..., a, :] - joints[..., b, :], axis=-1) for a, b in LIMBS], axis=-1)
 
 
+@pytest.mark.slow
 def test_limbs_of_children_keep_their_length():
     sets = ["people.children=1.0", "cameras.count=3", "duration=1.0", "rate=8", 'method.variants=["full"]']
     scenario = load(Path("quickstart"), overrides=sets, seed=6)

@@ -68,6 +68,7 @@ def test_people_and_solids_are_shown_where_they_are(written):
         np.testing.assert_allclose(shown.max(axis=0), used.max(axis=0), atol=1e-3)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_scene_and_says_how_to_open_it(tmp_path):
     arguments = ["mjcf", "quickstart", "--out", str(tmp_path)]
     for each in (*SMALL, 'room.kind="office"'):

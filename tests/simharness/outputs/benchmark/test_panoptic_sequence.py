@@ -138,6 +138,7 @@ def test_times_follow_the_frame_rate(folder):
     np.testing.assert_allclose(np.diff(times), 100.0)
 
 
+@pytest.mark.slow
 def test_pictures_show_the_people_where_the_joints_are(folder, trial, known):
     """Pictures have the camera's size, agree with the renderer, and show each person at the visible joints."""
     rig = read_calibration(folder / "calibration_tiny.json")
@@ -237,6 +238,7 @@ def test_without_faults_there_is_one_calibration(scenario, tmp_path):
     assert content["cameras"][0]["drift"] is None
 
 
+@pytest.mark.slow
 def test_swapped_and_dead_cameras_and_clocks_are_in_the_manifest(scenario, tmp_path):
     """The calibration of a view is that of the camera that takes its pictures, also where cameras are swapped."""
     faults = FaultsSection(swapped=((0, 1),), dead=(2,), clock_offset=0.05, rotation_drift=60.0)

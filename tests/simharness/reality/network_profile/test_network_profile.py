@@ -263,6 +263,7 @@ def test_a_network_is_profiled_by_one_command(tmp_path, monkeypatch):
     assert kept.stat().st_mtime_ns == written
 
 
+@pytest.mark.slow
 def test_the_profile_of_a_detector_without_errors_has_none(filmed):
     """Nothing is divided by the number of errors; a share of which no event was seen is 0."""
     fitted = fit_network(found_by(filmed), name="perfect", rounds=1).detector

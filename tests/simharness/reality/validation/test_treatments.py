@@ -136,6 +136,7 @@ class TestPhantoms:
         pictures = len(recording) * len(recording.rig)
         assert sum(added) / pictures == pytest.approx(rate, abs=4 * np.sqrt(rate / pictures))
 
+    @pytest.mark.slow
     def test_detections_stay_and_phantoms_have_real_poses(self, recording):
         treated = Treatment("phantoms", 2.0)(recording)
         shapes = [each.keypoints - each.boxes[:, None, :2] for each in recording.detections]

@@ -22,6 +22,7 @@ def draws(rng, count, *, size=60, rank=6):
     return rng.normal(size=(count, rank)) @ loads + rng.normal(size=(count, size))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("twins", [4, 10])
 def test_a_further_twin_is_noticed_as_often_as_promised(twins):
     rng = np.random.default_rng(twins)

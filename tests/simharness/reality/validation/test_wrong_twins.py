@@ -27,6 +27,7 @@ def power():
     return Power(real, filmed(range(TWINS)), filmed(range(200, 206)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "wrong",
     [{"noise": 2.0}, {"noise": 8.0}, {"change": turned(0.25).recording}],
@@ -39,6 +40,7 @@ def test_wrong_twins_are_noticed(power, wrong):
     assert found.ratio > 2.0
 
 
+@pytest.mark.slow
 def test_right_twins_are_not(power):
     found = power.noticed(filmed(range(300, 300 + TWINS)))
     assert found.share <= 2 / 6

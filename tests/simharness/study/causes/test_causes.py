@@ -161,6 +161,7 @@ def test_a_single_cause_takes_the_whole_loss():
     assert found.mending.restored == 1
 
 
+@pytest.mark.slow
 def test_shares_add_up_to_the_loss_and_are_paired():
     scenario = load("quickstart", overrides=SMALL)
     found = blame(scenario, variant="fast", seeds=1)

@@ -82,6 +82,7 @@ def test_one_more_person_changes_none_of_the_others():
         np.testing.assert_array_equal(before.angles, after.angles)
 
 
+@pytest.mark.slow
 def test_an_area_too_small_names_its_keys():
     with pytest.raises(ValueError, match=r"people.count = 4 .*people.area = 0.3 m .*people.spacing = 0.15 m"):
         choreograph(scenario(count=4, activities=("point",), area=0.3, spacing=0.15), cast(4), CLOCK[:60])
@@ -127,6 +128,7 @@ def test_a_prop_obstructs_pelvises_near_its_footprint(ahead, blocked):
     assert obstructs(prop, motion) == blocked
 
 
+@pytest.mark.slow
 def test_a_recorded_walk_longer_than_the_area_is_played_in_the_room(shared_data):
     file = str(shared_data / "motion/bvh/AV_8Walk_Meredith_HVHA_Rep1.bvh")
     crowd = scenario(count=4, area=2.0, motion={"file": file})

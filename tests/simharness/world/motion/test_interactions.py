@@ -184,6 +184,7 @@ def test_hands_are_on_the_table_and_not_in_it(cast, seed):
         assert (np.abs(over) < 0.03).all()  # sits on it
 
 
+@pytest.mark.slow
 def test_motions_differ_between_seeds(cast):
     for name in PAIRED:
         one, again, other = (play(name, cast, seed=seed, time=TIME[:60]).motions[0].angles for seed in (1, 1, 2))

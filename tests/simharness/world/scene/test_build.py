@@ -79,6 +79,7 @@ def test_speeds_and_heights_are_those_of_people(sequence):
     assert (upright > 1.1).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_people_keep_clear_of_each_other_and_of_clutter(seed):
     chosen = scenario(seed=seed, people={"count": 6, "spacing": 0.9}, clutter={"boxes": 6, "shelves": 2})
@@ -234,6 +235,7 @@ def test_a_camera_inside_an_object_is_refused(scene):
         check_rig(scenario(), scene.solids, Rig([rig[0], stuck]))
 
 
+@pytest.mark.slow
 def test_a_re_enacted_recording_has_its_places_and_sizes_and_objects_keep_clear(scene, tmp_path):
     recorded = simulate(scene)
     rate = 1 / np.diff(recorded.time).mean()

@@ -160,6 +160,7 @@ def test_one_more_object_moves_no_earlier_one():
         np.testing.assert_array_equal(after[name].mesh.vertices, before[name].mesh.vertices)
 
 
+@pytest.mark.slow
 def test_an_object_without_a_place_is_refused():
     with pytest.raises(ValueError, match=r"clutter.tables: found no place for table \d+.*lower clutter.tables"):
         place_clutter(

@@ -130,6 +130,7 @@ class TestInPictures:
             on = camera.inside(by_rays.lookalike_pixels)
             np.testing.assert_allclose(by_rays.lookalike_pixels[on], camera.project(joints)[on], atol=1e-9)
 
+    @pytest.mark.slow
     def test_rays_and_pictures_agree_on_95_of_100_joints(self):
         by_rays, by_picture = (
             np.concatenate([pair[k].lookalike_visible for seed in SEEDS for pair in compared(seed)]) for k in (0, 1)

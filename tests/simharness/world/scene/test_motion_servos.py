@@ -204,6 +204,7 @@ def test_a_pushed_person_recovers_or_falls_within_the_limits_of_joints():
     assert falling.motions[0].root[-1, 2] < 0.3
 
 
+@pytest.mark.slow
 def test_nobody_is_pushed_by_an_impulse_of_zero():
     one, other = (scene.motions[0] for scene in (one_person(impulse=0), one_person(impulse=0, direction=90, time=0.2)))
     np.testing.assert_array_equal(one.root, other.root)

@@ -36,6 +36,7 @@ def arrays(scene):
     ]
 
 
+@pytest.mark.slow
 def test_a_scene_after_others_and_after_their_trials_is_that_of_a_new_process(nobody_made):
     new = [array.copy() for array in arrays(built("seed=3"))]
     assert make_person.cache_info().misses == 2
