@@ -18,12 +18,22 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Rig
 from mvpose.kernels import njit
 from simharness.detector.draws import IN_TREE, ErrorDraws, with_parents
-from simharness.detector.viewing_conditions import OCCLUDED, OUTSIDE, SIDE, VISIBLE, Conditions, head_bearings
+from simharness.detector.viewing_conditions import (
+    OCCLUDED,
+    OUTSIDE,
+    SELF_OCCLUDED,
+    SIDE,
+    VISIBLE,
+    Conditions,
+    at_edges,
+    head_bearings,
+)
 from simharness.scenario.sections.detector_section import (
     BEARINGS,
     KIND_OF_JOINT,
     KINDS,
     DropSection,
+    EdgeSection,
     FaceSection,
     KeypointsSection,
 )
@@ -127,6 +137,10 @@ def drop_shares(drop: DropSection, face: FaceSection, occlusion: NDArray[np.int8
     """
     table = np.array([shares.by_joint() for shares in (drop.visible, drop.self_occluded, drop.occluded)])
     result = table[np.where(occlusion == OUTSIDE, VISIBLE, occlusion), np.arange(occlusion.shape[-1])]
+    if drop.edge != EdgeSection():
+        factors = np.ones(4)
+        factors[[SELF_OCCLUDED, OCCLUDED]] = drop.edge.self_occluded, drop.edge.occluded
+        result = np.where(at_edges(occlusion), factors[occlusion], 1.0) * result
     if bearings is None:
         return result
     for joint, kind in enumerate(KIND_OF_JOINT):

@@ -37,7 +37,7 @@ class Scatter:
             axes: right and down in the pictures as directions in the world, (T, V, 2, 3).
         """
         near = _near_joints(self.correlation.scatter_near)
-        return self.of_joints(person, np.arange(len(_BONES_APART)), occlusion, axes, near=near)
+        return self.of_joints(person, np.arange(len(BONES_APART)), occlusion, axes, near=near)
 
     def of_joints(
         self,
@@ -95,7 +95,7 @@ def _near_joints(correlation: float) -> Floats | None:
     """
     if correlation == 0:
         return None
-    return np.asarray(np.linalg.cholesky(correlation**_BONES_APART + 1e-9 * np.eye(len(_BONES_APART))), float)
+    return np.asarray(np.linalg.cholesky(correlation**BONES_APART + 1e-9 * np.eye(len(BONES_APART))), float)
 
 
 def _bones_apart() -> NDArray[np.int64]:
@@ -110,7 +110,8 @@ def _bones_apart() -> NDArray[np.int64]:
     return np.array([[len(set(one) ^ set(other)) for other in paths] for one in paths])
 
 
-_BONES_APART = _bones_apart()
+BONES_APART = _bones_apart()
+"""Number of bones between two joints of COCO-17, (17, 17)."""
 
 
 def _truncated(normal: Floats, sigma: Floats) -> Floats:

@@ -176,6 +176,18 @@ def overlaps(boxes: Floats) -> Floats:
     return result
 
 
+BESIDE = (*((joint, joint + 2) for joint in (5, 6, 7, 8, 11, 12, 13, 14)), (5, 11), (6, 12))
+"""Pairs of limb joints of COCO-17 that are one bone apart along the skeleton."""
+
+_BESIDE = np.zeros((17, 17), np.float32)
+_BESIDE[tuple(np.array(BESIDE).T)] = _BESIDE[tuple(np.array(BESIDE).T[::-1])] = 1.0
+
+
+def at_edges(occlusion: NDArray[np.int8]) -> Bools:
+    """Return which joints (..., 17), of given occlusion classes, have a visible joint beside them, (..., 17)."""
+    return np.asarray((occlusion == VISIBLE).astype(np.float32) @ _BESIDE > 0)
+
+
 _HIDDEN = (Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)
 
 

@@ -19,7 +19,8 @@ from mvpose import SHELF14, Rig
 from mvpose.arrays import Floats
 from mvpose.recording import People
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.detector.viewing_conditions import SIDE, body_axes
+from simharness.detector.scatter import BONES_APART
+from simharness.detector.viewing_conditions import BESIDE, SIDE, body_axes
 from simharness.reality.detector_fit.consensus import Consensus
 from simharness.reality.detector_fit.frame_sums import lags
 from simharness.reality.detector_fit.tetrachoric import fit_noisy_life
@@ -41,6 +42,9 @@ is off by 22 to 38 mm in space."""
 
 _DEVIATIONS = np.geomspace(0.0005, 0.15, 60)  # metres, that joints may have
 _TAIL = 3  # degrees of freedom of their distribution
+_BESIDE = SHELF14_OF_LIMBS[np.array(BESIDE) - LIMB_JOINTS[0]]
+_HEAD = np.array([[12, 13]])  # both ends
+_CLOSEST = 0.95  # correlation of the errors of two joints
 _SPREADS = (0.1, 0.2, 0.4, 0.7)  # of the logarithms of the joints of one recording
 
 # Left and right of each joint of SHELF14: 1 for left joints and the head, -1 for right ones.
@@ -67,6 +71,10 @@ class AnnotationModel:
     gross_deviation: Floats | float = 0.0
     """Standard deviation of gross errors of each joint along each axis, (A, 14) or one for all, metres; they come on
     top."""
+    near: float = 0.0
+    """Correlation of the random parts of two limb joints that a bone joins; of joints n bones apart, its n-th power."""
+    head: float = 0.0
+    """Correlation of the random parts of both ends of the head."""
 
     @classmethod
     def drawn(cls, config: AnnotationSection, actors: int, *, seed: int) -> Self:
@@ -109,9 +117,20 @@ class AnnotationModel:
 
         fast = stream(seed, "annotation", "fast").standard_normal(shape)[ticks]
         drawn = np.sqrt(1 - self.noise) * lasting("slow", shape) + np.sqrt(self.noise) * fast
+        if self.near or self.head:
+            drawn = self._factor() @ drawn
         wrong = lasting("gross", shape[:-1]) < ndtri(self.gross)
         away = (self.gross_deviation * wrong)[..., None] * lasting("place", shape)
         return drawn * self.deviation[..., None] + away
+
+    def _factor(self) -> Floats:
+        """Return the factor (14, 14) that correlates the random parts of the joints."""
+        result = np.full((len(SHELF14),) * 2, self.head)
+        result[:_LIMBS], result[:, :_LIMBS] = 0.0, 0.0
+        apart = BONES_APART[np.ix_(LIMB_JOINTS, LIMB_JOINTS)]
+        result[np.ix_(SHELF14_OF_LIMBS, SHELF14_OF_LIMBS)] = self.near**apart
+        np.fill_diagonal(result, 1.0)
+        return np.asarray(np.linalg.cholesky(result), float)
 
 
 def annotate_simulation(scenario: Scenario, sequence: PoseSequence, rig: Rig) -> Floats:
@@ -161,6 +180,8 @@ class AnnotationFit:
             "deviation": self.annotation.deviation.tolist(),
             "life": self.annotation.life,
             "noise": self.annotation.noise,
+            "near": self.annotation.near,
+            "head": self.annotation.head,
             "gross": np.broadcast_to(self.annotation.gross, self.compared.shape).tolist(),
             "gross_deviation": np.broadcast_to(self.annotation.gross_deviation, self.compared.shape).tolist(),
             "bias": self.bias.tolist(),
@@ -219,7 +240,26 @@ def fit_annotation(away: Floats, of_tracks: Sequence[Floats], time: Floats) -> A
     freedom = np.where((compared >= _FEWEST) & np.isfinite(total) & np.isfinite(expected), freedom, 0.0)
     deviation = _deviations(np.nan_to_num(total), np.nan_to_num(expected), freedom)
     gross = _gross_errors(away, of_tracks)
-    return AnnotationFit(AnnotationModel(shift + _per_joint(bias), deviation, life, white, *gross), bias, compared)
+    together = [_correlation(rest, others, deviation, pairs) for pairs in (_BESIDE, _HEAD)]
+    errors = AnnotationModel(shift + _per_joint(bias), deviation, life, white, *gross, *together)
+    return AnnotationFit(errors, bias, compared)
+
+
+def _correlation(rest: Floats, others: Sequence[Floats], deviation: Floats, pairs: NDArray[np.int64]) -> float:
+    """Return the correlation of the random parts of pairs of joints (N, 2), of all actors and pairs.
+
+    Args:
+        rest: offsets of the truth without their means, (F, A, 14, 3) metres.
+        others: the same of recordings with an exact truth: the errors of joints of one track are correlated, too.
+        deviation: deviation of the random part of each joint, (A, 14) metres.
+        pairs: pairs of joints.
+    """
+    one, other = pairs.T
+    both = [(each[:, :, one] * each[:, :, other]).sum(axis=-1) / 3 for each in (rest, *others)]
+    excess = _mean(both[0]) - _mean(np.stack([_mean(each) for each in both[1:]]))
+    weight = np.where(np.isfinite(excess), np.isfinite(both[0]).sum(axis=0), 0)
+    scale = (weight * deviation[:, one] * deviation[:, other]).sum()
+    return float(np.clip((weight * np.nan_to_num(excess)).sum() / max(scale, 1e-12), 0.0, _CLOSEST))
 
 
 def _gross_errors(away: Floats, of_tracks: Sequence[Floats]) -> tuple[Floats, Floats]:

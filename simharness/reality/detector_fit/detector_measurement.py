@@ -24,6 +24,8 @@ count as fewer."""
 
 _COUNTED: Mapping[str, Callable[[FrameSums], Floats]] = {
     "keypoints.inversion_reach": lambda sums: sums.apart.k,
+    "keypoints.drop.edge.self_occluded": lambda sums: sums.edge.n[:, 0],
+    "keypoints.drop.edge.occluded": lambda sums: sums.edge.n[:, 1],
     "keypoints.stray": lambda sums: sums.miss.n,
     "boxes": lambda sums: sums.people.all.n,
     "boxes.duplicates": lambda sums: sums.people.detected,

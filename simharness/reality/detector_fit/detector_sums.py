@@ -124,6 +124,9 @@ class FrameSums(NamedTuple):
 
     classes: Mapping[str, Trials]
     """Joints that each class of errors could have taken and took, by occlusion class and kind, (..., 3, 9)."""
+    edge: Trials
+    """Limb joints that may be dropped, and those dropped, of the hidden joints beside a visible one: self-occluded and
+    occluded, by kind, (..., 2, 9)."""
     face: Trials
     """Joints of the face that nobody else hides, and those not reported, by kind and bearing, (..., 3, 12)."""
     size: Trials

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Bools, Floats
 from simharness.detector.draws import GROSS, LIMB_OF_JOINT, PARENT
 from simharness.detector.error_classes import MIRROR
-from simharness.detector.viewing_conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
+from simharness.detector.viewing_conditions import BESIDE, OCCLUDED, OUTSIDE, SELF_OCCLUDED, VISIBLE, at_edges
 from simharness.reality.detector_fit import detector_sums
 from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints
 from simharness.reality.detector_fit.tetrachoric import correlation_grid, joint_probability
@@ -35,9 +35,6 @@ _LAGS = 8
 BONES = ((5, 7), (6, 8), (7, 9), (8, 10), (11, 13), (12, 14), (13, 15), (14, 16))
 """Limb bones whose length does not change, as pairs of joints."""
 
-NEAR = (*BONES, (5, 11), (6, 12))
-"""Limb joints that are one bone apart along the skeleton."""
-
 BORDER = np.linspace(0.0, 6.0, 49)
 """Edges of the histogram of distances from the border of the image, units."""
 
@@ -59,6 +56,7 @@ def frame_sums(labels: LabelledJoints) -> detector_sums.FrameSums:
     border, outside = _border(labels)
     return detector_sums.FrameSums(
         classes=_shares(labels),
+        edge=_at_edges(labels),
         face=_face(labels),
         size=size,
         size_drop=size_drop,
@@ -99,6 +97,13 @@ def _shares(labels: LabelledJoints) -> dict[str, detector_sums.Trials]:
         n["miss"] += by_chance
         k["miss"] += by_chance
     return {key: detector_sums.Trials(n[key], k[key]) for key in CLASSES}
+
+
+def _at_edges(labels: LabelledJoints) -> detector_sums.Trials:
+    """Return hidden joints beside a visible one, and those dropped, by occlusion class and kind, (T, 2, 9)."""
+    edge = at_edges(np.where(labels.inside, labels.occlusion, np.int8(OUTSIDE)))
+    both = (_by_occlusion(each["drop"] & edge, labels)[:, 1:] for each in (labels.risk, labels.taken))
+    return detector_sums.Trials(*both)
 
 
 def _face(labels: LabelledJoints) -> detector_sums.Trials:
@@ -194,7 +199,7 @@ def _scatter(labels: LabelledJoints) -> detector_sums.ScatterSums:
         offset = np.where(good[..., None], labels.residual / usual[:, None], 0.0)
     steps = lags(labels.step)
     later = [_later(offset, good, lag, labels) for lag in steps]
-    one, other = np.array(NEAR).T
+    one, other = np.array(BESIDE).T
     both = good[..., one] & good[..., other]
     first, second = offset[..., one, :], offset[..., other, :]
     product = np.where(both, (first * second).sum(axis=-1), 0.0)

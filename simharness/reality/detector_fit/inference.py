@@ -34,6 +34,7 @@ SCALES: Scales = {
     "logit": (
         *("keypoints.jitter", "keypoints.miss", "keypoints.inversion.", "keypoints.swap", "keypoints.stray"),
         *("keypoints.guess.self_occluded", "keypoints.guess.occluded", "correlation.scatter_noise"),
+        *("keypoints.drop.edge", "keypoints.drop.self_occluded", "keypoints.drop.occluded"),
         *("scores.good", "scores.jitter", "scores.miss", "scores.inversion", "scores.swap", "scores.hidden"),
         *("scores.guess", "scores.overconfident", "scores.underconfident"),
     ),

@@ -10,7 +10,7 @@ from scipy.special import expit, logit, ndtr
 from mvpose.arrays import Floats
 from simharness.detector.viewing_conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.reality.annotated_recording import DetectorKind
-from simharness.reality.detector_fit.detector_sums import FrameSums
+from simharness.reality.detector_fit.detector_sums import FrameSums, Trials
 from simharness.reality.detector_fit.frame_sums import APART, BORDER, LOGITS, SCORED, TERCILES, lags
 from simharness.reality.detector_fit.joint_labels import CLASSES
 from simharness.reality.detector_fit.tetrachoric import (
@@ -56,7 +56,11 @@ def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> 
             _put_by_kind(result, f"share.{key}", share[key])
         for key in ("swap", "inversion"):
             _put_by_kind(result, f"keypoints.{key}", share[key])
-        n_drop, k_drop = n["drop"], k["drop"]
+        n_drop, k_drop = n["drop"].copy(), k["drop"]
+        edge = _edge(n_drop[:, 1:], k_drop[:, 1:], sums.edge)
+        for index, (_, name) in enumerate(_HIDDEN):
+            result[f"keypoints.drop.edge.{name}"] = edge[:, index]
+        n_drop[:, 1:] -= np.nan_to_num(1 - edge)[..., None] * sums.edge.n
         dropped = np.where(n_drop > 0, k_drop / n_drop, (k_drop.sum(axis=1) / n_drop.sum(axis=1))[:, None])
         for index, occlusion in enumerate(("visible", "self_occluded", "occluded")):
             _put_by_kind(result, f"keypoints.drop.{occlusion}", np.clip(dropped[:, index], 0.0, 1.0))
@@ -130,6 +134,23 @@ def _factors(observed: Floats, expected: Floats) -> Floats:
     pooled = observed.sum(axis=-1, keepdims=True) / expected.sum(axis=-1, keepdims=True)
     pooled = np.where(np.isfinite(pooled), np.maximum(pooled, _LEAST_FACTOR), 1.0)
     return np.asarray(np.maximum((observed + _PRIOR_ERRORS) / (expected + _PRIOR_ERRORS / pooled), _LEAST_FACTOR))
+
+
+def _edge(n: Floats, k: Floats, edge: Trials) -> Floats:
+    """Return by which factors hidden joints beside a visible one are dropped less often than the others, (R, 2).
+
+    The estimate of Mantel and Haenszel (1959), which kinds of joint with other shares do not bias; _PRIOR_ERRORS count
+    as half as often. NaN with few drops.
+
+    Args:
+        n: hidden joints that may be dropped, (R, 2, 9) by occlusion class and kind.
+        k: those that are dropped, (R, 2, 9).
+        edge: both of joints beside a visible one, (R, 2, 9).
+    """
+    beside = (edge.k * (n - edge.n) / np.maximum(n, 1)).sum(axis=-1)
+    others = ((k - edge.k) * edge.n / np.maximum(n, 1)).sum(axis=-1)
+    ratio = (beside + _PRIOR_ERRORS / 2) / (others + _PRIOR_ERRORS)
+    return np.where(k.sum(axis=-1) >= _MIN_HIDDEN, np.minimum(ratio, 1.0), np.nan)
 
 
 def _guesses(n: dict[str, Floats], k: dict[str, Floats], sums: FrameSums) -> dict[str, Floats]:

@@ -21,7 +21,11 @@ PRIORS: Mapping[DetectorKind, str] = {"top-down": "topdown", "bottom-up": "typic
 
 _OF_QUALITY = ("keypoints.jitter.", "keypoints.miss.", "keypoints.inversion.", "keypoints.swap.")
 
-_ESTIMATES = {"keypoints.inversion_reach": 0.3, **{f"keypoints.stray.{kind}": 0.3 for kind in KINDS[3:]}}
+_ESTIMATES = {
+    "keypoints.inversion_reach": 0.3,
+    **dict.fromkeys(("keypoints.drop.edge.self_occluded", "keypoints.drop.edge.occluded"), 0.5),
+    **{f"keypoints.stray.{kind}": 0.3 for kind in KINDS[3:]},
+}
 """Estimates of parameters that the shipped profiles leave out."""
 
 _MOST = {
@@ -73,7 +77,7 @@ def prior_of(kind: DetectorKind) -> dict[str, float]:
     profile = read_profile(PRIORS[kind])
     quality, result = profile.keypoints.quality, dict(_ESTIMATES)
     for key, value in _numbers(profile.model_dump(), ""):
-        if value or key not in result:
+        if key not in _ESTIMATES or value not in (0.0, 1.0):  # no effect
             result[key] = quality * value if key.startswith(_OF_QUALITY) else value
     return result
 

@@ -125,6 +125,16 @@ class BiasSection(ByJoint[Offset]):
         return BiasSection(nose=self.nose, eyes=self.eyes, ears=self.ears)
 
 
+class EdgeSection(Section):
+    """Factors on the drops of hidden limb joints beside a visible one: they are just behind an edge.
+
+    Beside are the joints that a bone joins, and shoulder and hip of one side.
+    """
+
+    self_occluded: Share = 1.0
+    occluded: Share = 1.0
+
+
 class DropSection(Section):
     """Shares of the joints in the picture that are not reported at all, by the cause of their occlusion.
 
@@ -135,6 +145,7 @@ class DropSection(Section):
     visible: Shares = Shares()
     self_occluded: Shares = Shares()
     occluded: Shares = Shares()
+    edge: EdgeSection = EdgeSection()
 
 
 class FaceSection(Section):

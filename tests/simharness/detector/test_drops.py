@@ -73,6 +73,40 @@ class TestTree:
         assert (kept <= (alone.error != KeypointError.ABSENT)).all()
 
 
+EDGE = {"edge": {"self_occluded": 0.25, "occluded": 0.5}}
+
+
+class TestEdges:
+    """Hidden joints beside a visible one are dropped less often."""
+
+    SEEN = np.full(17, Visibility.VISIBLE)
+    SEEN[[8, 10, 13, 15]] = Visibility.SELF_OCCLUDED
+    SEEN[[6, 12, 14, 16]] = Visibility.OCCLUDED_BY_PERSON
+
+    def test_factors_are_of_hidden_joints_beside_visible_ones(self):
+        """The left knee is beside a visible hip; nothing beside the right arm and leg, and the left ankle, is."""
+        where = world(frames=1500, visibility=np.broadcast_to(self.SEEN, (1500, 3, 2, 17)))
+        drop = {"visible": 0.04, "self_occluded": 0.4, "occluded": 0.6, **EDGE}
+        gone = missing(where, drop=drop)
+        shares = {13: 0.1, 15: 0.4, 8: 0.4, 10: 0.4, 6: 0.6, 12: 0.6, 14: 0.6, 16: 0.6, 5: 0.04, 7: 0.04, 0: 0.04}
+        for joint, share in shares.items():
+            assert within(gone[..., joint].sum(), gone[..., joint].size, share), joint
+
+    def test_joints_outside_of_the_image_are_not_visible(self):
+        seen = np.full(17, Visibility.OUTSIDE)
+        seen[[13, 0]] = Visibility.OCCLUDED_BY_CLUTTER, Visibility.VISIBLE
+        where = world(frames=1500, visibility=np.broadcast_to(seen, (1500, 3, 2, 17)))
+        gone = missing(where, drop={"occluded": 0.6, **EDGE})[..., 13]
+        assert within(gone.sum(), gone.size, 0.6)
+
+    def test_lower_factors_only_keep_more(self):
+        where = world(visibility=np.broadcast_to(self.SEEN, (60, 3, 2, 17)))
+        drop = {"self_occluded": 0.4, "occluded": 0.6}
+        many, few = (missing(where, drop=each) for each in (drop, {**drop, **EDGE}))
+        assert (few <= many).all()
+        assert np.flatnonzero((few != many).any(axis=(0, 1, 2))).tolist() == [13]
+
+
 RISING = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 0.5]
 
 

@@ -103,6 +103,16 @@ class TestDrawn:
         assert (rest[0::2] * rest[1::2]).mean() == pytest.approx(np.exp(-STEP / 0.4), abs=0.03)
         assert (rest[1:-1:2] * rest[2::2]).mean() == pytest.approx(0.0, abs=0.03)
 
+    def test_errors_of_joints_that_a_bone_joins_are_correlated(self, still):
+        """Of joints n bones apart the correlation is the n-th power; head and limbs are independent."""
+        annotation = replace(model(shift=0.0, life=0.1), near=0.5, head=0.7)
+        rest = errors(annotation, *still)
+        np.testing.assert_allclose(rest.std(axis=(0, 1, 3)), 0.02, rtol=0.05)
+        found = np.corrcoef(np.moveaxis(rest, 2, 0).reshape(14, -1))
+        pairs = {(0, 1): 0.5, (7, 8): 0.5, (0, 2): 0.25, (2, 8): 0.5, (12, 13): 0.7, (8, 12): 0.0, (6, 11): 0.5**6}
+        for pair, expected in pairs.items():
+            assert found[pair] == pytest.approx(expected, abs=0.05), pair
+
     def test_seeds_and_missing_people(self, filmed):
         joints, time = filmed.sequence.joints.copy(), filmed.sequence.time
         whole = model().annotate(joints, time, seed=3)
@@ -256,6 +266,19 @@ class TestRandomPart:
         found = self.fitted(deviation, 0.005).deviation
         np.testing.assert_allclose(found[:, 5], 0.04, rtol=0.15)
         np.testing.assert_allclose(np.delete(found, 5, axis=1), 0.01, rtol=0.25)
+
+    def test_errors_of_joints_together_are_told_from_those_of_tracks(self, filmed):
+        """The joints of a track err together, too: 20 mm, all limbs alike."""
+        known = replace(model(shift=0.0, deviation=0.02, life=0.05), near=0.3, head=0.7)
+        still = np.broadcast_to(filmed.sequence.joints[0], (self.FRAMES, 3, 17, 3))
+        tracks = [
+            0.02 * np.random.default_rng(seed).standard_normal((self.FRAMES, self.ACTORS, 1, 3)) for seed in (1, 2, 3)
+        ]
+        away = errors(known, still, STEP * np.arange(self.FRAMES)) + tracks[0]
+        exact = [np.broadcast_to(each, away.shape) for each in tracks[1:]]
+        found = fit_annotation(away, exact, STEP * np.arange(self.FRAMES)).annotation
+        assert found.near == pytest.approx(0.3, abs=0.06)
+        assert found.head == pytest.approx(0.7, abs=0.1)
 
     def test_gross_errors_are_told_from_the_random_part(self, filmed):
         """One joint is off by 10 cm along each axis in a tenth of the frames."""

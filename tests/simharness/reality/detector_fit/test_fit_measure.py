@@ -127,6 +127,23 @@ class TestDrops:
             n, k = (each[:, index, 3:].sum() for each in found.classes["drop"])
             assert k / n == pytest.approx(expected, abs=4 * np.sqrt(expected * (1 - expected) / n))
 
+    @pytest.mark.parametrize("factors", [(0.25, 0.5), (0.9, 0.1)])
+    def test_factors_of_joints_at_edges(self, filmed, factors):
+        """Also where the shares of kinds of joint differ: elbows are hidden at edges more often than others."""
+        names, kinds = ("self_occluded", "occluded"), {**dict.fromkeys(KINDS, 0.2), "elbows": 0.7, "wrists": 0.5}
+        drop = {"self_occluded": kinds, "occluded": kinds, "edge": dict(zip(names, factors, strict=True))}
+        found = point_estimates(filmed.sample(staged=True, keypoints={"drop": drop}))
+        for name, factor in zip(names, factors, strict=True):
+            assert found[f"keypoints.drop.edge.{name}"] == pytest.approx(factor, abs=0.06), name
+            for kind in LIMB_KINDS:
+                share = found[f"keypoints.drop.{name}.{kind}"]
+                assert share == pytest.approx(kinds[kind], abs=0.04), (name, kind)
+
+    def test_few_drops_say_nothing_about_edges(self, filmed):
+        measured = measure_detector(part(filmed.sample(keypoints={"drop": {"self_occluded": 0.01}}), 20), resamples=5)
+        assert not measured["keypoints.drop.edge.self_occluded"].known
+        assert "edge" not in settings(measured, name="few")["keypoints"]["drop"]
+
     def test_joints_below_a_missing_one_do_not_count(self, filmed):
         """The same detections as of a top-down detector: wrists also fall with their elbows and shoulders."""
         sample = part(filmed.sample(**DROPPING), 80)
