@@ -65,4 +65,5 @@ class ScenarioFile(Scenario):
     detector: DetectorFileSection = DetectorFileSection()
     sweep: dict[str, Any] = key({}, "keys of a scenario, each with a list or a range of values")
     cases: dict[str, dict[str, Any]] = key({}, "named changes, each run with every setting of the sweep")
+    search: dict[str, Any] = key({}, "keys that a hunt may change, each with a list or a range of values")
     gate: GateSection = GateSection()

@@ -24,6 +24,9 @@ Beside the keys of a scenario, a scenario file may have::
     [cases.crowd]                     # named changes, each run with every setting of the sweep
     people.count = 8
 
+    [search]                          # keys that a hunt may change, written as those of [sweep]
+    people.count = [2, 4, 8]
+
     [method.estimators]               # user-defined estimators: simharness.trial.stages.estimators
     custom = "custom.py:Custom"
 
@@ -167,6 +170,21 @@ class ScenarioPlan:
     """At least one case."""
     gate: GateSection
     """Section [gate]."""
+    search: Sweep
+    """Section [search]."""
+
+    def at(self, values: Mapping[str, Value], seed: int) -> Scenario:
+        """Return the base with other values of keys of [search], at a seed.
+
+        Raises:
+            ScenarioError: the values are not valid together.
+        """
+        mistakes: list[str] = []
+        keys = vary(self.cases[0].data, self.cases[0].origins, self.search, values)
+        scenario = _Settings(self.document, mistakes).scenario(*keys)
+        refuse(mistakes)
+        assert scenario is not None
+        return scenario.model_copy(update={"seed": seed})
 
     @property
     def settings(self) -> int:
@@ -305,6 +323,7 @@ def read_plan(
     mistakes: list[str] = []
     reader = SweepReader(origins, str(document.path), mistakes)
     settings = _Settings(document, mistakes)
+    search = reader.sweep(data.pop("search", {}), "search")
     sweep = reader.sweep(data.pop("sweep", {}))
     changes = reader.cases(data.pop("cases", {}), sweep) or {"": {}}
     gate = settings.checker.gate(data.pop("gate", {}), origins)
@@ -318,13 +337,14 @@ def read_plan(
         if scenario is not None:
             values = {key: value_at(scenario, keys[0], key) for key in sweep.keys}
             cases.append(ScenarioCase(name, *keys, changed, scenario, values))
-    if mistakes:  # report those of swept values as well: settings are not made after a mistake
-        for axis in sweep.axes:
+    # Those of swept values are reported as well where there are others: settings are not made after a mistake.
+    for axes in (search, sweep) if mistakes else (search,):
+        for axis in axes.axes:
             for axis_values in axis.values:
-                settings.scenario(*vary(data, origins, sweep, dict(zip(axis.keys, axis_values, strict=True))))
+                settings.scenario(*vary(data, origins, axes, dict(zip(axis.keys, axis_values, strict=True))))
     refuse(mistakes)
     assert base is not None
-    return ScenarioPlan(document, base, all_seeds, sweep, tuple(cases), gate)
+    return ScenarioPlan(document, base, all_seeds, sweep, tuple(cases), gate, search)
 
 
 def _refuse_second(origins: Origins, key: Key, option: str) -> None:

@@ -1,4 +1,4 @@
-"""[sweep], [cases] and seeds: values of the keys of a scenario, their combinations, and the keys of each setting."""
+"""[sweep], [search], [cases] and seeds: values of keys of a scenario, their combinations, the keys of each setting."""
 
 import itertools
 import json
@@ -37,6 +37,7 @@ NOT_VARIED: dict[layers.Key, str] = {
     ("gate",): "a study has one gate",
     ("sweep",): "a study has one [sweep]",
     ("cases",): "a study has one table of [cases]",
+    ("search",): "a scenario has one [search]",
 }
 
 
@@ -53,6 +54,11 @@ class Axis:
     def is_numeric(self) -> bool:
         """Whether it has numbers of a single key."""
         return all(len(each) == 1 and type(each[0]) in (int, float) for each in self.values)
+
+    def at(self, share: float) -> list[tuple[str, Value]]:
+        """Return the keys with their values at a share of the way through the values, 0 to 1."""
+        which = min(int(share * len(self.values)), len(self.values) - 1)
+        return list(zip(self.keys, self.values[which], strict=True))
 
     def others(self, base: Mapping[str, Value]) -> list[tuple[Value, ...]]:
         """Return the values that differ from those of the base."""
@@ -128,12 +134,14 @@ class SweepReader:
         self._mistakes = mistakes
         self._swept: dict[str, str] = {}
 
-    def sweep(self, section: Any) -> Sweep:
-        """Return the axes of [sweep]."""
+    def sweep(self, section: Any, name: str = "sweep") -> Sweep:
+        """Return the axes of [sweep], or those of [search], which have no settings of their own."""
         if not isinstance(section, Mapping):
-            message = f"sweep: expected a section [sweep] with keys of a scenario, got {_shown(section)}"
-            self._refuse(("sweep",), message)
+            message = f"{name}: expected a section [{name}] with keys of a scenario, got {_shown(section)}"
+            self._refuse((name,), message)
             return Sweep()
+        if name == "search" and (other := {"one_at_a_time", "refine"} & section.keys()):
+            self._refuse((name, *other), f"{', '.join(sorted(other))}: only a sweep has this; remove it")
         section = dict(section)
         one_at_a_time = section.pop("one_at_a_time", False)
         if not isinstance(one_at_a_time, bool):
@@ -143,18 +151,20 @@ class SweepReader:
             self._refuse(("sweep", "refine"), f"refine: expected 0 to {MOST_ADDED} values, got {_shown(refine)}")
             refine = 0
         paired = section.pop("paired", [])
-        axes = [Axis((dotted,), tuple((value,) for value in values)) for dotted, values in self._varied(section)]
+        axes = [
+            Axis((dotted,), tuple((value,) for value in values)) for dotted, values in self._varied(section, (name,))
+        ]
         for axis in axes:
-            self._refuse_repeated(axis, ("sweep", *axis.keys[0].split(".")))
+            self._refuse_repeated(axis, (name, *axis.keys[0].split(".")))
         if isinstance(paired, list) and all(isinstance(table, Mapping) for table in paired):
             axes += filter(None, map(self._pair, paired))
         else:
-            self._refuse(("sweep", "paired"), f"paired: expected tables [[sweep.paired]], got {_shown(paired)}")
+            self._refuse((name, "paired"), f"paired: expected tables [[{name}.paired]], got {_shown(paired)}")
         keys = [tuple(key.split(".")) for axis in axes for key in axis.keys]
         for index, key in enumerate(keys):
             if clash := next((other for other in keys[:index] if layers.overlap(key, other)), None):
                 also = "" if clash == key else f", because {'.'.join(clash)} is swept"
-                self._refuse(("sweep", *key), f"{'.'.join(key)} is swept twice{also}; remove one of them")
+                self._refuse((name, *key), f"{'.'.join(key)} is swept twice{also}; remove one of them")
         return Sweep(tuple(axes), one_at_a_time is True, self._swept, refine)
 
     def cases(self, section: Any, sweep: Sweep) -> dict[str, dict[str, Any]]:
@@ -227,9 +237,9 @@ class SweepReader:
         return layers.merge_with_presets(data, changes), origins
 
     def origin(self, key: layers.Key) -> str:
-        """Return the origin of a key of [sweep] or [cases], with which its messages begin."""
+        """Return the origin of a key of [sweep], [search] or [cases], with which its messages begin."""
         origin = origin_of(key, self.origins, self._file)
-        section = "sweep" if key[0] == "sweep" else ".".join(key[:2])
+        section = ".".join(key[:2]) if key[0] == "cases" else key[0]
         return origin if origin.startswith("--") else f"{origin}, [{section}]"
 
     def _refuse(self, key: layers.Key, message: str) -> None:

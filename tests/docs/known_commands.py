@@ -48,6 +48,7 @@ NAMES = (  # mentioned
     "simharness fit-detector",
     "simharness profile-network",
     "simharness score",
+    "simharness hunt my-room.toml --budget 30m",  # tests/simharness/hunt/test_hunt_run.py
     "simharness shrink results/failures/NAME.toml",  # tests/simharness/hunt/test_kept_failure.py
 )
 CHECKS = (
@@ -139,7 +140,6 @@ ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tr
 POWER = "python -m benchmarks.validation FOLDER"  # half an hour, and the data of Shelf; test_wrong_twins.py
 LOOP = "python -m benchmarks.fit FOLDER"  # half an hour; tests/benchmarks/fit/test_closed_loop.py
 OUT_OF_SAMPLE = "python -m benchmarks.fit FOLDER --out-of-sample"  # tests/benchmarks/fit/test_closed_loop.py
-HUNT = "python -m benchmarks.hunt benchmarks/hunt/room.toml FOLDER --trials 96 --method lhs"  # tests/benchmarks/hunt
 # tests/simharness/outputs/benchmark/test_submission.py
 SCORED = ("simharness score SUBMISSION benchmark/gathering", "simharness score FILE benchmark/gathering")
 SEED_SCORES = "python -m tools.paper_tables.seed_scores"  # tests/tools/test_seed_scores.py
@@ -172,7 +172,6 @@ KNOWN = {
     POWER,
     LOOP,
     OUT_OF_SAMPLE,
-    HUNT,
     LEADERBOARD,
     *BAKE,
     GALLERY,

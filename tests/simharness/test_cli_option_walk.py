@@ -73,6 +73,7 @@ BASES = {
     "mjcf": "{lab}/tiny.toml --out {out}",
     "check": "ci --baseline {lab}/base.json",
     "blame": "{lab}/tiny.toml",
+    "hunt": "{lab}/tiny.toml --out {out}",
     "shrink": "{lab}/wrong.toml --out {out}",
     "report": "{lab}/study",
     "study": "{lab}/tiny.toml --out {out}",
@@ -125,6 +126,19 @@ ROWS = {
         "variant": Row("--variant full"),
         "score": Row("--score recall"),
         "cause": Row("--cause noise"),
+    },
+    "hunt": WORKERS
+    | {
+        "overrides": RESULT["set"],
+        "variant": Row("--variant no-3dps"),
+        "property": Row("--property mirrored"),
+        "rival": Row("--rival full --property disagree"),
+        "method": Row("--method lhs"),
+        "trials": Row("--trials 3"),
+        "budget": Row("--budget 1h"),
+        "seed": Row("--seed 3"),
+        "keep": Row("--keep 3"),
+        "out": RESULT["out"],
     },
     "shrink": RUN
     | {
@@ -279,6 +293,7 @@ def _stand_ins(study):
     checked_profile = SimpleNamespace(summary=dict, scenes=(), detectors=(), variants=(), verdicts={})
     return {
         "simharness.outputs.run.result_folder": {"run": None},
+        "simharness.hunt.hunt_run": {"run_hunt": None},
         "simharness.gate.suite": {"baseline_of": (), "check": checked, "run_suite": measured},
         "simharness.gate.baseline": {"write_baseline": ()},
         "simharness.study.causes.cause_shares": {"blame": blame},

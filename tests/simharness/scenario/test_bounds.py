@@ -15,6 +15,7 @@ from simharness.scenario.toml_files import ScenarioError
 UNBOUNDED = {
     "sweep": "its values are checked as those of the keys that they replace, and its settings are counted",
     "cases": "as sweep",
+    "search": "as sweep",
     "method.estimators": "one name for each file of the user",
 }
 

@@ -2,27 +2,20 @@
 
 import json
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from crowded_frames import crowd
+from typer.testing import CliRunner
 
-from benchmarks.hunt.__main__ import main
-from benchmarks.hunt.hunt_run import TRIALS, HuntedPoint, distinct
-from benchmarks.hunt.hunted_trial import NOISES, HuntFinding, circumstances
+from simharness.cli import app
+from simharness.hunt.hunt_run import TRIALS, HuntedPoint, distinct
+from simharness.hunt.hunted_trial import NOISES, HuntFinding, circumstances
 from simharness.hunt.kept_failure import read_failure
 
 SEARCHED = """
-scenario = "small.toml"
-overrides = ["detector.profile=crowded"]
-[search]
-people.count = { from = 2, to = 4, steps = 3 }
-cameras.count = [3, 4]
-detector.boxes.missed = { from = 0.6, to = 0.9, steps = 4 }
-"""
-SMALL = """
 extends = "quickstart"
+name = "searched"
 duration = 0.4
 rate = 5.0
 variants = ["fast"]
@@ -30,21 +23,23 @@ variants = ["fast"]
 spacing = 0.5
 [rendering]
 renderer = "rays"
+[detector]
+profile = "crowded"
+[search]
+people.count = { from = 2, to = 4, steps = 3 }
+cameras.count = [3, 4]
+detector.boxes.missed = { from = 0.6, to = 0.9, steps = 4 }
 """
 
 
 @pytest.fixture
-def hunt(tmp_path, capsys):
+def hunt(tmp_path):
     (tmp_path / "searched.toml").write_text(SEARCHED)
-    (tmp_path / "small.toml").write_text(SMALL)
 
     def call(*options, out="out"):
-        code = 0
-        try:
-            main([str(tmp_path / "searched.toml"), str(tmp_path / out), *options])
-        except SystemExit as stopped:
-            code = stopped.code
-        return SimpleNamespace(exit_code=code, **capsys.readouterr()._asdict()), tmp_path / out
+        words = ["hunt", str(tmp_path / "searched.toml"), "--out", str(tmp_path / out), *options]
+        result = CliRunner().invoke(app, words)
+        return result, tmp_path / out / "searched"
 
     return call
 
@@ -56,7 +51,7 @@ def content(folder):
 def test_a_hunt_finds_keeps_and_continues(hunt):
     options = ["--trials", "4", "--method", "random", "--keep", "2"]
     result, folder = hunt(*options)
-    assert result.exit_code == 0, result.err
+    assert result.exit_code == 0, result.output
     lines = [json.loads(line) for line in (folder / TRIALS).read_text().splitlines()]
     assert [row["trial"] for row in lines[1:]] == list(range(4))
     assert all(row["error"] == "" for row in lines[1:])
@@ -67,18 +62,18 @@ def test_a_hunt_finds_keeps_and_continues(hunt):
     for path in kept:
         failure = read_failure(path)
         assert failure.replay()[1]
-        assert failure.text in result.out
+        assert failure.text in result.stdout
     text = (folder / TRIALS).read_text()
     (folder / TRIALS).write_text("".join(text.splitlines(keepends=True)[:3]) + '{"trial": 3, "val')
     again, _ = hunt(*options)
-    assert again.exit_code == 0, again.err
+    assert again.exit_code == 0, again.output
     restored = content(folder)
     assert sorted(restored.pop(TRIALS).splitlines()) == sorted(whole.pop(TRIALS).splitlines())
     assert restored == whole
-    assert again.out == result.out
+    assert again.stdout == result.stdout
     refused, _ = hunt(*options, "--seed", "5")
     assert refused.exit_code == 2
-    assert "another hunt" in refused.err
+    assert "another hunt" in refused.stderr
 
 
 @pytest.mark.slow
@@ -94,9 +89,9 @@ def test_the_number_of_workers_changes_nothing(hunt):
 @pytest.mark.parametrize(
     ("options", "what"),
     [
-        (["--minutes", "soon"], "--minutes"),
-        (["--trials", "0"], "--trials"),
-        (["--method", "luck"], "--method"),
+        (["--budget", "soon"], "--budget soon"),
+        (["--method", "luck"], "--method luck"),
+        (["--set", "search={}"], "nothing to search"),
         (["--property", "luck"], "no such property"),
         (["--variant", "track"], "memory"),
     ],
@@ -104,7 +99,7 @@ def test_the_number_of_workers_changes_nothing(hunt):
 def test_what_cannot_be_hunted(hunt, options, what):
     result, _ = hunt("--trials", "1", *options)
     assert result.exit_code == 2
-    assert what in result.err
+    assert what in result.stderr
 
 
 def finding(**changes):

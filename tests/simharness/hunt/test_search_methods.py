@@ -1,19 +1,18 @@
 """Search methods: points of the unit cube that follow from the seed, spread as each method promises."""
 
-import importlib.util
-
 import numpy as np
 import pytest
 
-from benchmarks.hunt.hunted_trial import NOISES, HuntFinding
-from benchmarks.hunt.search_methods import BATCH, search_method
+from simharness.hunt.hunted_trial import NOISES, HuntFinding
+from simharness.hunt.search_methods import BATCH, search_method
 
 NAMES = ("missed", "merged")
 ELITE = np.array([0.9, 0.1, 0.2])
 
 
-NEEDS_RIBS = pytest.mark.skipif(importlib.util.find_spec("ribs") is None, reason="ribs is not installed")
-METHODS = ("random", "lhs", pytest.param("map-elites", marks=NEEDS_RIBS))
+def methods():
+    pytest.importorskip("ribs")
+    return ("random", "lhs", "map-elites")
 
 
 def made(name, seed=3, trials=None):
@@ -35,7 +34,7 @@ def searched(name, batches, seed=3):
     return np.concatenate(points)
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", methods())
 def test_points_follow_from_the_seed_and_stay_in_the_cube(name):
     points = searched(name, 6)
     assert points.shape == (6 * BATCH, 3)
@@ -51,8 +50,8 @@ def test_each_layer_of_a_hypercube_has_one_point():
     assert (np.sort((points * 2 * BATCH).astype(int), axis=0) == np.arange(2 * BATCH)[:, None]).all()
 
 
-@NEEDS_RIBS
 def test_map_elites_returns_to_what_failed():
+    pytest.importorskip("ribs")
     shares = {}
     for name in ("random", "map-elites"):
         points = searched(name, 20)

@@ -14,15 +14,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from benchmarks.hunt.hunted_trial import HuntFinding, HuntOutput, hunt_in_trial
-from benchmarks.hunt.search_file import SearchFile
-from benchmarks.hunt.search_methods import search_method
 from mvpose.commands.output_files import write_text
 from mvpose.commands.progress import Reporter, Silence
 from simharness.hunt.frozen_frame import freeze
+from simharness.hunt.hunted_trial import HuntFinding, HuntOutput, hunt_in_trial
 from simharness.hunt.kept_failure import KeptFailure, judge_of, keep, write_failure
-from simharness.scenario.load import fingerprint
-from simharness.scenario.sweep import Value
+from simharness.hunt.search_methods import search_method
+from simharness.scenario.load import ScenarioPlan, Value, fingerprint
 from simharness.study.scheduler import TrialFailure, Unit, run_units
 from simharness.trial.run_trial import run_trial
 
@@ -34,8 +32,8 @@ T = TypeVar("T")
 class Hunt:
     """What is hunted, and how."""
 
-    search: SearchFile
-    """The scenario and the values that may change in it."""
+    plan: ScenarioPlan
+    """The scenario file with its section [search]."""
     variants: tuple[str, ...]
     """Variant of the method, and a rival for the property "disagree"."""
     properties: tuple[str, ...]
@@ -55,7 +53,7 @@ class HuntedPoint:
     trial: int
     """Its number."""
     values: Mapping[str, Value]
-    """Values of the keys of the search."""
+    """Values of the keys of [search]."""
     seed: int
     """Seed of the scene."""
     findings: tuple[HuntFinding, ...] = ()
@@ -100,16 +98,24 @@ def run_hunt(
         The trials in the order of the search, and the kept failures.
 
     Raises:
-        ValueError: the folder holds another hunt, or the search method needs a library.
+        ValueError: nothing to search, or the folder holds another hunt.
     """
-    axes, most = hunt.search.axes, hunt.trials
+    axes, most = hunt.plan.search.axes, hunt.trials
+    if not axes:
+        raise ValueError(
+            f"{hunt.plan.document.path}: has nothing to search; add a section [search] with keys and their values: "
+            "people.count = { from = 2, to = 8, steps = 7 }"
+        )
     start, reporter = time.monotonic(), reporter or Silence()
     search = search_method(hunt.method, len(axes), hunt.seed, properties=hunt.properties, trials=most)
     stored, points = _stored(hunt, folder / TRIALS), list[HuntedPoint]()
     with reporter.stage("trials", most or 0) as advance:
         while (most is None or len(points) < most) and (seconds is None or time.monotonic() - start < seconds):
             asked = search.ask()[: None if most is None else most - len(points)]
-            wanted = [(hunt.search.chosen(each), number) for number, each in enumerate(asked.tolist(), len(points))]
+            wanted = [
+                (dict(pair for axis, share in zip(axes, each, strict=True) for pair in axis.at(share)), number)
+                for number, each in enumerate(asked.tolist(), len(points))
+            ]
             for point in _measured(hunt, [each for each in wanted if each[1] not in stored], workers):
                 stored[point.trial] = point
                 with (folder / TRIALS).open("a", encoding="utf-8") as file:
@@ -137,8 +143,8 @@ def _stored(hunt: Hunt, path: Path) -> dict[int, HuntedPoint]:
         ValueError: another hunt is stored there.
     """
     heading: dict[str, Any] = {
-        "scenario": fingerprint(hunt.search.base),
-        "search": [vars(each) for each in hunt.search.axes],
+        "scenario": fingerprint(hunt.plan.base),
+        "search": [vars(each) for each in hunt.plan.search.axes],
     }
     heading |= {key: getattr(hunt, key) for key in ("variants", "properties", "method", "seed")}
     heading = json.loads(json.dumps(heading | ({"trials": hunt.trials} if hunt.method == "lhs" else {})))
@@ -147,7 +153,7 @@ def _stored(hunt: Hunt, path: Path) -> dict[int, HuntedPoint]:
         del lines[-1]
     rows = list(map(json.loads, lines))
     if rows and rows[0] != heading:
-        raise ValueError(f"{path}: holds another hunt, or one of other code; choose another folder or remove it")
+        raise ValueError(f"{path}: holds another hunt, or one of other code; choose another --out or remove it")
     write_text("".join(lines) or json.dumps(heading) + "\n", path)
     found = [
         HuntedPoint(**row | {"findings": tuple(HuntFinding(**each) for each in row["findings"])}) for row in rows[1:]
@@ -159,9 +165,9 @@ def _measured(hunt: Hunt, wanted: Sequence[tuple[dict[str, Value], int]], worker
     """Yield trials with these values and numbers as they end."""
     units, points = [], {}
     for values, number in wanted:
-        points[str(number)] = HuntedPoint(number, values, hunt.search.base.seed + number)
+        points[str(number)] = HuntedPoint(number, values, hunt.plan.base.seed + number)
         try:
-            units.append(Unit(str(number), hunt.search.at(values, points[str(number)].seed), hunt.variants))
+            units.append(Unit(str(number), hunt.plan.at(values, points[str(number)].seed), hunt.variants))
         except ValueError as error:
             yield replace(points[str(number)], error=str(error))
     measure = partial(hunt_in_trial, properties=hunt.properties)
@@ -177,13 +183,13 @@ def _measured(hunt: Hunt, wanted: Sequence[tuple[dict[str, Value], int]], worker
 
 def _keep(hunt: Hunt, point: HuntedPoint, finding: HuntFinding) -> KeptFailure | None:
     """Shrink the frame of a finding; None where it does not fail by what a frozen frame holds."""
-    search, (variant, *rivals) = hunt.search, hunt.variants
-    about: dict[str, Any] = {"variant": variant, "rival": "".join(rivals), "estimators": search.base.method.estimators}
+    plan, (variant, *rivals) = hunt.plan, hunt.variants
+    about: dict[str, Any] = {"variant": variant, "rival": "".join(rivals), "estimators": plan.base.method.estimators}
     judge = judge_of(**about)
-    recording = run_trial(search.at(point.values, point.seed), variants=hunt.variants, until="detect").recording
+    recording = run_trial(plan.at(point.values, point.seed), variants=hunt.variants, until="detect").recording
     frozen = freeze(recording.rig, recording.detections[finding.frame], recording.truth[finding.frame])
     keys = ", ".join(f"{key} = {value}" for key, value in point.values.items())
-    about["origin"] = f"{search.base.name}, {keys}, seed {point.seed}, frame {finding.frame}"
+    about["origin"] = f"{plan.base.name}, {keys}, seed {point.seed}, frame {finding.frame}"
     found = judge.violations(frozen, (finding.violated,))
     violation = next((each for each in found if each.person == finding.person), None)
-    return keep(frozen, violation, judge, scenario=search.base.name, about=about) if violation else None
+    return keep(frozen, violation, judge, scenario=plan.base.name, about=about) if violation else None

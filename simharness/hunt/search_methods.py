@@ -12,13 +12,10 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from benchmarks.hunt.hunted_trial import BINS, NOISES, HuntFinding
 from mvpose.arrays import Floats
+from simharness.hunt.hunted_trial import BINS, NOISES, HuntFinding
 from simharness.scoring.stage_blame import Stage
 from simharness.types.random_streams import stream
-
-METHODS = ("map-elites", "lhs", "random")
-"""Names of the search methods."""
 
 BATCH = 16
 """Points that are tried before the method hears of their results."""
@@ -70,7 +67,7 @@ class MapElites(RandomSearch):
             from ribs.emitters import IsoLineEmitter
         except ImportError:
             raise ValueError(
-                '--method map-elites: needs ribs; install the extra "bench", or choose another method'
+                '--method map-elites: needs ribs; install the extra "hunt", or choose another method'
             ) from None
         sizes = [len(properties), len(_STAGES), *(len(borders) + 1 for borders in BINS.values())]
         ranges = [(-0.5, size - 0.5) for size in sizes]
@@ -112,6 +109,6 @@ def search_method(
     """
     if name == "map-elites":
         return MapElites(dimensions, seed, properties)
-    if name not in METHODS:
+    if name not in ("random", "lhs"):
         raise ValueError(f"--method {name}: no such method; expected map-elites, lhs or random")
     return LatinHypercube(dimensions, seed, trials or 64) if name == "lhs" else RandomSearch(dimensions, seed)

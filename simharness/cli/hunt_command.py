@@ -1,0 +1,114 @@
+"""``simharness hunt``: a search for failures, each shrunk and kept."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from mvpose.commands.option_groups import grouped, option
+from simharness.cli.program import PROGRAM, Overrides, ScenarioFile, Workers
+from simharness.cli.shrink_command import Checked
+
+if TYPE_CHECKING:
+    from simharness.hunt.hunt_run import HuntedPoint
+    from simharness.hunt.kept_failure import KeptFailure
+
+_UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
+
+
+@dataclass(frozen=True)
+class Searching:
+    """How the next trials are found, and how many."""
+
+    method: str = option(
+        "map-elites", "How to search: [cyan]map-elites[/], [cyan]lhs[/], [cyan]random[/].", metavar="METHOD"
+    )
+    trials: int | None = option(None, "Number of trials. [dim]\\[default: until --budget is over][/]", min=1)
+    budget: str | None = option(
+        None, "Time of the search: [cyan]90s[/], [cyan]30m[/], [cyan]2h[/]. [dim]\\[default: 30m][/]", metavar="TIME"
+    )
+    seed: int = option(0, "Seed of the search.", metavar="N", min=0)
+    keep: int = option(10, "Largest number of kept failures.", metavar="N", min=0)
+
+    @property
+    def seconds(self) -> float | None:
+        """Time of the search, seconds; None where the number of trials ends it.
+
+        Raises:
+            ValueError: the budget is no time.
+        """
+        budget = self.budget or ("30m" if self.trials is None else None)
+        if budget is None:
+            return None
+        if not (match := re.fullmatch(r"(\d+(?:\.\d+)?)([smh])", budget)):
+            raise ValueError(f"--budget {budget}: expected a time such as 90s, 30m or 2h")
+        return float(match[1]) * _UNITS[match[2]]
+
+
+@grouped()
+def hunt(
+    scenario: ScenarioFile,
+    overrides: Overrides = None,
+    workers: Workers = 1,
+    out: Path = option(
+        Path("results/hunts"), "Folder in which the hunt gets a folder with the name of the scenario.", file_okay=False
+    ),
+    *,
+    checked: Checked,
+    searching: Searching,
+) -> None:
+    r"""Hunt for failures: search the ranges of the section \[search] of a scenario for trials in which something fails.
+
+    A failure counts if it comes back with most fresh draws of the detector's
+    errors. One of each kind and stage to blame is shrunk, printed and kept.
+    The same command continues an interrupted hunt.
+    """
+    with PROGRAM.exit_on_error():
+        from mvpose.commands.progress import reporter
+        from simharness.hunt.hunt_run import Hunt, run_hunt
+        from simharness.hunt.kept_failure import check_alone
+        from simharness.hunt.properties import properties_of
+        from simharness.outputs.hunt.page import write_failures_page
+        from simharness.scenario.load import read_plan
+        from simharness.trial.run_trial import with_variants
+
+        seconds, wanted = searching.seconds, properties_of(checked.property, checked.rival)
+        plan = read_plan(scenario, overrides=overrides or ())
+        chosen = checked.variant or plan.base.method.variants[0]
+        check_alone(with_variants(plan.base, [chosen]))
+        method, seed, trials = searching.method, searching.seed, searching.trials
+        names = (chosen, checked.rival) if checked.rival else (chosen,)
+        hunted = Hunt(plan, names, wanted, method, seed, trials)
+        folder = out / plan.base.name
+        with reporter() as bars:
+            points, kept = run_hunt(
+                hunted, folder, seconds=seconds, keep_most=searching.keep, workers=workers, reporter=bars
+            )
+        page = write_failures_page(folder / "failures") if kept else None
+    _print(points, kept, Console(), f"{plan.base.name}, {chosen}, {method}")
+    if page is not None:
+        Console().print(f"page: {page}", soft_wrap=True, highlight=False, markup=False)
+
+
+def _print(points: "list[HuntedPoint]", kept: "list[KeptFailure]", console: Console, what: str) -> None:
+    """Print the kinds of failures with their numbers, and what each kept one is."""
+    from simharness.cli.score_tables import ScoreTable
+    from simharness.hunt.hunt_run import distinct
+    from simharness.hunt.hunted_trial import NOISES
+
+    cells = distinct(points, lambda each: each.cell)
+    rows = []
+    for (name, stage), (_, best) in sorted(distinct(points, lambda each: each.cell[:2]).items()):
+        alike = sum(cell[:2] == (name, stage) for cell in cells)
+        robust = ({each.cell[:2] for each in point.findings if each.robust} for point in points)
+        trials = sum((name, stage) in each for each in robust)
+        rows.append((name, stage or "–", str(trials), str(alike), f"{best.failed} of {NOISES}"))
+    failed = sum(bool(point.error) for point in points)
+    lost = f", {failed} of which could not be run" if failed else ""
+    console.print(f"{what}: {len(cells)} distinct failures in {len(points)} trials{lost}", highlight=False)
+    headings = ("trials", "distinct", "fails with\nfresh noise")
+    ScoreTable("", ("property", "stage"), headings, rows).print_to(console)
+    for each in kept:
+        console.print(f"{each.name}: {each.text}", soft_wrap=True, highlight=False, markup=False)
