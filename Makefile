@@ -44,7 +44,7 @@ results: $(STUDIES:%=results-%) results-paper results-time results-overview
 
 results-%: $(RUN)
 	$(BIN)/simharness study scenarios/$*.toml --workers $(WORKERS)
-	$(BIN)/simharness report results/studies/$* --digest results/$*
+	$(BIN)/python -m tools.study_digest results/studies/$* results/$*
 
 # Tables 1 and 2 of the paper: of real Shelf where its published files are, and of the twins, which -j2 runs side by side.
 # Less than ten minutes a twin: that of Shelf is filmed 5 times a second, at its 25 it would take five times as long.

@@ -1,7 +1,6 @@
 """``simharness hunt``: a search for failures, each shrunk and kept."""
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,46 +17,22 @@ if TYPE_CHECKING:
 _UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
 
-@dataclass(frozen=True)
-class Searching:
-    """How the next trials are found, and how many."""
-
-    method: str = option(
-        "map-elites", "How to search: [cyan]map-elites[/], [cyan]lhs[/], [cyan]random[/].", metavar="METHOD"
-    )
-    trials: int | None = option(None, "Number of trials. [dim]\\[default: until --budget is over][/]", min=1)
-    budget: str | None = option(
-        None, "Time of the search: [cyan]90s[/], [cyan]30m[/], [cyan]2h[/]. [dim]\\[default: 30m][/]", metavar="TIME"
-    )
-    seed: int = option(0, "Seed of the search.", metavar="N", min=0)
-    keep: int = option(10, "Largest number of kept failures.", metavar="N", min=0)
-
-    @property
-    def seconds(self) -> float | None:
-        """Time of the search, seconds; None where the number of trials ends it.
-
-        Raises:
-            ValueError: the budget is no time.
-        """
-        budget = self.budget or ("30m" if self.trials is None else None)
-        if budget is None:
-            return None
-        if not (match := re.fullmatch(r"(\d+(?:\.\d+)?)([smh])", budget)):
-            raise ValueError(f"--budget {budget}: expected a time such as 90s, 30m or 2h")
-        return float(match[1]) * _UNITS[match[2]]
-
-
 @grouped()
 def hunt(
     scenario: ScenarioFile,
     overrides: Overrides = None,
+    budget: str | None = option(
+        None, "Time of the search: [cyan]90s[/], [cyan]30m[/], [cyan]2h[/]. [dim]\\[default: 30m][/]", metavar="TIME"
+    ),
+    trials: int | None = option(None, "Number of trials. [dim]\\[default: until --budget is over][/]", min=1),
+    seed: int = option(0, "Seed of the search.", metavar="N", min=0),
+    most: int = option(10, "Largest number of kept failures.", "--keep", metavar="N", min=0),
     workers: Workers = 1,
     out: Path = option(
         Path("results/hunts"), "Folder in which the hunt gets a folder with the name of the scenario.", file_okay=False
     ),
     *,
     checked: Checked,
-    searching: Searching,
 ) -> None:
     r"""Hunt for failures: search the ranges of the section \[search] of a scenario for trials in which something fails.
 
@@ -74,22 +49,38 @@ def hunt(
         from simharness.scenario.load import read_plan
         from simharness.trial.run_trial import with_variants
 
-        seconds, wanted = searching.seconds, properties_of(checked.property, checked.rival)
+        seconds, wanted = _seconds(budget, trials), properties_of(checked.property, checked.rival)
         plan = read_plan(scenario, overrides=overrides or ())
         chosen = checked.variant or plan.base.method.variants[0]
         check_alone(with_variants(plan.base, [chosen]))
-        method, seed, trials = searching.method, searching.seed, searching.trials
-        names = (chosen, checked.rival) if checked.rival else (chosen,)
-        hunted = Hunt(plan, names, wanted, method, seed, trials)
-        folder = out / plan.base.name
+        names, folder = (chosen, checked.rival) if checked.rival else (chosen,), out / plan.base.name
         with reporter() as bars:
             points, kept = run_hunt(
-                hunted, folder, seconds=seconds, keep_most=searching.keep, workers=workers, reporter=bars
+                Hunt(plan, names, wanted, seed),
+                folder,
+                trials=trials,
+                seconds=seconds,
+                keep_most=most,
+                workers=workers,
+                reporter=bars,
             )
         page = write_failures_page(folder / "failures") if kept else None
-    _print(points, kept, Console(), f"{plan.base.name}, {chosen}, {method}")
+    _print(points, kept, Console(), f"{plan.base.name}, {chosen}")
     if page is not None:
         Console().print(f"page: {page}", soft_wrap=True, highlight=False, markup=False)
+
+
+def _seconds(budget: str | None, trials: int | None) -> float | None:
+    """Return the time of the search, seconds; None where the number of trials ends it.
+
+    Raises:
+        ValueError: the budget is no time.
+    """
+    if budget is None and trials is not None:
+        return None
+    if not (match := re.fullmatch(r"(\d+(?:\.\d+)?)([smh])", budget or "30m")):
+        raise ValueError(f"--budget {budget}: expected a time such as 90s, 30m or 2h")
+    return float(match[1]) * _UNITS[match[2]]
 
 
 def _print(points: "list[HuntedPoint]", kept: "list[KeptFailure]", console: Console, what: str) -> None:

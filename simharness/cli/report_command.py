@@ -24,12 +24,6 @@ def report(
         "Report where a score passes this value. Repeatable. [dim]\\[default: pcp=90, precision=90][/]",
         metavar="SCORE=VALUE",
     ),
-    digest: Path | None = option(
-        None,
-        "Instead of the report, write a digest to keep with the code: numbers, a table, the curves.",
-        metavar="FOLDER",
-        file_okay=False,
-    ),
     blame: BlameSeeds = 0,
 ) -> None:
     """Write the report of a finished study again: scores, curves, failures, the worst frames.
@@ -37,9 +31,6 @@ def report(
     The trials of the worst frames are run again to make their pictures.
     """
     with PROGRAM.exit_on_error():
-        for given, text in ((blame, "--blame: is part of the report"), (out, "--out: names the report")):
-            if given and digest is not None:
-                raise ValueError(f"{text}, which --digest replaces; give one of them")
         check_place(out, option="--out", mark=HTML)
         thresholds = _thresholds(threshold or [])
         from simharness.study.study_folder import read_study
@@ -56,12 +47,6 @@ def report(
         check_thresholds(thresholds)
         if thresholds and not any(each.numeric for swept in factors_by_case(results).values() for each in swept):
             note("--threshold has no effect: the study sweeps no numbers")
-        if digest is not None:
-            from simharness.outputs.study.digest import write_digest
-
-            write_digest(results, digest, thresholds=thresholds or THRESHOLDS)
-            typer.echo(f"digest: {digest}")
-            return
         if blame:
             from simharness.cli.study_command import blame_results
 

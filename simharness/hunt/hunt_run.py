@@ -1,5 +1,9 @@
 """Run of a hunt: trials of a search, each stored as it ends, and the failures that it found, shrunk and kept.
 
+The search is MAP-Elites (Mouret & Clune, "Illuminating search spaces by mapping elites", 2015): the trial that fails
+most reliably is known for every kind of failure in its circumstances, and the next trials vary these (with the operator
+of Vassiliades & Mouret, "Discovering the elite hypervolume", GECCO 2018).
+
 The result folder has ``trials.jsonl``, what was hunted in the first line and a line for each trial after it; and
 ``failures``, a file for each kept failure. The points of the search follow from its seed and from what earlier trials
 found, so that the same command continues an interrupted hunt and ends with the same files.
@@ -14,17 +18,26 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
+from mvpose.arrays import Floats
 from mvpose.commands.output_files import write_text
 from mvpose.commands.progress import Reporter, Silence
+from mvpose.files.input_files import read_bytes
 from simharness.hunt.frozen_frame import freeze
 from simharness.hunt.hunted_trial import HuntFinding, HuntOutput, hunt_in_trial
 from simharness.hunt.kept_failure import KeptFailure, judge_of, keep, write_failure
-from simharness.hunt.search_methods import search_method
 from simharness.scenario.load import ScenarioPlan, Value, fingerprint
 from simharness.study.scheduler import TrialFailure, Unit, run_units
 from simharness.trial.run_trial import run_trial
+from simharness.types.random_streams import stream
 
 TRIALS = "trials.jsonl"
+BATCH = 16
+"""Trials that run before the search hears of their results."""
+
+_ISO, _LINE = 0.1, 0.2  # spread of new points about an elite, and along the way to another one
+_UNIFORM = 4  # one in so many points is anywhere
 T = TypeVar("T")
 
 
@@ -38,12 +51,8 @@ class Hunt:
     """Variant of the method, and a rival for the property "disagree"."""
     properties: tuple[str, ...]
     """Names of the properties."""
-    method: str
-    """Search method: map-elites, lhs or random."""
     seed: int
     """Seed of the search."""
-    trials: int | None
-    """Number of trials; None: until the time is over."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +61,8 @@ class HuntedPoint:
 
     trial: int
     """Its number."""
+    shares: tuple[float, ...]
+    """Its point in the unit cube of the search: how far through the values of each key it is."""
     values: Mapping[str, Value]
     """Values of the keys of [search]."""
     seed: int
@@ -63,22 +74,48 @@ class HuntedPoint:
 
 
 def distinct(
-    points: Iterable[HuntedPoint], kind: Callable[[HuntFinding], T]
+    points: Iterable[HuntedPoint], kind: Callable[[HuntFinding], T], *, robust: bool = True
 ) -> dict[T, tuple[HuntedPoint, HuntFinding]]:
-    """Return the most reliable robust failure of each kind, the first of equals, and its trial."""
+    """Return the most reliable failure of each kind, the first of equals, and its trial.
+
+    Args:
+        points: finished trials.
+        kind: the kind of a finding.
+        robust: whether those that fail again with few draws of noise are left out.
+    """
     best: dict[T, tuple[HuntedPoint, HuntFinding]] = {}
     for point in points:
         for each in point.findings:
             key = kind(each)
-            if each.robust and (key not in best or each.failed > best[key][1].failed):
+            if (each.robust or not robust) and (key not in best or each.failed > best[key][1].failed):
                 best[key] = point, each
     return best
+
+
+def next_points(elites: Floats, dimensions: int, seed: int, batch: int) -> Floats:
+    """Return the next :data:`BATCH` points of the unit cube, (n, d): some anywhere, the others near the elites (m, d).
+
+    Args:
+        elites: points that fail most reliably in their cells; all points are anywhere where there are none.
+        dimensions: d.
+        seed: seed of the search.
+        batch: number of the batch.
+    """
+    rng = stream(seed, "hunt", "search", batch)
+    points = rng.random((BATCH, dimensions))
+    if len(elites):
+        one, other = elites[rng.integers(len(elites), size=(2, BATCH))]
+        varied = one + rng.normal(scale=_ISO, size=one.shape) + rng.normal(scale=_LINE, size=(BATCH, 1)) * (other - one)
+        anywhere = np.arange(BATCH)[:, None] % _UNIFORM == 0
+        points = np.where(anywhere, points, np.clip(varied, 0.0, 1.0))
+    return points
 
 
 def run_hunt(
     hunt: Hunt,
     folder: Path,
     *,
+    trials: int | None = None,
     seconds: float | None = None,
     keep_most: int = 10,
     workers: int = 1,
@@ -89,6 +126,7 @@ def run_hunt(
     Args:
         hunt: what is hunted.
         folder: result folder; trials that an earlier run of the same hunt finished are read from it.
+        trials: number of trials; None: until the time is over.
         seconds: no batch of trials begins later; None: no limit.
         keep_most: largest number of kept failures.
         workers: processes that share the trials; the results do not depend on it.
@@ -100,31 +138,36 @@ def run_hunt(
     Raises:
         ValueError: nothing to search, or the folder holds another hunt.
     """
-    axes, most = hunt.plan.search.axes, hunt.trials
+    axes = hunt.plan.search.axes
     if not axes:
         raise ValueError(
             f"{hunt.plan.document.path}: has nothing to search; add a section [search] with keys and their values: "
             "people.count = { from = 2, to = 8, steps = 7 }"
         )
     start, reporter = time.monotonic(), reporter or Silence()
-    search = search_method(hunt.method, len(axes), hunt.seed, properties=hunt.properties, trials=most)
     stored, points = _stored(hunt, folder / TRIALS), list[HuntedPoint]()
-    with reporter.stage("trials", most or 0) as advance:
-        while (most is None or len(points) < most) and (seconds is None or time.monotonic() - start < seconds):
-            asked = search.ask()[: None if most is None else most - len(points)]
-            wanted = [
-                (dict(pair for axis, share in zip(axes, each, strict=True) for pair in axis.at(share)), number)
-                for number, each in enumerate(asked.tolist(), len(points))
+    with reporter.stage("trials", trials or 0) as advance:
+        while (trials is None or len(points) < trials) and (seconds is None or time.monotonic() - start < seconds):
+            elites = [point.shares for point, _ in distinct(points, lambda each: each.cell, robust=False).values()]
+            asked = next_points(np.array(elites), len(axes), hunt.seed, len(points) // BATCH).tolist()
+            first = len(points)
+            batch = [
+                HuntedPoint(
+                    number,
+                    tuple(shares),
+                    dict(pair for axis, share in zip(axes, shares, strict=True) for pair in axis.at(share)),
+                    hunt.plan.base.seed + number,
+                )
+                for number, shares in enumerate(asked, first)
+                if trials is None or number < trials
             ]
-            for point in _measured(hunt, [each for each in wanted if each[1] not in stored], workers):
+            for point in _measured(hunt, [each for each in batch if each.trial not in stored], workers):
                 stored[point.trial] = point
                 with (folder / TRIALS).open("a", encoding="utf-8") as file:
                     row = {**vars(point), "findings": [vars(each) for each in point.findings]}
                     file.write(json.dumps(row) + "\n")
                 advance(1, failed=int(bool(point.error)))
-            batch = [stored[number] for _, number in wanted]
-            search.tell(asked, [each.findings for each in batch])
-            points += batch
+            points += [stored[each.trial] for each in batch]
     chosen = list(distinct(points, lambda each: each.cell[:2]).values())[:keep_most]
     kept = []
     with reporter.stage("shrink", len(chosen)) as advance:
@@ -142,43 +185,41 @@ def _stored(hunt: Hunt, path: Path) -> dict[int, HuntedPoint]:
     Raises:
         ValueError: another hunt is stored there.
     """
-    heading: dict[str, Any] = {
-        "scenario": fingerprint(hunt.plan.base),
-        "search": [vars(each) for each in hunt.plan.search.axes],
-    }
-    heading |= {key: getattr(hunt, key) for key in ("variants", "properties", "method", "seed")}
-    heading = json.loads(json.dumps(heading | ({"trials": hunt.trials} if hunt.method == "lhs" else {})))
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
+    axes = [vars(each) for each in hunt.plan.search.axes]
+    about = {key: getattr(hunt, key) for key in ("variants", "properties", "seed")}
+    heading = json.loads(json.dumps({"scenario": fingerprint(hunt.plan.base), "search": axes, **about}))
+    lines = read_bytes(path, what="trials").decode().splitlines(keepends=True) if path.exists() else []
     if lines and not lines[-1].endswith("\n"):  # cut off when the process was killed
         del lines[-1]
     rows = list(map(json.loads, lines))
     if rows and rows[0] != heading:
         raise ValueError(f"{path}: holds another hunt, or one of other code; choose another --out or remove it")
     write_text("".join(lines) or json.dumps(heading) + "\n", path)
-    found = [
-        HuntedPoint(**row | {"findings": tuple(HuntFinding(**each) for each in row["findings"])}) for row in rows[1:]
+    points = [
+        HuntedPoint(
+            **row | {"shares": tuple(row["shares"]), "findings": tuple(HuntFinding(**each) for each in row["findings"])}
+        )
+        for row in rows[1:]
     ]
-    return {each.trial: each for each in found}
+    return {each.trial: each for each in points}
 
 
-def _measured(hunt: Hunt, wanted: Sequence[tuple[dict[str, Value], int]], workers: int) -> Iterator[HuntedPoint]:
-    """Yield trials with these values and numbers as they end."""
-    units, points = [], {}
-    for values, number in wanted:
-        points[str(number)] = HuntedPoint(number, values, hunt.plan.base.seed + number)
+def _measured(hunt: Hunt, points: Sequence[HuntedPoint], workers: int) -> Iterator[HuntedPoint]:
+    """Yield trials with what was found in them, as they end."""
+    units, of = [], {str(each.trial): each for each in points}
+    for name, point in of.items():
         try:
-            units.append(Unit(str(number), hunt.plan.at(values, points[str(number)].seed), hunt.variants))
+            units.append(Unit(name, hunt.plan.at(point.values, point.seed), hunt.variants))
         except ValueError as error:
-            yield replace(points[str(number)], error=str(error))
+            yield replace(point, error=str(error))
     measure = partial(hunt_in_trial, properties=hunt.properties)
     with closing(run_units(units, measure, workers=workers)) as results:
         for each in results:
-            point = points[each.unit.trial]
             if isinstance(each, TrialFailure):
-                yield replace(point, error=each.error)
+                yield replace(of[each.unit.trial], error=each.error)
             else:
                 assert isinstance(each.output, HuntOutput)
-                yield replace(point, findings=each.output.findings)
+                yield replace(of[each.unit.trial], findings=each.output.findings)
 
 
 def _keep(hunt: Hunt, point: HuntedPoint, finding: HuntFinding) -> KeptFailure | None:

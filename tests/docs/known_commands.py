@@ -73,7 +73,6 @@ FROM_PICTURES = (  # run by tests/benchmarks/pictures and tests/simharness/reali
 OWN_STUDY = {
     "simharness study my-lab.toml --workers 2": f"{LAB} --seeds 1",
     "simharness study my-lab.toml --seeds 40": f"{LAB} --seeds 2",
-    "simharness report STUDY --digest FOLDER": "",
 }
 OWN_GATE = (
     "simharness check my-ci.toml --baseline my-ci.json --update-baseline",
@@ -146,6 +145,7 @@ SEED_SCORES = "python -m tools.paper_tables.seed_scores"  # tests/tools/test_see
 LEADERBOARD = (
     "python -m benchmarks.leaderboard FOLDER --shelf SHELF"  # a quarter of an hour; tests/benchmarks/leaderboard
 )
+DIGEST = "python -m tools.study_digest STUDY FOLDER"  # tests/tools/test_study_digest.py
 GALLERY = "python -m tools.gallery results/gallery"  # tests/tools/test_gallery.py; minutes of rendering
 # Without arguments these begin to bake the body.
 BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")
@@ -174,6 +174,7 @@ KNOWN = {
     OUT_OF_SAMPLE,
     LEADERBOARD,
     *BAKE,
+    DIGEST,
     GALLERY,
     SEED_SCORES,
     *SCORED,

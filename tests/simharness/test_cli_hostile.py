@@ -54,7 +54,6 @@ NUMBERS = [
     ["hunt", "quickstart"],
     ["hunt", "quickstart", "--trials", "0"],
     ["hunt", "quickstart", "--budget", "-1s"],
-    ["hunt", "quickstart", "--method", "名"],
     ["hunt", "quickstart", "--seed", "-1"],
     ["shrink", "quickstart", "--frame", "-1"],
     ["shrink", "quickstart", "--property", "名"],

@@ -9,8 +9,6 @@ from simharness.cli import app
 WITHOUT_EFFECT = [
     ("--lag", ["evaluate", "shelf", "--lag", "0.5"]),
     ("--lag", ["evaluate", "shelf", "--method", "fast", "--method", "full", "--lag", "0"]),
-    ("--out", ["report", "results", "--digest", "digest", "--out", "page.html"]),
-    ("--blame", ["report", "results", "--digest", "digest", "--blame", "2"]),
     ("--blame", ["study", "quickstart", "--shard", "1/2", "--blame", "2"]),
     ("--out", ["study", "quickstart", "--shard", "1/2", "--store", "one", "--out", "two"]),
     ("--workers", ["study", "quickstart", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"]),

@@ -133,11 +133,10 @@ ROWS = {
         "variant": Row("--variant no-3dps"),
         "property": Row("--property mirrored"),
         "rival": Row("--rival full --property disagree"),
-        "method": Row("--method lhs"),
         "trials": Row("--trials 3"),
         "budget": Row("--budget 1h"),
         "seed": Row("--seed 3"),
-        "keep": Row("--keep 3"),
+        "most": Row("--keep 3"),
         "out": RESULT["out"],
     },
     "shrink": RUN
@@ -150,7 +149,6 @@ ROWS = {
     "report": {
         "out": Row("--out {out}/page.html"),
         "threshold": Row("--threshold pcp=80"),
-        "digest": Row("--digest {out}/digest"),
         "blame": Row("--blame 2"),
     },
     "study": WORKERS
@@ -231,7 +229,6 @@ COMBINATIONS = [
     (f"validate {BASES['validate']} --quick", "--twins 3"),
     (f"render {BASES['render']} --video", "--overlay truth"),
     (f"render {BASES['render']} --video", "--also depth"),
-    (f"report {BASES['report']} --digest {{out}}/digest", "--threshold pcp=80"),
     (f"study {BASES['study']} --blame 2", "--workers 3"),
     (f"study {BASES['study']} --shard 1/2", "--variant full"),
     (f"check {BASES['check']} --update-baseline", "--workers 3"),
@@ -301,7 +298,6 @@ def _stand_ins(study):
         "simharness.study.causes.blame_text": {"write_blame": ()},
         "simharness.study.study_run": {"run_study": study, "run_shard": None},
         "simharness.outputs.study.page": {"write_report": "report.html"},
-        "simharness.outputs.study.digest": {"write_digest": ()},
         "simharness.reality.detector_fit.fit": {"fit": fitted, "write_profile": ()},
         "simharness.reality.detector_fit.fit_table": dict.fromkeys(printed, ()),
         "simharness.reality.detector_fit.half_check": {"check_halves": figures},

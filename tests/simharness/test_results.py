@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from simharness.outputs.study.digest import SCORED, markdown
 from simharness.runtime.version import code_version
 from simharness.scenario.load import load, load_study
 from simharness.trial.identity import PROVENANCE
 from tools.paper_tables.tables import INPUTS, paper_tables, read_inputs
 from tools.paper_tables.text import markdown as paper_text
+from tools.study_digest.digest import SCORED, markdown
 
 ROOT = Path(__file__).parents[2]
 DIGESTS = sorted(path.parent.name for path in (ROOT / "results").glob("*/digest.json"))

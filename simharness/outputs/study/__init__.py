@@ -1,1 +1,1 @@
-"""Report and digest of a study: curves, breaking points, failures and worst frames."""
+"""Report of a study: curves, breaking points, failures and worst frames."""

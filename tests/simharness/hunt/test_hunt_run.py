@@ -9,7 +9,7 @@ from crowded_frames import crowd
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.hunt.hunt_run import TRIALS, HuntedPoint, distinct
+from simharness.hunt.hunt_run import BATCH, TRIALS, HuntedPoint, distinct, next_points
 from simharness.hunt.hunted_trial import NOISES, HuntFinding, circumstances
 from simharness.hunt.kept_failure import read_failure
 
@@ -49,7 +49,7 @@ def content(folder):
 
 
 def test_a_hunt_finds_keeps_and_continues(hunt):
-    options = ["--trials", "4", "--method", "random", "--keep", "2"]
+    options = ["--trials", "4", "--keep", "2"]
     result, folder = hunt(*options)
     assert result.exit_code == 0, result.output
     lines = [json.loads(line) for line in (folder / TRIALS).read_text().splitlines()]
@@ -78,7 +78,7 @@ def test_a_hunt_finds_keeps_and_continues(hunt):
 
 @pytest.mark.slow
 def test_the_number_of_workers_changes_nothing(hunt):
-    options = ["--trials", "4", "--method", "lhs", "--keep", "1"]
+    options = ["--trials", "4", "--keep", "1"]
     _, one = hunt(*options, out="one")
     _, two = hunt(*options, "--workers", "2", out="two")
     first, second = (sorted((folder / TRIALS).read_text().splitlines()) for folder in (one, two))
@@ -90,7 +90,6 @@ def test_the_number_of_workers_changes_nothing(hunt):
     ("options", "what"),
     [
         (["--budget", "soon"], "--budget soon"),
-        (["--method", "luck"], "--method luck"),
         (["--set", "search={}"], "nothing to search"),
         (["--property", "luck"], "no such property"),
         (["--variant", "track"], "memory"),
@@ -108,10 +107,10 @@ def finding(**changes):
 
 def test_near_twins_and_coincidences_do_not_count():
     found = [finding(), finding(distance=0.55, person=2), finding(distance=2.0), finding(overlap=0.9, failed=2)]
-    points = [HuntedPoint(number, {}, number, (each,)) for number, each in enumerate(found)]
+    points = [HuntedPoint(number, (), {}, number, (each,)) for number, each in enumerate(found)]
     cells = distinct(points, lambda each: each.cell)
     assert [point.seed for point, _ in cells.values()] == [0, 2]
-    better = [HuntedPoint(number, {}, number, (finding(failed=3 + number),)) for number in (0, 1)]
+    better = [HuntedPoint(number, (), {}, number, (finding(failed=3 + number),)) for number in (0, 1)]
     ((point, _),) = distinct(better, lambda each: each.cell[:2]).values()
     assert point.seed == 1
 
@@ -127,3 +126,36 @@ def test_circumstances():
         assert found["views"] == (visible >= 0.75).sum()
         assert found["hidden"] == pytest.approx(1 - visible.mean(), abs=6e-4)
     assert circumstances(truth, -1)["distance"] == pytest.approx(apart.min(), abs=6e-4)
+
+
+ELITE = np.array([0.9, 0.1, 0.2])
+
+
+def test_points_follow_from_the_seed_and_stay_in_the_cube():
+    none, elites = np.zeros((0, 3)), np.array([[0.0, 1.0, 0.5], [1.0, 1.0, 0.0]])
+    for known in (none, elites):
+        points = np.concatenate([next_points(known, 3, 5, batch) for batch in range(20)])
+        assert points.shape == (20 * BATCH, 3)
+        assert points.min() >= 0
+        assert points.max() <= 1
+        np.testing.assert_array_equal(points[:BATCH], next_points(known, 3, 5, 0))
+        assert not np.array_equal(points[:BATCH], next_points(known, 3, 6, 0))
+
+
+def test_three_in_four_points_are_near_the_elites():
+    points = np.concatenate([next_points(ELITE[None], 3, 5, batch) for batch in range(40)])
+    near = np.linalg.norm(points - ELITE, axis=1) < 0.35
+    assert 0.7 < near.mean() < 0.85
+    away = np.concatenate([next_points(np.zeros((0, 3)), 3, 5, batch) for batch in range(40)])
+    assert (np.linalg.norm(away - ELITE, axis=1) < 0.35).mean() < 0.1
+    np.testing.assert_array_equal(points[::4], away[::4])
+
+
+def test_points_along_the_way_between_two_elites():
+    """Between two elites the spread is larger along the way from one to the other than across."""
+    elites = np.array([[0.2, 0.5, 0.5], [0.8, 0.5, 0.5]])
+    points = np.concatenate([next_points(elites, 3, 1, batch) for batch in range(60)])
+    points = points[np.arange(len(points)) % 4 != 0]
+    off = points - elites[np.abs(points[:, None] - elites).sum(axis=2).argmin(axis=1)]
+    assert off[:, 1].std() == pytest.approx(0.1, abs=0.015)
+    assert points[:, 0].std() > 2.5 * off[:, 1].std()

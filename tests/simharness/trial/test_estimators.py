@@ -21,7 +21,6 @@ from mvpose.commands.errors import RunError
 from mvpose.presets import PRESETS
 from simharness import assert_robust
 from simharness.outputs.run.result_folder import run
-from simharness.outputs.study.digest import write_digest
 from simharness.outputs.study.page import write_report
 from simharness.outputs.study.skeleton_view_3d import replay
 from simharness.outputs.study.worst_frames import _command
@@ -33,6 +32,7 @@ from simharness.trial.run_folder import read_run
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.estimation import EstimateFrames, input_digest, own_rig
 from simharness.trial.stages.estimators import UserEstimator, estimators_of, load_estimator, sources_of
+from tools.study_digest.digest import write_digest
 
 WRAPPED = Path(__file__).parent / "foreign" / "wrapped.py"
 CUSTOM = """

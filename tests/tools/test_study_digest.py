@@ -12,11 +12,13 @@ import pytest
 from made_study import make_study, pcp_of
 
 from mvpose.report.svg_plots import plot_sheet
-from simharness.outputs.study.digest import PRINTED, curves, digest, markdown, write_digest
 from simharness.scoring.catalogue import SCORES
 from simharness.scoring.failure_classes import FailureKind
 from simharness.scoring.stage_blame import Stage
+from simharness.study.study_folder import Tables, write_study
 from simharness.trial.identity import PROVENANCE
+from tools.study_digest.__main__ import main
+from tools.study_digest.digest import PRINTED, curves, digest, markdown, write_digest
 
 SVG = "{http://www.w3.org/2000/svg}"
 COUNTS = [2, 3, 5]
@@ -321,3 +323,12 @@ def test_scores_over_time_are_there_where_a_variant_tracks_people(study, tmp_pat
     assert "| variant | HOTA, % | AssA, % |" in text
     assert "HOTA, %, against `cameras.count`:" in text
     assert "HOTA" not in markdown(plain)
+
+
+def test_the_command(study, tmp_path, capsys):
+    (tmp_path / "study").mkdir()
+    write_study(tmp_path / "study", study.info, Tables(study.trials, study.frames, study.people, study.failures), "")
+    assert main([str(tmp_path / "study"), str(tmp_path / "kept")]) == 0
+    assert json.loads((tmp_path / "kept" / "digest.json").read_text()) == digest(study)
+    assert main([str(tmp_path), str(tmp_path / "other")]) == 2
+    assert "not the result folder of a study" in capsys.readouterr().err

@@ -17,11 +17,10 @@ from mvpose.commands.output_files import write_text
 from mvpose.commands.progress import duration
 from mvpose.report.documents import fill_template
 from mvpose.report.svg_plots import plot_sheet
-from simharness.outputs import TEMPLATES
 from simharness.outputs.study import plots, tables
 from simharness.outputs.study.curves import axis_label, axis_names, panels
 from simharness.outputs.study.plots import mean_over, short
-from simharness.outputs.study.tables import OVER_TIME, failure_rates
+from simharness.outputs.study.tables import OVER_TIME
 from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import AP_MM, SCORES
 from simharness.scoring.failure_classes import FailureKind
@@ -30,6 +29,7 @@ from simharness.statistics.intervals import Interval, mean_interval
 from simharness.study.factors import THRESHOLDS, Factor, cases_of, factor_breaking_points, factors, factors_by_case
 from simharness.study.study_folder import Results
 from simharness.trial.identity import PROVENANCE, provenance_sentence
+from tools.study_digest.failure_rates import failure_rates
 
 HEADS = ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts")
 """Scores of the first table of a digest."""
@@ -71,7 +71,7 @@ def write_digest(results: Results, folder: Path, *, thresholds: Mapping[str, flo
         files["curves.svg"] = curves(results, thresholds=thresholds)
     files["digest.json"] = json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     for name, text in files.items():  # without a manifest, because people keep these few files with their code
-        write_text(text, folder / name, option="--digest")
+        write_text(text, folder / name, option="FOLDER")
 
 
 def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) -> dict[str, Any]:
@@ -82,7 +82,7 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
         ``means`` by variant, and ``cases`` with such means by case; ``factors`` with the scores at every value, and
         with the keys that these are means over; ``breaking`` points; ``by_case`` with factors and breaking points of
         each case separately, while the ones above pool all cases; ``failures``, see
-        :func:`simharness.outputs.study.tables.failure_rates`; ``time_ms`` of each stage.
+        :func:`tools.study_digest.failure_rates.failure_rates`; ``time_ms`` of each stage.
     """
     info, trials = results.info, results.trials
     names: list[str] = info["variants"]
@@ -225,7 +225,7 @@ def markdown(digest: Mapping[str, Any]) -> str:
     """Return the text of a digest.
 
     Args:
-        digest: from :func:`simharness.outputs.study.digest.digest`.
+        digest: from :func:`tools.study_digest.digest.digest`.
     """
     names, seeds = list(digest["means"]), digest["seeds"]
     parts = digest["by_case"] or {"": digest}
@@ -245,7 +245,7 @@ def markdown(digest: Mapping[str, Any]) -> str:
                 breaking.setdefault(row, {})[each["variant"]] = _broken(each, len(seeds))
     text = fill_template(
         "digest.md",
-        folder=TEMPLATES,
+        folder=Path(__file__).parent,
         digest=digest,
         names=names,
         took=duration(digest["seconds"]),

@@ -1,0 +1,1 @@
+"""Digest of a study, small enough to be kept with the code."""
