@@ -2,11 +2,12 @@
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from mvpose.commands.option_groups import grouped, option
+from mvpose.commands.output_files import check_place
 from simharness.cli.program import PROGRAM, Overrides, ScenarioFile, Workers
 from simharness.cli.shrink_command import Checked
 
@@ -42,7 +43,7 @@ def hunt(
     """
     with PROGRAM.exit_on_error():
         from mvpose.commands.progress import reporter
-        from simharness.hunt.hunt_run import Hunt, run_hunt
+        from simharness.hunt.hunt_run import TRIALS, Hunt, run_hunt
         from simharness.hunt.kept_failure import check_alone
         from simharness.hunt.properties import properties_of
         from simharness.outputs.hunt.page import write_failures_page
@@ -54,16 +55,10 @@ def hunt(
         chosen = checked.variant or plan.base.method.variants[0]
         check_alone(with_variants(plan.base, [chosen]))
         names, folder = (chosen, checked.rival) if checked.rival else (chosen,), out / plan.base.name
+        check_place(folder / TRIALS, option="--out", mark=b'"properties": ')
+        limits: dict[str, Any] = {"trials": trials, "keep_most": most, "workers": workers}
         with reporter() as bars:
-            points, kept = run_hunt(
-                Hunt(plan, names, wanted, seed),
-                folder,
-                trials=trials,
-                seconds=seconds,
-                keep_most=most,
-                workers=workers,
-                reporter=bars,
-            )
+            points, kept = run_hunt(Hunt(plan, names, wanted, seed), folder, seconds=seconds, reporter=bars, **limits)
         page = write_failures_page(folder / "failures") if kept else None
     _print(points, kept, Console(), f"{plan.base.name}, {chosen}")
     if page is not None:

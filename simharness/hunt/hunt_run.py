@@ -22,7 +22,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.commands.output_files import write_text
-from mvpose.commands.progress import Reporter, Silence
+from mvpose.commands.progress import Reporter
 from mvpose.files.input_files import read_bytes
 from simharness.hunt.frozen_frame import freeze
 from simharness.hunt.hunted_trial import HuntFinding, HuntOutput, hunt_in_trial
@@ -119,7 +119,7 @@ def run_hunt(
     seconds: float | None = None,
     keep_most: int = 10,
     workers: int = 1,
-    reporter: Reporter | None = None,
+    reporter: Reporter,
 ) -> tuple[list[HuntedPoint], list[KeptFailure]]:
     """Search, then shrink and keep a failure of each property and stage.
 
@@ -144,13 +144,11 @@ def run_hunt(
             f"{hunt.plan.document.path}: has nothing to search; add a section [search] with keys and their values: "
             "people.count = { from = 2, to = 8, steps = 7 }"
         )
-    start, reporter = time.monotonic(), reporter or Silence()
-    stored, points = _stored(hunt, folder / TRIALS), list[HuntedPoint]()
+    start, stored, points = time.monotonic(), _stored(hunt, folder / TRIALS), list[HuntedPoint]()
     with reporter.stage("trials", trials or 0) as advance:
         while (trials is None or len(points) < trials) and (seconds is None or time.monotonic() - start < seconds):
             elites = [point.shares for point, _ in distinct(points, lambda each: each.cell, robust=False).values()]
             asked = next_points(np.array(elites), len(axes), hunt.seed, len(points) // BATCH).tolist()
-            first = len(points)
             batch = [
                 HuntedPoint(
                     number,
@@ -158,7 +156,7 @@ def run_hunt(
                     dict(pair for axis, share in zip(axes, shares, strict=True) for pair in axis.at(share)),
                     hunt.plan.base.seed + number,
                 )
-                for number, shares in enumerate(asked, first)
+                for number, shares in enumerate(asked, len(points))
                 if trials is None or number < trials
             ]
             for point in _measured(hunt, [each for each in batch if each.trial not in stored], workers):

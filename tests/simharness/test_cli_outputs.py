@@ -51,6 +51,7 @@ FOLDERS = {
     "simharness profile-network --out": ("simharness profile-network movenet --out {}", ""),
     "simharness profile-network --store": ("simharness profile-network movenet --out new --store {}", ""),
     "simharness rehearse --out": ("simharness rehearse ring5 --volume 4x3 --out {}", ""),
+    "simharness hunt --out": ("simharness hunt quickstart --set search.people.count=[1,2] --out {}", "quickstart"),
     "simharness shrink --out": ("simharness shrink quickstart --out {}", ""),
     "simharness validate --out": ("simharness validate shelf --out {}", ""),
 }
@@ -125,7 +126,7 @@ def test_a_folder_of_the_user_is_never_replaced(call, tmp_path, option):
     folder = tmp_path / "mine" / inside.replace("HASH", fingerprint(load(Path("quickstart"))))
     folder.mkdir(parents=True)
     Store(tmp_path / "store")  # that merge can read
-    names = ["ik.mot", "failures.html", "rehearsal.html", "validation.html", "profile.html"]
+    names = ["ik.mot", "trials.jsonl", "failures.html", "rehearsal.html", "validation.html", "profile.html"]
     for name in names:
         (folder / name).write_text(MINE)
     result = call(line, "mine")
