@@ -85,8 +85,8 @@ IN_PARTS = {
 }
 READ_BY_A_NETWORK = {
     "simharness run pixels": "--set duration=0.4 --set rate=5 --set cameras.count=3",
-    "simharness profile-network movenet --check": "--scenes pixels --other-scenes pixels --set duration=0.4 "
-    "--set rate=5 --set people.count=2 --set cameras.count=3 --set cameras.size=[320,240]",
+    "simharness profile-network movenet": "--scenes pixels --set duration=0.4 --set rate=5 "
+    "--set people.count=2 --set cameras.count=3 --set cameras.size=[320,240]",
     "simharness study sensor": "--set duration=0.2 --set rate=5 --set cameras.count=2 --set cameras.size=[320,240] "
     "--set 'sweep={one_at_a_time=true, sensor={jpeg=[92,5]}}' --seeds 1 --variant fast --workers 1",
 }
@@ -124,6 +124,7 @@ MODULES = tuple(
         "benchmarks.doctor.breaks",
         "benchmarks.expected_error",
         "benchmarks.method",
+        "benchmarks.network_profile",
         "benchmarks.pictures",
         "benchmarks.simulator",
         "benchmarks.tracking",

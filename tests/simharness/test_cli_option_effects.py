@@ -13,7 +13,6 @@ WITHOUT_EFFECT = [
     ("--out", ["study", "quickstart", "--shard", "1/2", "--store", "one", "--out", "two"]),
     ("--workers", ["study", "quickstart", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"]),
     ("--size", ["rehearse", "ring5", "--size", "320x240"]),
-    ("--other-scenes", ["profile-network", "movenet", "--other-scenes", "crowd"]),
     *(
         (f"--{name}", ["plan", "lab", "--preview", f"--{name}", "4"])
         for name in ("cameras", "scenes", "seed", "workers")

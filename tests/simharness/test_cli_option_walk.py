@@ -192,10 +192,8 @@ ROWS = {
     "profile-network": WORKERS
     | {
         "head": Row("--head posenet"),
-        "check": Row("--check"),
         "quick": Row("--quick", base="movenet --scenes profile --out {out}"),
         "scenes": Row("--scenes profile"),
-        "other_scenes": Row("--other-scenes pixels", "--check"),
         "overrides": Row("--set duration=0.4"),
         "out": RESULT["out"],
         "store": Row("--store {out}/elsewhere"),

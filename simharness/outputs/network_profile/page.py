@@ -4,7 +4,6 @@ Plots of the errors of a network beside those of the simulated detector with its
 """
 
 from collections.abc import Iterator, Mapping
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -18,12 +17,7 @@ from simharness.outputs import TEMPLATES
 from simharness.outputs.validation.plots import REAL_COLOR, TWIN_COLOR
 from simharness.reality.detector_fit.detector_sums import Trials
 from simharness.reality.network_profile.error_curves import ErrorCurve, condition_curves, error_curves
-from simharness.reality.network_profile.profile_check import CheckedFigure, ProfileCheck
 from simharness.reality.network_profile.profile_fit import NetworkProfile
-from simharness.reality.validation.verdicts import VerdictState
-from simharness.scenario.sections.detector_section import KINDS
-from simharness.scoring.catalogue import SCORES as CATALOGUE
-from simharness.scoring.pcp import GROUPS
 from simharness.trial.identity import provenance_sentence
 
 _SIZE = (3.6, 2.6)
@@ -67,15 +61,11 @@ def _intervals(counts: Trials) -> Floats:
     return 100 * np.array(ends).T
 
 
-_SHOWN = ("pcp", "recall", "ghosts", "mpjpe_mm")
-
-
-def render_profile(profile: NetworkProfile, check: ProfileCheck | None, *, provenance: Mapping[str, Any]) -> str:
+def render_profile(profile: NetworkProfile, *, provenance: Mapping[str, Any]) -> str:
     """Return the page of a profile.
 
     Args:
         profile: the fitted profile.
-        check: its comparison with the network on other scenes; None: not made.
         provenance: keys of :func:`simharness.trial.identity.provenance`.
     """
     return fill_template(
@@ -87,15 +77,6 @@ def render_profile(profile: NetworkProfile, check: ProfileCheck | None, *, prove
         joints=int(profile.labels.risk["drop"].sum()),
         conditions=list(_plots(profile, conditions=True)),
         curves=list(_plots(profile, conditions=False)),
-        check=check,
-        states=list(VerdictState),
-        shown={key: CATALOGUE[key].title for key in _SHOWN},
-        pairs=[] if check is None else list(combinations(check.variants, 2)),
-        groups=GROUPS,
-        kinds=KINDS,
-        figure=_figure,
-        ratio=_ratio,
-        number=_number,
         code=provenance["code"],
         command=provenance.get("command") or "",
         provenance=provenance_sentence(provenance),
@@ -111,24 +92,3 @@ def _plots(profile: NetworkProfile, *, conditions: bool) -> Iterator[tuple[str, 
     for index, (network, simulated) in enumerate(zip(*(each.values() for each in both), strict=True)):
         svg = compared_curves(network, simulated, name=f"{'condition' if conditions else 'curve'}-{index}")
         yield network.title, Markup(svg)
-
-
-def _figure(figure: CheckedFigure, digits: int) -> tuple[str, str, str, VerdictState | None]:
-    """Return the network's figure, the difference, its interval and its verdict."""
-    each = figure.difference
-    ends = f"{each.low:+.{digits}f} to {each.high:+.{digits}f}" if np.isfinite(each.low) else ""
-    return _number(figure.network, digits), _number(each.mean, digits, sign=True), ends, figure.verdict
-
-
-def _ratio(figure: CheckedFigure) -> tuple[str, str, str, VerdictState | None]:
-    """Return the network's rate, the ratio of both rates, its interval and its verdict."""
-    each = figure.difference
-    ends = f"{1 + each.low:.2f} to {1 + each.high:.2f}" if np.isfinite(each.low) else ""
-    rate = f"{100 * figure.network:.1f} %" if np.isfinite(figure.network) else "–"
-    return rate, f"× {1 + each.mean:.2f}" if np.isfinite(each.mean) else "too few", ends, figure.verdict
-
-
-def _number(value: float, digits: int, *, sign: bool = False) -> str:
-    if not np.isfinite(value):
-        return "–"
-    return f"{value:+.{digits}f}" if sign else f"{value:.{digits}f}"

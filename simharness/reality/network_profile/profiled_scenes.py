@@ -10,7 +10,7 @@ from mvpose import Rig
 from mvpose.commands.progress import Silence, Stages
 from simharness.detector.detect import Detected, detect
 from simharness.runtime.frame_pool import map_jobs
-from simharness.scenario.load import Study
+from simharness.scenario.load import Study, load_study
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.scenario.sections.scenario import Scenario
 from simharness.study.trial_store import Store
@@ -59,6 +59,26 @@ class ProfiledScene:
         """Return the input of scoring, with detections of this scene, T."""
         frames = tuple(each.detections for each in detected), tuple(each.truth for each in detected)
         return Recording(self.sequence.time, self.believed, *frames)
+
+
+def network_study(
+    scenes: Path, network: str, *, head: str | None = None, overrides: Sequence[str] = (), seeds: int | None = None
+) -> Study:
+    """Return the study of a scenario file whose pictures a network reads.
+
+    Args:
+        scenes: name or file of the scenario.
+        network: name of a network that finds people, or an ONNX file.
+        head: name or file of the pose head that reads the joints in its boxes.
+        overrides: further KEY=VALUE of all scenes.
+        seeds: number of seeds; None: those of the file.
+
+    Raises:
+        ValueError: anything wrong with the file or a value.
+    """
+    named = str(Path(network).resolve()).replace("\\", "/") if network.endswith(".onnx") else network
+    keys = [f'detector.network="{named}"', *([f'detector.onnx="{head}"'] if head else [])]
+    return load_study(scenes, overrides=[*keys, *overrides], seeds=seeds)
 
 
 def read_scenes(

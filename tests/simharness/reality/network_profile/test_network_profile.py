@@ -14,12 +14,10 @@ from simharness.detector.viewing_conditions import OCCLUDED
 from simharness.reality.detector_fit.detector_measurement import label_estimates
 from simharness.reality.network_profile.error_curves import condition_curves, error_curves, part_counts
 from simharness.reality.network_profile.exact_labels import kind_of, label_scenes, measure_bias, shared_scatter
-from simharness.reality.network_profile.profile_check import CheckedFigure, check_profile
 from simharness.reality.network_profile.profile_fit import fit_network
 from simharness.reality.network_profile.profiled_scenes import ProfiledScene, read_scenes
 from simharness.scenario.load import load, load_study
 from simharness.scenario.sections.detector_section import KINDS, DetectorSection
-from simharness.statistics.intervals import Interval
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import capture_trial
 from simharness.types.truth import KeypointError
@@ -189,42 +187,6 @@ def test_a_profile_is_read_back(known, tmp_path, monkeypatch):
     assert load("quickstart", overrides=['detector.profile="known.toml"']).detector == profile.detector
     assert "\n[bias]\n" in profile.text
     assert profile.detector.bias.hips == pytest.approx((0.0, 0.02, 0.04), abs=0.006)
-
-
-def test_the_same_detector_holds_and_another_fails(filmed):
-    """The check is passed by the very draws of the network, and failed by a detector that misses nearly everybody."""
-    short = ["duration=0.8", 'rendering.renderer="rays"', "people.count=2", "clutter.boxes=0"]
-    study = load_study("quickstart", overrides=[*short, 'method.variants=["fast"]'])
-    right = DetectorSection.model_validate(KNOWN)
-    wrong = right.model_copy(update={"boxes": right.boxes.model_copy(update={"missed": 0.97})})
-    scenes = []
-    for seed in range(4):
-        trial = build_trial(study.at(study.settings[0], seed))
-        film = capture_trial(trial, Stages(Silence()))
-        rigs = trial.exposures.true_rig, trial.exposures.believed_rig
-        scene = ProfiledScene("", trial.scenario, film.sequence, film.views, *rigs, ())
-        scenes.append(replace(scene, found=scene.simulated(right)))
-    check = check_profile(scenes, {"right": right, "wrong": wrong}, kind="top-down", bias=NO_BIAS)
-    score = check.score("right", "fast", "pcp")
-    assert score.difference.mean == 0
-    assert score.verdict == "holds"
-    assert check.score("wrong", "fast", "pcp").verdict == "fails"
-    assert set(check.verdicts["subsets of cameras"]) == {"holds"}
-    assert check.summary()["detectors"]["wrong"]["scores"]["fast"]["pcp"]["verdict"] == "fails"
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "verdict"),
-    [
-        (-1.9, 1.9, "holds"),
-        (-1.0, 2.1, "cannot tell"),
-        (2.1, 3.0, "fails"),
-        (-5.0, -2.1, "fails"),
-        (-3.0, 3.0, "cannot tell"),
-    ],
-)
-def test_a_verdict_is_about_the_whole_interval(low, high, verdict):
-    assert CheckedFigure(90.0, Interval((low + high) / 2, low, high, 10), 2.0).verdict == verdict
 
 
 def test_scenes_need_a_network():

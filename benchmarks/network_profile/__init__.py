@@ -1,0 +1,1 @@
+"""A fitted profile beside its network on scenes that the fit has not seen."""
