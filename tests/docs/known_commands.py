@@ -124,7 +124,6 @@ MODULES = tuple(
         "benchmarks.doctor.breaks",
         "benchmarks.expected_error",
         "benchmarks.method",
-        "benchmarks.network_profile",
         "benchmarks.pictures",
         "benchmarks.simulator",
         "benchmarks.tracking",
@@ -135,6 +134,7 @@ MODULES = tuple(
         "tools.reid",
     )
 )
+PROFILE_CHECK = "python -m benchmarks.network_profile movenet FOLDER"  # half an hour; tests/benchmarks/network_profile
 FORECASTS = "python -m benchmarks.planning.blind_forecasts FOLDER --shelf SHELF"  # half an hour; data of Shelf
 ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tracking/test_shelf_losses.py
 POWER = "python -m benchmarks.validation FOLDER"  # half an hour, and the data of Shelf; test_wrong_twins.py
