@@ -19,7 +19,11 @@ if TYPE_CHECKING:
 
 
 _UNTRACKED = ("lag", "max_speed", "min_frames")
-_USUAL_UP = {"trc": "y", "c3d": "z", "csv": "z", "bvh": "y"}  # of formats that leave their axes open
+_USUAL_UP = {
+    "c3d": "z",
+    "csv": "z",
+    **dict.fromkeys(("trc", "bvh", "opensim", "mot", "angles"), "y"),
+}  # where left open
 _FLAGS = {"films": "--no-films"}
 
 
@@ -33,7 +37,8 @@ class Wanted:
     )
     formats: str = option(
         "trc,json",
-        "Formats beside poses.parquet and people.json: trc, c3d, csv, panoptic, bvh, gltf, lengths.",
+        "Formats beside poses.parquet and people.json: trc, c3d, csv, panoptic, bvh, gltf, lengths, opensim, mot, "
+        "angles.",
         "--format",
         metavar="NAME,...",
     )
@@ -60,6 +65,9 @@ class Wanted:
     max_speed: float = option(
         24.8, "Leave out arms and legs that are faster, and trunks at half of it; inf: none.", metavar="M/S"
     )
+    filter: str | None = option(
+        None, "Filter joints over time: butterworth (of 6 Hz), butterworth:HZ or spline.", metavar="NAME"
+    )
     min_frames: int = option(5, "Leave out people who are there in fewer frames.", metavar="N")
 
     @property
@@ -80,6 +88,12 @@ class Wanted:
             ValueError: an option that cannot be, or a folder that cannot be written.
         """
         _ = self.limits
+        if self.filter:
+            from mvpose.files.message_text import prefixed
+            from mvpose.formats.people.filters import filter_of
+
+            with prefixed("--filter"):
+                filter_of(self.filter)
         from mvpose.cli.results import ESTIMATE, formats_of, options_of
         from mvpose.commands.output_files import check_writable
 
@@ -146,6 +160,12 @@ def estimate_into(
     people, left_out = within_limits(found, wanted.limits, tracked=tracks)
     if sentences := left_out.sentences():
         note(f"left out: {'; '.join(sentences)}")
+    if wanted.filter:
+        from mvpose.files.message_text import prefixed
+        from mvpose.formats.people.filters import filter_of, filtered
+
+        with prefixed("--filter"):
+            people = filtered(people, *filter_of(wanted.filter))
     diagnosis = examine(inputs) if wanted.doctor else None
     write_results(
         wanted.out,
