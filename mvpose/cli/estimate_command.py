@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from mvpose.formats.pictures import PictureSource
 
 
-_UNTRACKED = ("lag", "max_speed", "min_frames")
+_UNTRACKED = ("lag", "max_speed", "min_frames", "filter")
 _USUAL_UP = {
     "c3d": "z",
     "csv": "z",
@@ -89,11 +89,9 @@ class Wanted:
         """
         _ = self.limits
         if self.filter:
-            from mvpose.files.message_text import prefixed
             from mvpose.formats.people.filters import filter_of
 
-            with prefixed("--filter"):
-                filter_of(self.filter)
+            filter_of(self.filter)
         from mvpose.cli.results import ESTIMATE, formats_of, options_of
         from mvpose.commands.output_files import check_writable
 
@@ -160,12 +158,10 @@ def estimate_into(
     people, left_out = within_limits(found, wanted.limits, tracked=tracks)
     if sentences := left_out.sentences():
         note(f"left out: {'; '.join(sentences)}")
-    if wanted.filter:
-        from mvpose.files.message_text import prefixed
+    if wanted.filter and tracks:
         from mvpose.formats.people.filters import filter_of, filtered
 
-        with prefixed("--filter"):
-            people = filtered(people, *filter_of(wanted.filter))
+        people = filtered(people, *filter_of(wanted.filter))
     diagnosis = examine(inputs) if wanted.doctor else None
     write_results(
         wanted.out,

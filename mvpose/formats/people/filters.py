@@ -16,7 +16,7 @@ from mvpose.arrays import Floats
 from mvpose.recording import People
 
 CUTOFF = 6.0
-"""Usual cutoff of joints in gait, Hz: D. Winter, Biomechanics and Motor Control of Human Movement, 4th edition, 2.2.4."""
+"""Usual cutoff of joints in gait, Hz: D. Winter, Biomechanics and Motor Control of Human Movement, 4th edition."""
 
 _FEWEST = 5  # frames of a stretch that a smoothing spline takes
 _PADDED = 9  # frames by which filtfilt reflects the ends of a stretch
@@ -32,7 +32,7 @@ def butterworth(values: Floats, times: Floats, cutoff: float) -> Floats:
     rate = (len(times) - 1) / (times[-1] - times[0])
     if not 0.0 < cutoff / _TWICE < rate / 2.0:
         raise ValueError(
-            f"a cutoff of {cutoff:g} Hz: expected between 0 and {_TWICE * rate / 2.0:.3g} Hz at {rate:g} Hz"
+            f"--filter: a cutoff of {cutoff:g} Hz: expected between 0 and {_TWICE * rate / 2.0:.3g} Hz at {rate:g} Hz"
         )
     if len(values) <= _PADDED:
         return values
@@ -66,7 +66,7 @@ def filter_of(text: str) -> tuple[str, float]:
     except ValueError:
         cutoff = np.nan
     if name not in FILTERS or not 0.0 < cutoff < np.inf or (given and name == "spline"):
-        raise ValueError(f"expected butterworth, butterworth:HZ or spline, got {text!r}")
+        raise ValueError(f"--filter: expected butterworth, butterworth:HZ or spline, got {text!r}")
     return name, cutoff
 
 
@@ -82,7 +82,7 @@ def filtered(people: People, name: str, cutoff: float = CUTOFF) -> People:
         ValueError: times that are uneven, or a cutoff that is too high for the frame rate.
     """
     if people.uniform() is not people:
-        raise ValueError("a filter needs frames at even times; these are uneven")
+        raise ValueError("--filter: needs frames at even times; these are uneven")
     joints = people.joints.copy()
     for row, joint in np.ndindex(joints.shape[1:3]):
         there = np.isfinite(joints[:, row, joint]).all(axis=-1)

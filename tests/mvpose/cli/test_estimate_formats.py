@@ -30,7 +30,7 @@ def estimate(lab, out, *options):
 
 def test_files_have_the_axis_up_and_those_for_our_own_commands_do_not(lab, tmp_path):
     out = tmp_path / "out"
-    options = ("--format", "trc,csv,c3d,bvh,gltf,lengths,json", "--files-up", "y", "--together")
+    options = ("--format", "trc,csv,c3d,bvh,gltf,lengths,json,opensim,mot,angles", "--files-up", "y", "--together")
     result = estimate(lab, out, "--method", "track-fast", *options)
     assert result.exit_code == 0, result.output
     ours, turned = pl.read_parquet(out / "poses.parquet"), pl.read_csv(out / "poses.csv")
@@ -44,6 +44,7 @@ def test_files_have_the_axis_up_and_those_for_our_own_commands_do_not(lab, tmp_p
     assert reader.get("POINT:Y_SCREEN").string_value == "+Y"
     names = {path.name for path in out.iterdir()}
     assert {"person_0.bvh", "person_1.trc", "people.glb", "bone_lengths.csv", "people.json"} <= names
+    assert {"person_0.mot", "person_1_angles.csv", "person_0_scale.xml", "opensim_markers.xml"} <= names
 
 
 def test_a_wrong_axis_is_found_before_anything_is_read(lab, tmp_path):
