@@ -67,7 +67,9 @@ FORMATS: dict[str, PeopleFormat] = {
     "actors-mat": PeopleFormat("actorsGT.mat", read=actors_mat.read, found="*.mat"),
     "bvh": PeopleFormat("person_ID.bvh", bvh.write),
     "gltf": PeopleFormat("people.glb", gltf.write),
-    "opensim": PeopleFormat("person_ID_scale.xml, person_ID_ik.xml, opensim_markers.xml", opensim.write_setup),
+    "opensim": PeopleFormat(
+        "person_ID_scale.xml, person_ID_ik.xml, opensim_markers.xml", opensim.write_setup, requires=("jinja2",)
+    ),
     "mot": PeopleFormat("person_ID.mot", opensim.write_mot),
     "angles": PeopleFormat("person_ID_angles.csv", opensim.write_angles),
     "lengths": PeopleFormat("bone_lengths.csv", people_tables.write_lengths),
