@@ -148,7 +148,7 @@ class TestWheels:
 
     def test_simharness_requires_mvpose_of_its_version(self, metadata):
         (required,) = (each for each in metadata["simharness"].requires_dist if each.name == "mvpose")
-        assert str(required) == f"mvpose[networks,recordings]=={metadata['simharness'].version}"
+        assert str(required) == f"mvpose[films,networks,recordings]=={metadata['simharness'].version}"
 
     @pytest.mark.parametrize("name", ["mvpose", "simharness"])
     def test_a_wheel_holds_its_package_and_nothing_else(self, wheels, name):

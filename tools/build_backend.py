@@ -18,7 +18,7 @@ import setuptools
 from setuptools import build_meta
 
 _PACKAGES = ("simharness", "simharness.*")
-_EXTRAS = ("networks", "recordings")  # of mvpose: the simulator runs networks, and reads what mvpose reads
+_EXTRAS = ("films", "networks", "recordings")  # of mvpose: the simulator runs networks, and reads what mvpose reads
 
 
 class _Backend(build_meta._BuildMetaBackend):  # type: ignore[misc, name-defined, unused-ignore]

@@ -141,6 +141,7 @@ def estimate_into(
     from mvpose.cli.estimation import estimate_people, estimator, examine
     from mvpose.estimators import SequenceEstimator
     from mvpose.formats.people.outliers import within_limits
+    from mvpose.report.film_file import NEEDS, has_pyav
 
     own = sources is None and wanted.pictures
     if own:
@@ -154,6 +155,8 @@ def estimate_into(
     tracks = isinstance(method, SequenceEstimator)
     for each in _without_effect(wanted, choices, inputs, tracks=tracks, pictures=sources is not None):
         note(each)
+    if wanted.films and wanted.page and views is not None and not has_pyav():
+        note(f"no films: this {NEEDS}")
     found = estimate_people(inputs, method, trust=wanted.trust)
     people, left_out = within_limits(found, wanted.limits, tracked=tracks)
     if sentences := left_out.sentences():
@@ -172,7 +175,7 @@ def estimate_into(
         left_out=left_out,
         page=wanted.page and bool(inputs.frames),
         views=views,
-        films=wanted.films,
+        films=wanted.films and has_pyav(),
         diagnosis=diagnosis,
     )
     typer.echo(f"{len(people)} people in {people.frames} frames: {wanted.out}")

@@ -1,7 +1,7 @@
 """Films of the cameras: pictures with the people in 3D and the detections drawn into them, which browsers play.
 
-VP9 in MP4, or VP8 in WebM without PyAV (:mod:`.film_file`). Drawings look as those of the page
-(:mod:`.picture_drawings`): broad limbs for people in 3D, thin lines with dots for detections.
+VP9 in MP4 (:mod:`.film_file`). Drawings look as those of the page (:mod:`.picture_drawings`):
+broad limbs for people in 3D, thin lines with dots for detections.
 """
 
 import re
@@ -17,7 +17,7 @@ from mvpose.arrays import Floats, Integers
 from mvpose.camera import Camera
 from mvpose.files.message_text import one_line
 from mvpose.report.examined_recording import ExaminedRecording
-from mvpose.report.film_file import FilmFile, film_suffix
+from mvpose.report.film_file import FilmFile
 from mvpose.report.overlay import USUAL_HEIGHT, Overlay
 from mvpose.report.palette import (
     INK,
@@ -85,7 +85,7 @@ def write_films(
     rate = max(_SLOWEST, recording.people.rate / step)
     films, names = [], _file_names(recording.names)
     for view, camera in enumerate(recording.rig):
-        address = f"{FOLDER}/{names[view]}{film_suffix()}"
+        address = f"{FOLDER}/{names[view]}.mp4"
         scale = min(1.0, _WIDEST / camera.size[0])
         size = tuple(max(2, 2 * round(0.5 * scale * side)) for side in camera.size)  # colour has half the resolution
         writer, pen = FilmFile(folder / address, (size[0], size[1]), rate), _Pen(recording, view, scale)

@@ -6,7 +6,6 @@ from scipy.spatial.transform import Rotation
 from mvpose.arrays import Floats
 
 _NO_LENGTH = 1e-9  # metres
-_NEAR_HALF_TURN = -0.999  # cosine of an angle
 
 
 def to_matrices(vectors: Floats) -> Floats:
@@ -17,16 +16,7 @@ def to_matrices(vectors: Floats) -> Floats:
 
 def to_vectors(matrices: Floats) -> Floats:
     """Return the rotation vectors (..., 3), radians, of rotation matrices (..., 3, 3)."""
-    cosine = (np.trace(matrices, axis1=-2, axis2=-1) - 1.0) / 2.0
-    sines = np.stack([matrices[..., 2, 1], matrices[..., 0, 2], matrices[..., 1, 0]], axis=-1)
-    sines = (sines - np.stack([matrices[..., 1, 2], matrices[..., 2, 0], matrices[..., 0, 1]], axis=-1)) / 2.0
-    sine = np.sqrt(np.sum(sines**2, axis=-1))
-    angle = np.arctan2(sine, cosine)
-    vectors = sines * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)[..., None]
-    half = cosine < _NEAR_HALF_TURN  # where the sines lose the axis
-    if half.any():
-        vectors[half] = Rotation.from_matrix(matrices[half]).as_rotvec()
-    return vectors
+    return Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_rotvec().reshape(matrices.shape[:-1])
 
 
 def shortest(start: Floats, end: Floats) -> Floats:
@@ -50,10 +40,7 @@ def shortest(start: Floats, end: Floats) -> Floats:
 
 def skew(vectors: Floats) -> Floats:
     """Return the matrices (..., 3, 3) that multiply as the cross product with vectors (..., 3)."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    zero = np.zeros_like(x)
-    rows = [zero, -z, y, z, zero, -x, -y, x, zero]
-    return np.stack(rows, axis=-1).reshape(*vectors.shape, 3)
+    return np.cross(np.eye(3), vectors[..., None, :])
 
 
 def unit(vectors: Floats, usual: Floats) -> Floats:

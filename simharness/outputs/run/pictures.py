@@ -302,7 +302,7 @@ def _sheet(
 
 
 def encode_mp4(pictures: Sequence[Rgb], *, rate: float) -> bytes | None:
-    """Return pictures, each (h, w, 3) of one size, as an MP4 file; None where no encoder is installed.
+    """Return pictures, each (h, w, 3) of one size, as an MP4 file; None where PyAV is not installed.
 
     Widths and heights are even in the file: a last odd row or column is left out.
 
