@@ -18,9 +18,6 @@ from mvpose.skeleton_fit.rotations import to_matrices, to_vectors
 AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Rotation from the axes of our segments (forward, left, up) to those of OpenSim's bodies (forward, up, right)."""
 
-PELVIS = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
-"""Names of the rotations of the pelvis in the world."""
-
 
 def joint_angles(fit: FittedBody, world: Floats) -> dict[str, Floats]:
     """Return the angle of each coordinate, (T,), degrees, without jumps of whole turns.
@@ -35,7 +32,8 @@ def joint_angles(fit: FittedBody, world: Floats) -> dict[str, Floats]:
     body, rotations = fit.body, fit.pose.rotations
     local = {each.name: rotations[:, k] for k, each in enumerate(body.segments)}
     axes = {each.name: np.reshape(each.axes, (-1, 3)) for each in body.segments}
-    found = dict(zip(PELVIS, _euler(world @ local["Hips"] @ AXES.T), strict=True))
+    pelvis = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
+    found = dict(zip(pelvis, _euler(world @ local["Hips"] @ AXES.T), strict=True))
 
     def ball(names: tuple[str, str, str], turned: Floats, *, side: float = 1.0) -> None:
         found.update(zip(names, _euler(AXES @ turned @ AXES.T, np.array([1.0, side, side])), strict=True))
@@ -44,19 +42,14 @@ def joint_angles(fit: FittedBody, world: Floats) -> dict[str, Floats]:
         end = name[0].lower()
         hanging = to_matrices(np.array([side * np.pi / 2, 0.0, 0.0]))  # from the T-pose
         ball((f"hip_flexion_{end}", f"hip_adduction_{end}", f"hip_rotation_{end}"), local[f"{name}UpLeg"], side=side)
-        found[f"knee_angle_{end}"] = _hinge(local[f"{name}Leg"], axes[f"{name}Leg"])
+        found[f"knee_angle_{end}"] = np.degrees(to_vectors(local[f"{name}Leg"]) @ axes[f"{name}Leg"][0])
         if len(axes[f"{name}Foot"]):
             found[f"ankle_angle_{end}"] = _euler(AXES @ local[f"{name}Foot"] @ AXES.T)[0]
         arm = local[f"{name}Shoulder"] @ local[f"{name}Arm"] @ hanging.T
         ball((f"arm_flex_{end}", f"arm_add_{end}", f"arm_rot_{end}"), arm, side=side)
-        found[f"elbow_flex_{end}"] = _hinge(local[f"{name}ForeArm"], axes[f"{name}ForeArm"])
+        found[f"elbow_flex_{end}"] = np.degrees(to_vectors(local[f"{name}ForeArm"]) @ axes[f"{name}ForeArm"][0])
     ball(("lumbar_extension", "lumbar_bending", "lumbar_rotation"), local["Spine"])
     return found
-
-
-def _hinge(turned: Floats, axes: Floats) -> Floats:
-    """Return the angles about the one axis of a hinge, (T,), degrees."""
-    return np.asarray(np.degrees(to_vectors(turned) @ axes[0]))
 
 
 def _euler(turned: Floats, signs: Floats | None = None) -> Floats:

@@ -19,9 +19,6 @@ from mvpose.skeleton_fit import FittedBody, joint_angles
 from mvpose.skeleton_fit.body import ArticulatedBody
 from mvpose.skeleton_fit.joint_angles import AXES
 
-MODEL, MARKERS = "Rajagopal2016.osim", "opensim_markers.xml"
-"""File of the model that the setups name, and of the markers on its bodies."""
-
 _HIPS = np.array([-0.056276, -0.07849, 0.07726])  # metres; centre of the right hip in the pelvis of that model
 _SHOULDERS = np.array([0.003155, 0.3715, 0.0])  # middle between the centres of the shoulders in its torso
 _HEEL = np.array([-0.04877, -0.04195, 0.00792])  # origin of the right calcaneus from the centre of the ankle
@@ -58,14 +55,13 @@ def write_setup(export: Export) -> Iterator[tuple[str, bytes]]:
     """
     people = export.uniform
     markers = {marker_label(joint): place for joint, place in marker_places(people.skeleton).items()}
-    yield MARKERS, _filled(MARKERS, markers=markers)
+    yield "opensim_markers.xml", _filled("opensim_markers.xml", markers=markers)
     yield from trc.write(export)
     for _, identity, span in each_person(people):
         name = f"person_{identity}"
         times = f"{people.times[span.start]:.6f} {people.times[span.stop - 1]:.6f}"
         for kind in ("scale", "ik"):
-            values = {"name": name, "times": times, "markers": markers, "model": MODEL, "marker_file": MARKERS}
-            yield f"{name}_{kind}.xml", _filled(f"opensim_{kind}.xml", **values)
+            yield f"{name}_{kind}.xml", _filled(f"opensim_{kind}.xml", name=name, times=times, markers=markers)
 
 
 def _filled(template: str, **values: Any) -> bytes:

@@ -167,7 +167,8 @@ def buying_curve(name: str, plan: RigPlan) -> str:
             label="share of the volume within the target",
         )  # fmt: skip
         axes.axvline(len(plan.rig), color=LINE, lw=1.2, zorder=0)
-        axes.set(xlabel="cameras", ylabel="%", ylim=(min(50.0, *_lows(plan)) - 3, 103))
+        axes.set(xlabel="cameras", ylabel="%")
+        axes.set_ylim(top=100.5)
         axes.set_xticks(counts)
         axes.grid(axis="y")
         axes.legend(loc="lower right", labelcolor=INK)
@@ -223,8 +224,3 @@ def _label(axes: Axes, room: Room, cameras: Sequence[Camera]) -> None:
         ],
         areas=[(corners.min(axis=0), corners.max(axis=0)) for corners in boxes],
     )
-
-
-def _lows(plan: RigPlan) -> list[float]:
-    values = [v for p in plan.curve for v in (p.figures.pcp.mean, p.figures.share) if np.isfinite(v)]
-    return values or [50.0]

@@ -325,7 +325,7 @@ def rig_view_3d(rehearsal: Rehearsal) -> View3D:
     if rehearsal.extra is not None:
         frusta.append(Piece3D(camera_pyramid(rehearsal.extra.camera, _REACH), PYRAMID, _EXTRA))
     room = _at(walls, 0.0)
-    floor = _floor(points)
+    floor, good = _floor(points), outline_of(rehearsal.prediction.places, rehearsal.good)
     scene = Scene3D(
         label="The rig in 3D: frusta of the cameras, the volume, and the part of it that meets the target in green",
         center=np.array([*(points.min(axis=0) + points.max(axis=0)) / 2, height / 2]),
@@ -336,7 +336,7 @@ def rig_view_3d(rehearsal: Rehearsal) -> View3D:
             Piece3D(room, Shape3D(lines=loop(len(room))), _ROOM),
             *(Piece3D(each.corners[[0, 4, 6, 2, 1, 5, 7, 3]], prism(4), _OBSTACLE) for each in setup.obstacles),
             Piece3D(np.concatenate([_at(volume, 0.0), _at(volume, height)]), prism(len(volume)), _VOLUME),
-            Piece3D.of_lines(_upright(outline_of(rehearsal.prediction.places, rehearsal.good), height), _OUTLINE),
+            Piece3D.of_lines([_at(each, 0.0) for each in good], _OUTLINE),
             *frusta,
         ],
         names=[(camera.name, camera.center) for camera in rig],
@@ -355,22 +355,6 @@ def _tiles(rehearsal: Rehearsal) -> list[Piece3D]:
     corner = grid_spacing(places) / 2 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     square = Shape3D(faces=(tuple(range(4)),))
     return [Piece3D(_at(place + corner, 0.0), square, _TILE) for place in places[rehearsal.good]]
-
-
-def _upright(lines: list[Floats], height: float) -> list[Floats]:
-    """Return lines of the floor on the floor and at a height, with posts where they turn."""
-    corners = {tuple(np.round(end, 6)) for line in lines for end in line}
-    turning = {
-        corner
-        for corner in corners
-        if len({tuple(np.abs(np.sign(np.round(line[1] - line[0], 6)))) for line in lines if _ends(line, corner)}) > 1
-    }
-    posts = [np.array([[*corner, 0.0], [*corner, height]]) for corner in sorted(turning)]
-    return [*(_at(line, level) for line in lines for level in (0.0, height)), *posts]
-
-
-def _ends(line: Floats, corner: tuple[float, ...]) -> bool:
-    return any(np.allclose(end, corner, atol=1e-5) for end in line)
 
 
 def _floor(points: Floats) -> list[Floats]:
