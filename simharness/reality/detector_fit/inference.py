@@ -35,6 +35,7 @@ SCALES: Scales = {
         *("keypoints.jitter", "keypoints.miss", "keypoints.inversion.", "keypoints.swap", "keypoints.stray"),
         *("keypoints.guess.self_occluded", "keypoints.guess.occluded", "correlation.scatter_noise"),
         *("keypoints.drop.edge", "keypoints.drop.self_occluded", "keypoints.drop.occluded"),
+        "boxes.missed_hidden",
         *("scores.good", "scores.jitter", "scores.miss", "scores.inversion", "scores.swap", "scores.hidden"),
         *("scores.guess", "scores.overconfident", "scores.underconfident"),
     ),
@@ -67,7 +68,10 @@ _APART = 0.2
 """Distance of the left-right counterpart, heights of the box, at which inversions are inferred: joints that are told
 from their counterpart are about so far from it. Shares at no distance are extrapolated with the reach."""
 
-_ANEW = tuple(f"correlation.{key}" for key in ("life", "views", "gross_views", "limb")) + ("boxes.",)
+_ANEW = tuple(f"correlation.{key}" for key in ("life", "views", "gross_views", "limb")) + (
+    "boxes.life",
+    "boxes.missed_views",
+)
 """Parameters by which errors are drawn anew. They change no share: the marginal distributions are exact."""
 
 _NOISE, _NOISE_ANEW = 0.4, 1.2

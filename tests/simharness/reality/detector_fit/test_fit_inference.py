@@ -158,3 +158,21 @@ def test_other_parameters_are_told_apart_by_what_they_do():
     found = infer(exact, seen, prior)
     for key, true in near.items():
         assert found[key].value == pytest.approx(true, rel=0.12), key
+
+
+def test_people_who_are_seen_less_hidden_than_they_are():
+    """In half of the cases the film shows people less hidden than the recording: measured shares are mixtures."""
+    true = [0.01, 0.05, 0.2, 0.6, 0.9]
+
+    def mixed(values, rng):
+        shares = np.array([values[f"boxes.missed_hidden.{index}"] for index in range(5)])
+        seen = (shares + np.append(shares[1:], 1.0)) / 2
+        return {f"boxes.missed_hidden.{index}": rng.binomial(2000, each) / 2000 for index, each in enumerate(seen)}
+
+    real = mixed({f"boxes.missed_hidden.{index}": each for index, each in enumerate(true)}, np.random.default_rng(5))
+    reach = {key: 1.96 * np.sqrt(value * (1 - value) / 2000) for key, value in real.items()}
+    measured = {key: MeasuredValue(each, each - reach[key], each + reach[key], 2000) for key, each in real.items()}
+    prior = {key: each for key, each in zip(real, [0.02, 0.1, 0.3, 0.5, 0.8], strict=True)}
+    found = infer(measured, lambda values, draw: mixed(values, np.random.default_rng([6, draw])), prior)
+    for key, each in zip(real, true, strict=True):
+        assert abs(found[key].value - each) < 0.4 * max(abs(real[key] - each), 0.02), (key, found[key], real[key])
