@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from mvpose.formats.pictures import PictureSource
 
 
-_UNTRACKED = ("lag", "max_speed", "min_frames")
+_UNTRACKED = ("lag", "max_speed", "min_frames", "filter")
 _OPEN = ("trc", "bvh", "opensim", "mot", "angles")
 _USUAL_UP = {"c3d": "z", "csv": "z"} | dict.fromkeys(_OPEN, "y")  # of formats that leave their axes open
 _FLAGS = {"films": "--no-films"}
@@ -62,6 +62,9 @@ class Wanted:
     max_speed: float = option(
         24.8, "Leave out arms and legs that are faster, and trunks at half of it; inf: none.", metavar="M/S"
     )
+    filter: str | None = option(
+        None, "Filter joints over time: butterworth (of 6 Hz), butterworth:HZ or spline.", metavar="NAME"
+    )
     min_frames: int = option(5, "Leave out people who are there in fewer frames.", metavar="N")
 
     @property
@@ -82,6 +85,10 @@ class Wanted:
             ValueError: an option that cannot be, or a folder that cannot be written.
         """
         _ = self.limits
+        if self.filter:
+            from mvpose.formats.people.filters import filter_of
+
+            filter_of(self.filter)
         from mvpose.cli.results import ESTIMATE, formats_of, options_of
         from mvpose.commands.output_files import check_writable
 
@@ -151,6 +158,10 @@ def estimate_into(
     people, left_out = within_limits(found, wanted.limits, tracked=tracks)
     if sentences := left_out.sentences():
         note(f"left out: {'; '.join(sentences)}")
+    if wanted.filter and tracks:
+        from mvpose.formats.people.filters import filter_of, filtered
+
+        people = filtered(people, *filter_of(wanted.filter))
     diagnosis = examine(inputs) if wanted.doctor else None
     write_results(
         wanted.out,

@@ -47,6 +47,7 @@ RESULTS = {
     "doctor": Row("--doctor"),
     "max_error": Row("--max-error 0.004"),
     "max_speed": Row("--max-speed 0.5", "--method track-fast"),
+    "filter": Row("--filter butterworth:3", "--method track-fast"),
     "min_frames": Row("--min-frames 12", "--method track-fast"),
 }
 ROWS = {
@@ -95,6 +96,7 @@ NO_EFFECT = [
     (PLAIN, "--lag inf"),
     (PLAIN, "--max-speed 3"),
     (PLAIN, "--min-frames 7"),
+    (PLAIN, "--filter spline"),
     (f"estimate {FILMED} --no-page", "--pictures {lab}/pictures"),
     (PLAIN, "--no-films"),
     (f"estimate {FILMED}", "--no-films"),
