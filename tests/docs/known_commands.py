@@ -172,6 +172,7 @@ KNOWN = {
     *MAKE,
     *MODULES,
     FORECASTS,
+    PROFILE_CHECK,
     ON_SHELF,
     POWER,
     LOOP,
