@@ -1,7 +1,7 @@
 """A profile beside its network on new scenes: ``python -m benchmarks.network_profile NETWORK FOLDER``.
 
-Fits the profile of a network as ``simharness profile-network`` does, then runs the method on what the network finds in
-the pictures of ``scenarios/profile_check.toml``, and on what simulated detectors find in the same scenes: with the
+Fits the profile of a network as ``tools.network_profile`` does, then runs the method on what the network finds in the
+pictures of ``scenarios/profile_check.toml``, and on what simulated detectors find in the same scenes: with the
 fitted profile, and with shipped ones. Prints PCP by variant and the counts of verdicts, and writes all figures to
 ``FOLDER/check.json``. Half an hour on two cores; detections are kept in ``FOLDER/store``.
 """
@@ -19,10 +19,10 @@ from benchmarks.network_profile.profile_check import ProfileCheck, check_profile
 from mvpose.commands.output_files import write_json
 from mvpose.commands.progress import reporter
 from mvpose.commands.terminal import plain_table
-from simharness.reality.network_profile.profile_fit import SIMULATIONS, fit_network
-from simharness.reality.network_profile.profiled_scenes import network_study, read_scenes
 from simharness.reality.validation.verdicts import VerdictState
 from simharness.scenario.load import load
+from tools.network_profile.profile_fit import SIMULATIONS, fit_network
+from tools.network_profile.profiled_scenes import network_study, read_scenes
 
 _RIVALS = ("typical", "topdown", "posefix")
 

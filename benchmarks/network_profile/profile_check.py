@@ -17,9 +17,6 @@ from mvpose.arrays import Floats
 from simharness.detector.detect import Detected
 from simharness.reality.annotated_recording import AnnotatedRecording, DetectorKind
 from simharness.reality.detector_fit.detector_sums import Trials
-from simharness.reality.network_profile.error_curves import part_counts
-from simharness.reality.network_profile.exact_labels import label_scenes
-from simharness.reality.network_profile.profiled_scenes import ProfiledScene
 from simharness.reality.validation.verdicts import VerdictState, equivalence
 from simharness.runtime.frame_pool import map_jobs
 from simharness.scenario.sections.detector_section import KINDS, DetectorSection
@@ -29,6 +26,9 @@ from simharness.scoring.pcp import GROUPS, percent
 from simharness.statistics.intervals import Interval, mean_interval
 from simharness.statistics.resampling import pseudo_values
 from simharness.trial.conditioned_trial import estimate_frames
+from tools.network_profile.error_curves import part_counts
+from tools.network_profile.exact_labels import label_scenes
+from tools.network_profile.profiled_scenes import ProfiledScene
 
 NETWORK = "network"
 SCORES = ("pcp", "recall", "ghosts", "mpjpe_mm", *(f"pcp_{group}" for group in GROUPS))

@@ -37,7 +37,6 @@ from simharness.planning.rehearsal_scene import RehearsalSetup, SceneSettings
 from simharness.planning.rig_file import read_rig
 from simharness.planning.simulated_scenes import Condition, SceneBatch, SceneResult, simulate_scenes
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.network_profile.profiled_scenes import ProfiledScene, read_scenes
 from simharness.reality.recording_file import read_recording
 from simharness.reality.validation.evidence import frame_weights
 from simharness.reality.validation.passes import CameraSubset, annotated, run_passes
@@ -47,6 +46,7 @@ from simharness.scenario.presets import read_profile
 from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.pcp import percent
 from simharness.trial.conditioned_trial import estimate_frames
+from tools.network_profile.profiled_scenes import ProfiledScene, read_scenes
 
 _RIGS = Path(__file__).with_name("filmed_rigs.toml")
 Scores = Mapping[Subset, Floats]

@@ -10,7 +10,6 @@ from simharness.cli import (
     check_command,
     evaluate_command,
     hunt_command,
-    profile_command,
     rehearse_command,
     report_command,
     run_command,
@@ -48,7 +47,6 @@ app.add_typer(evaluate_command.app, name="evaluate")
 for command in (
     validate_command.fit_detector,
     validate_command.validate,
-    profile_command.profile_network,
     rehearse_command.rehearse,
     rehearse_command.plan,
 ):

@@ -95,7 +95,7 @@ GENERAL = ForecastErrors(ForecastError(4.3, 0.36, 11), ForecastError(0.86, 0.4, 
 """Errors with a shipped profile of no certain network."""
 
 MEASURED = ForecastErrors(ForecastError(0.59, 0.28, 9), ForecastError(0.21, 0.41, 9), ForecastError(1.0, 0.12, 9))
-"""Errors with a profile that was measured on other pictures of the network (``simharness profile-network``)."""
+"""Errors with a profile that was measured on other pictures of the network (``python -m tools.network_profile``)."""
 
 
 def forecast_text(forecast: Interval, *, digits: int = 1) -> str:

@@ -46,7 +46,6 @@ NAMES = (  # mentioned
     "simharness check",
     "simharness export",
     "simharness fit-detector",
-    "simharness profile-network",
     "simharness score",
     "simharness hunt my-room.toml --budget 30m",  # tests/simharness/hunt/test_hunt_run.py
     "simharness shrink results/failures/NAME.toml",  # tests/simharness/hunt/test_kept_failure.py
@@ -85,8 +84,6 @@ IN_PARTS = {
 }
 READ_BY_A_NETWORK = {
     "simharness run pixels": "--set duration=0.4 --set rate=5 --set cameras.count=3",
-    "simharness profile-network movenet": "--scenes pixels --set duration=0.4 --set rate=5 "
-    "--set people.count=2 --set cameras.count=3 --set cameras.size=[320,240]",
     "simharness study sensor": "--set duration=0.2 --set rate=5 --set cameras.count=2 --set cameras.size=[320,240] "
     "--set 'sweep={one_at_a_time=true, sensor={jpeg=[92,5]}}' --seeds 1 --variant fast --workers 1",
 }
@@ -137,6 +134,7 @@ MODULES = tuple(
         "tools.reid",
     )
 )
+PROFILE = "python -m tools.network_profile movenet"  # tests/tools/network_profile
 PROFILE_CHECK = "python -m benchmarks.network_profile movenet FOLDER"  # half an hour; tests/benchmarks/network_profile
 FORECASTS = "python -m benchmarks.planning.blind_forecasts FOLDER --shelf SHELF"  # half an hour; data of Shelf
 ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tracking/test_shelf_losses.py
@@ -172,6 +170,7 @@ KNOWN = {
     *MAKE,
     *MODULES,
     FORECASTS,
+    PROFILE,
     PROFILE_CHECK,
     ON_SHELF,
     POWER,

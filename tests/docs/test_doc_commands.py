@@ -79,7 +79,6 @@ OUTPUT = {
     "export": "benchmark/gathering/**/manifest.json",
     "render": "results/renders/gathering/mosaic*",
     "study": "results/*/*/report.html",
-    "profile-network": "results/profiles/*/profile.html",
 }
 
 

@@ -81,7 +81,6 @@ BASES = {
     "fit-detector": "{lab}/hall.toml",
     "validate": "{lab}/hall.toml --out {out}",
     "rehearse": "ring5 --out {out}",
-    "profile-network": "movenet --scenes pixels --out {out}",
     "plan": "lab --out {out}",
     "evaluate recording": "{lab}/hall.toml",
     "evaluate poses": "{lab}/hall.toml {lab}/people",
@@ -189,15 +188,6 @@ ROWS = {
         "seed": Row("--seed 3"),
         "out": RESULT["out"],
     },
-    "profile-network": WORKERS
-    | {
-        "head": Row("--head posenet"),
-        "quick": Row("--quick", base="movenet --scenes profile --out {out}"),
-        "scenes": Row("--scenes profile"),
-        "overrides": Row("--set duration=0.4"),
-        "out": RESULT["out"],
-        "store": Row("--store {out}/elsewhere"),
-    },
     "plan": WORKERS
     | {
         "cameras": Row("--cameras 4"),
@@ -249,7 +239,6 @@ NO_EFFECT = [
     (f"report {BASES['report'].replace('study', 'single')}", "--threshold pcp=80"),
     ("rehearse {lab}/three.toml --out {out}", "--subsets"),
     (f"plan {BASES['plan']} --scenes 0", "--workers 3"),
-    (f"profile-network {BASES['profile-network']}", "--quick"),
 ]
 """Combinations in which an option has nothing to act on."""
 
@@ -311,10 +300,6 @@ def _stand_ins(study):
         "simharness.outputs.planning.rehearsal_page": {"render_rehearsal": "<!doctype html>"},
         "simharness.planning.plan_rig": {"plan_rig": None},
         "simharness.trial.stages.networks": {"people_finder": ()},
-        "simharness.reality.network_profile.profiled_scenes": {"read_scenes": ()},
-        "simharness.reality.network_profile.profile_fit": {"fit_network": profile},
-        "simharness.reality.network_profile.profile_check": {"check_profile": checked_profile},
-        "simharness.outputs.network_profile.page": {"render_profile": "<!doctype html>"},
     }  # fmt: skip
 
 

@@ -48,8 +48,6 @@ FOLDERS = {
     "simharness study --store": ("simharness study quickstart --out new --store {}", ""),
     "simharness merge --into": ("simharness merge store --into {}", ""),
     "simharness plan --out": ("simharness plan lab --out {}", "lab"),
-    "simharness profile-network --out": ("simharness profile-network movenet --out {}", ""),
-    "simharness profile-network --store": ("simharness profile-network movenet --out new --store {}", ""),
     "simharness rehearse --out": ("simharness rehearse ring5 --volume 4x3 --out {}", ""),
     "simharness hunt --out": ("simharness hunt quickstart --set search.people.count=[1,2] --out {}", "quickstart"),
     "simharness shrink --out": ("simharness shrink quickstart --out {}", ""),

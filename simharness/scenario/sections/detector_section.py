@@ -354,8 +354,8 @@ class DetectorSection(Section):
     )
     measured: bool = key(
         False,
-        "whether the errors below were measured on a network, by profile-network or fit-detector: forecasts with them "
-        "are more exact",
+        "whether the errors below were measured on a network, by fit-detector or tools.network_profile: forecasts with "
+        "them are more exact",
     )
     source: Literal["simulated", "network"] = key(
         "simulated",

@@ -7,12 +7,12 @@ import pytest
 
 from benchmarks.network_profile.profile_check import CheckedFigure, check_profile
 from mvpose.commands.progress import Silence, Stages
-from simharness.reality.network_profile.profiled_scenes import ProfiledScene
 from simharness.scenario.load import load_study
 from simharness.scenario.sections.detector_section import KINDS, DetectorSection
 from simharness.statistics.intervals import Interval
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import capture_trial
+from tools.network_profile.profiled_scenes import ProfiledScene
 
 NO_BIAS = np.zeros((len(KINDS), 3))
 ERRING = {

@@ -4,6 +4,7 @@ Plots of the errors of a network beside those of the simulated detector with its
 """
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,11 @@ from scipy.stats import binomtest
 from mvpose.arrays import Floats
 from mvpose.report.documents import fill_template
 from mvpose.report.svg_plots import legend_above, svg_plot
-from simharness.outputs import TEMPLATES
 from simharness.outputs.validation.plots import REAL_COLOR, TWIN_COLOR
 from simharness.reality.detector_fit.detector_sums import Trials
-from simharness.reality.network_profile.error_curves import ErrorCurve, condition_curves, error_curves
-from simharness.reality.network_profile.profile_fit import NetworkProfile
 from simharness.trial.identity import provenance_sentence
+from tools.network_profile.error_curves import ErrorCurve, condition_curves, error_curves
+from tools.network_profile.profile_fit import NetworkProfile
 
 _SIZE = (3.6, 2.6)
 _FEWEST = 10  # trials behind a point that is drawn
@@ -70,7 +70,7 @@ def render_profile(profile: NetworkProfile, *, provenance: Mapping[str, Any]) ->
     """
     return fill_template(
         "network_profile.html",
-        folder=TEMPLATES,
+        folder=Path(__file__).parent,
         program="simharness",
         name=profile.name,
         profile=profile,

@@ -5,22 +5,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from mvpose.commands.progress import Silence, Stages
 from mvpose.networks.catalogue.store import path_of
-from simharness.cli import app
 from simharness.detector.viewing_conditions import OCCLUDED
 from simharness.reality.detector_fit.detector_measurement import label_estimates
-from simharness.reality.network_profile.error_curves import condition_curves, error_curves, part_counts
-from simharness.reality.network_profile.exact_labels import kind_of, label_scenes, measure_bias, shared_scatter
-from simharness.reality.network_profile.profile_fit import fit_network
-from simharness.reality.network_profile.profiled_scenes import ProfiledScene, read_scenes
 from simharness.scenario.load import load, load_study
 from simharness.scenario.sections.detector_section import KINDS, DetectorSection
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.simulation import capture_trial
 from simharness.types.truth import KeypointError
+from tools.network_profile.__main__ import main
+from tools.network_profile.error_curves import condition_curves, error_curves, part_counts
+from tools.network_profile.exact_labels import kind_of, label_scenes, measure_bias, shared_scatter
+from tools.network_profile.profile_fit import fit_network
+from tools.network_profile.profiled_scenes import ProfiledScene, read_scenes
 
 NO_BIAS = np.zeros((len(KINDS), 3))
 KNOWN = {
@@ -195,12 +194,21 @@ def test_scenes_need_a_network():
         read_scenes(study, store=Path("store"))
 
 
-def test_an_unknown_network_is_one_line(tmp_path, monkeypatch):
+def test_an_unknown_network_is_one_line(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(app, ["profile-network", "nobody"])
-    assert result.exit_code == 2
-    assert "no such file or name; `mvpose networks list` shows the names" in result.output
+    assert main(["nobody"]) == 2
+    assert "no such file or name; `mvpose networks list` shows the names" in capsys.readouterr().err
     assert not list(tmp_path.rglob("*.*"))
+
+
+def test_a_file_of_the_user_is_not_replaced(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "results/profiles/movenet"
+    folder.mkdir(parents=True)
+    (folder / "movenet.toml").write_text("mine")
+    assert main(["movenet"]) == 2
+    assert "movenet.toml" in capsys.readouterr().err
+    assert (folder / "movenet.toml").read_text() == "mine"
 
 
 @pytest.mark.slow
@@ -212,16 +220,15 @@ def test_a_network_is_profiled_by_one_command(tmp_path, monkeypatch):
         pytest.skip(f"no network: {error}")
     monkeypatch.chdir(tmp_path)
     small = ["duration=0.4", "people.count=2", "cameras.size=[320,240]", "cameras.count=3"]
-    command = ["profile-network", "movenet", "--scenes", "pixels", *(each for key in small for each in ("--set", key))]
-    result = CliRunner().invoke(app, command)
-    assert result.exit_code == 0, result.output
+    command = ["movenet", "--scenes", "pixels", *(each for key in small for each in ("--set", key))]
+    assert main(command) == 0
     folder = Path("results/profiles/movenet")
     assert "how it errs" in (folder / "profile.html").read_text()
     scenario = load("quickstart", overrides=[f'detector.profile="{folder / "movenet.toml"}"'])
     assert scenario.detector.keypoints.scatter.hips > 0
     (kept,) = (folder / "store").glob("??/*.detections")
     written = kept.stat().st_mtime_ns
-    assert CliRunner().invoke(app, command).exit_code == 0
+    assert main(command) == 0
     assert kept.stat().st_mtime_ns == written
 
 

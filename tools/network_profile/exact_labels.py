@@ -26,11 +26,11 @@ from simharness.reality.detector_fit.joint_labels import (
     error_classes,
     expected_people,
 )
-from simharness.reality.network_profile.profiled_scenes import ProfiledScene
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, BiasSection
 from simharness.types.sequence import Sequence as PoseSequence
 from simharness.types.truth import GOOD_BELOW, KeypointError
 from simharness.types.views import Visibility
+from tools.network_profile.profiled_scenes import ProfiledScene
 
 _GAP = 1000.0  # seconds between scenes
 _ON_DECOY = 0.3  # intersection over union of the boxes of a detection and of the decoy that it shows

@@ -12,10 +12,10 @@ from simharness.detector.error_classes import MIRROR
 from simharness.detector.viewing_conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.reality.detector_fit.detector_sums import Trials
 from simharness.reality.detector_fit.joint_labels import LabelledJoints
-from simharness.reality.network_profile.profiled_scenes import ProfiledScene
 from simharness.reality.people_tracks import LIMB_JOINTS
 from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOINT, KINDS
 from simharness.types.truth import MISS_FROM, KeypointError
+from tools.network_profile.profiled_scenes import ProfiledScene
 
 _HEIGHTS = (0.0, 60.0, 85.0, 120.0, 170.0, 240.0, 340.0, np.inf)  # pixels
 _APART = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.45, np.inf)  # of the height of the box

@@ -25,8 +25,12 @@ from simharness.reality.detector_fit.detector_measurement import (
 from simharness.reality.detector_fit.inference import SCALES, Scales, infer
 from simharness.reality.detector_fit.joint_labels import LabelledJoints
 from simharness.reality.detector_fit.profile import as_toml, settings
-from simharness.reality.network_profile.error_curves import error_curves, neighbour_distance
-from simharness.reality.network_profile.exact_labels import (
+from simharness.reality.people_tracks import LIMB_JOINTS
+from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOINT, KINDS, DetectorSection
+from simharness.types.random_streams import stream
+from simharness.types.truth import MISS_FROM, KeypointError
+from tools.network_profile.error_curves import error_curves, neighbour_distance
+from tools.network_profile.exact_labels import (
     Results,
     decoy_hits,
     kind_of,
@@ -34,11 +38,7 @@ from simharness.reality.network_profile.exact_labels import (
     measure_bias,
     shared_scatter,
 )
-from simharness.reality.network_profile.profiled_scenes import ProfiledScene
-from simharness.reality.people_tracks import LIMB_JOINTS
-from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOINT, KINDS, DetectorSection
-from simharness.types.random_streams import stream
-from simharness.types.truth import MISS_FROM, KeypointError
+from tools.network_profile.profiled_scenes import ProfiledScene
 
 ROUNDS = 6
 """Simulations of all scenes before slopes are found, and after."""

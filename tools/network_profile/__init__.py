@@ -1,0 +1,1 @@
+"""How a network errs in rendered pictures, and the detector profile with which simulation errs alike."""
