@@ -272,9 +272,7 @@ def _stand_ins(study):
     figures = SimpleNamespace(summary=dict)
     fitted = SimpleNamespace(real=figures, calibrated=figures, annotation=figures)
     printed = ("plot_comparison", "print_agreement", "print_annotation", "print_measurement", "print_priors")
-    profile = SimpleNamespace(text="", measured=figures, bias=np.zeros(1), detector=None, kind="")
     submission = Submission({"a": dict.fromkeys(SCORES, 1.0)}, {"a": "test"})
-    checked_profile = SimpleNamespace(summary=dict, scenes=(), detectors=(), variants=(), verdicts={})
     return {
         "simharness.outputs.run.result_folder": {"run": None},
         "simharness.hunt.hunt_run": {"run_hunt": None},
