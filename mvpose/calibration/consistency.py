@@ -83,24 +83,42 @@ class Consistency:
             result[i, j] = value(reading, keys, int(i), int(j))
         return result
 
+    def of_pair(self, reading: Reading, i: int, j: int, *, ideal: bool = False) -> float:
+        """Return the evidence of two views, i before j, alone; at its best if ``ideal``, as :meth:`ideal`."""
+        keys = [_key(reading, view) for view in range(len(reading.cameras))]
+        return float(best_evidence(*self._views(reading, keys, i, j), ideal).sum())
+
     def agreement(self, reading: Reading) -> Floats:
         """Return the evidence of each camera's pairs as a share of what it would be at best, (V,)."""
         evidence, ideal = (each.sum(axis=2) for each in (self(reading), self.ideal(reading)))
         evidence, ideal = (each + each.T for each in (evidence, ideal))
         return evidence.sum(axis=1) / np.maximum(ideal.sum(axis=1), 1e-9)
 
-    def pairs(self, reading: Reading) -> Iterator[tuple[int, int, int, Integers]]:
-        """Yield view, view, window and the matched pieces (n, 2) under a reading."""
-        keys = [_key(reading, view) for view in range(len(reading.cameras))]
-        for i in range(len(keys)):
-            for j in range(i + 1, len(keys)):
-                views = self._views(reading, keys, i, j)
-                for w in range(self.pieces.windows):
-                    yield i, j, w, assigned(window_sums(*views, w, False))
+    def matched_rows(self, reading: Reading, i: int, j: int) -> tuple[Integers, Integers]:
+        """Return the detections of two views, i before j, that are matched under a reading, (n,) each.
+
+        They are counted from the first detection of each view, as :meth:`normalised` returns them.
+        """
+        views = self._views(reading, [_key(reading, view) for view in range(len(reading.cameras))], i, j)
+        (bounds_a, _, frames_a, pieces_a, *_), (bounds_b, _, frames_b, pieces_b, *_) = views[:2]
+        one, other = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+        for w in range(self.pieces.windows):
+            for a, b in assigned(window_sums(*views, w, False)).tolist():
+                first = bounds_a[w] + np.flatnonzero(pieces_a[bounds_a[w] : bounds_a[w + 1]] == a)
+                second = bounds_b[w] + np.flatnonzero(pieces_b[bounds_b[w] : bounds_b[w + 1]] == b)
+                _, left, right = np.intersect1d(frames_a[first], frames_b[second], return_indices=True)
+                one.append(first[left])
+                other.append(second[right])
+        return np.concatenate(one), np.concatenate(other)
+
+    def normalised(self, reading: Reading, view: int) -> tuple[Floats, Floats]:
+        """Return the normalised coordinates of a view's detections, (n, J, 2), and their standard deviations (n, J)."""
+        rays, _ = self._view_rays(reading, _key(reading, view), view)
+        return rays[4], rays[5]
 
     def rays(self, reading: Reading, view: int) -> Floats:
         """Return the viewing rays of a view's detections in the world, (n, J, 3), of depth 1; NaN where missing."""
-        points = self._view_rays(reading, _key(reading, view), view)[0][4]
+        points, _ = self.normalised(reading, view)
         rotation = reading.cameras[view, 5:14].reshape(3, 3)
         return np.concatenate([points, np.ones((*points.shape[:-1], 1))], axis=-1) @ rotation
 

@@ -4,6 +4,8 @@ Where the scale is trusted, the size of people relative to adults is the only ev
 (:func:`relative_size`).
 """
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -63,38 +65,29 @@ def resized(rig: Rig, factor: float) -> Rig:
     return Rig([replace(camera, t=-camera.R @ center) for camera, center in zip(rig, centers, strict=True)])
 
 
-def relative_size(consistency: Consistency, reading: Reading, skeleton: Skeleton) -> tuple[float, int]:
+def relative_size(
+    consistency: Consistency, reading: Reading, skeleton: Skeleton, *, views: Sequence[int] | None = None
+) -> tuple[float, int]:
     """Return how many times as large as adults people are, and from how many bones; NaN where too few are seen.
 
     Bones are those between joints triangulated by pairs of views from matched tracklets. Adults differ by 6 % of their
     stature (:mod:`mvpose.reconstruction.bone_length_prior`).
+
+    Args:
+        consistency: evidence on the detections.
+        reading: the cameras.
+        skeleton: the joints.
+        views: views whose pairs count; by default all.
     """
     parents, children, length = published_limbs(skeleton)
-    ratios = []
-    for joints in _triangulated(consistency, reading):
+    centers, ratios = reading.cameras[:, 14:17], [np.zeros(0)]
+    for i, j in itertools.combinations(range(len(reading.cameras)) if views is None else views, 2):
+        a, b = consistency.matched_rows(reading, i, j)
+        joints = _midpoints(centers[i], consistency.rays(reading, i)[a], centers[j], consistency.rays(reading, j)[b])
         ratios.append((np.linalg.norm(joints[:, parents] - joints[:, children], axis=-1) / length).ravel())
-    found = np.concatenate(ratios) if ratios else np.zeros(0)
+    found = np.concatenate(ratios)
     found = found[np.isfinite(found)]
     return (float(np.median(found)), len(found)) if len(found) >= _FEWEST_BONES else (np.nan, len(found))
-
-
-def _triangulated(consistency: Consistency, reading: Reading) -> list[Floats]:
-    """Return joints of matched pieces, each (n, J, 3); NaN where they are not seen by both views."""
-    pieces = consistency.pieces
-    rays = [consistency.rays(reading, view) for view in range(len(reading.cameras))]
-    centers = reading.cameras[:, 14:17]
-    result = []
-    for i, j, w, matched in consistency.pairs(reading):
-        cells = [slice(pieces.start[v, w], pieces.stop[v, w]) for v in (i, j)]
-        offsets = [cell.start - pieces.start[v, 0] for cell, v in zip(cells, (i, j), strict=True)]
-        for chosen in matched:
-            rows = [np.flatnonzero(pieces.piece[cell] == each) for cell, each in zip(cells, chosen, strict=True)]
-            frames = [pieces.frame[cell][row] for cell, row in zip(cells, rows, strict=True)]
-            _, a, b = np.intersect1d(frames[0], frames[1], return_indices=True)
-            result.append(
-                _midpoints(centers[i], rays[i][offsets[0] + rows[0][a]], centers[j], rays[j][offsets[1] + rows[1][b]])
-            )
-    return result
 
 
 def _midpoints(c: Floats, u: Floats, d: Floats, v: Floats) -> Floats:
