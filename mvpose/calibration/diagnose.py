@@ -99,7 +99,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04, up
     if undetermined and not any(sufficiency.SHORT in each.text for each in missing):
         of_cameras = [replace(each, severity="unknown") if each.severity == "alarm" else each for each in of_cameras]
     findings += [each for each in of_cameras if each.view not in files.turned or each.kind != "moved-camera"]
-    of_world, line = world_findings(mended, sightings, rows, result.equations.joints, joints, up)
+    of_world, line = world_findings(mended, sightings, rows[first], result.equations.joints, up)
     after = _corrected(reading, result).cameras
     findings += of_world + [
         turn_finding(rig, after, result.covariance[view], view, names) for view in sorted(files.turned - useless)

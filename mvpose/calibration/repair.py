@@ -26,7 +26,7 @@ from mvpose.calibration.normal_equations import (
     normal_equations,
     with_errors,
 )
-from mvpose.calibration.rig_size import resized, size_of_people
+from mvpose.calibration.rig_size import Bodies, resized, size_of_people
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
 from mvpose.calibration.tracklet_matching import PeopleGroups, RigUncertainty, match_tracklets
 from mvpose.calibration.tracklets import Tracklets, chosen_frames, link
@@ -345,11 +345,8 @@ def _result(rig: Rig, sightings: Sightings, adjusted: Adjustment, held: list[str
 
 def _of_size(size: Size, result: Repair, sightings: Sightings, adjusted: Adjustment) -> Repair:
     """Return the repair with the size of the rig by the bone lengths of people, or by both."""
-    joints, first = adjusted.joints, adjusted.rows[adjusted.joints.start[:-1]]
-    assert joints.cluster is not None
-    people, sigma = size_of_people(
-        adjusted.equations.joints, joints.cluster, joints.person, sightings.joint[first], sightings.skeleton
-    )
+    first = adjusted.rows[adjusted.joints.start[:-1]]
+    people, sigma = size_of_people(Bodies.of_joints(sightings, first, adjusted.equations.joints))
     if not np.isfinite(people):
         reason = "size of the rig: too few limbs are seen whole to measure people; record people from head to foot"
         return replace(result, held=(*result.held, reason))

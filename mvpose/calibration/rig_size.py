@@ -6,44 +6,76 @@ Where the scale is trusted, the size of people relative to adults is the only ev
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
 from mvpose.arrays import Floats, Integers
 from mvpose.calibration.consistency import Consistency, Reading
+from mvpose.calibration.sightings import Sightings
 from mvpose.camera import Rig
 from mvpose.reconstruction.bone_graph import bone_graph
 from mvpose.reconstruction.bone_length_prior import STATURE_DEVIATION, published_bones
 from mvpose.skeleton import Skeleton
 
-_FEWEST = 30  # bones in frames of a person; fewer show nothing
-
-_FEWEST_BONES = 30  # bones in frames; fewer show nothing
+_FEWEST = 30  # bones in frames, of a person and of all; fewer show nothing
 _LEAST_SINE = 0.2  # of the angle between two viewing rays; a place found by narrower ones is vague
 
 
-def size_of_people(
-    positions: Floats, body: Integers, person: Integers, kind: Integers, skeleton: Skeleton
-) -> tuple[float, float]:
+@dataclass(frozen=True)
+class Bodies:
+    """People in frames, by the joints that several views see."""
+
+    joints: Floats
+    """(n, J, 3), metres; NaN where unknown."""
+    person: Integers
+    """Person of each, (n,)."""
+    frame: Integers
+    """Frame of each, (n,)."""
+    skeleton: Skeleton
+    """The J joints."""
+
+    @classmethod
+    def of_joints(cls, sightings: Sightings, first: Integers, positions: Floats) -> Self:
+        """Return the bodies of joints that were placed.
+
+        Args:
+            sightings: matched keypoints.
+            first: a sighting of each joint, (G,).
+            positions: of the joints, (G, 3), metres; NaN where unknown.
+        """
+        who = np.stack([sightings.frame[first], sightings.person[first]])
+        names, body = np.unique(who, axis=1, return_inverse=True)
+        joints = np.full((names.shape[1], len(sightings.skeleton), 3), np.nan)
+        joints[body.ravel(), sightings.joint[first]] = positions
+        return cls(joints, names[1], names[0], sightings.skeleton)
+
+    def joint(self, name: str) -> Floats:
+        """Return the places of a joint, (n, 3)."""
+        return self.joints[:, self.skeleton.index(name)]
+
+    def middle(self, pair: str) -> Floats:
+        """Return the middle of a left and a right joint, such as "hip", (n, 3)."""
+        return 0.5 * (self.joint(f"left_{pair}") + self.joint(f"right_{pair}"))
+
+    @property
+    def upright(self) -> Floats:
+        """Unit vectors from hips to shoulders, of the bodies of which both are known, (m, 3)."""
+        trunks = self.middle("shoulder") - self.middle("hip")
+        trunks = trunks[np.isfinite(trunks[:, 0])]
+        return np.asarray(trunks / np.linalg.norm(trunks, axis=1, keepdims=True), np.float64)
+
+
+def size_of_people(bodies: Bodies) -> tuple[float, float]:
     """Return how many times as large as adults people are, and the standard deviation; NaN and infinity if unknown.
 
     Of each person the median over bones and frames counts, which wrong keypoints hardly change; statures of adults
     differ by 5.5 %, so that n people give the size up to 5.5 % / sqrt(n).
-
-    Args:
-        positions: joints, (G, 3), metres; NaN where unknown.
-        body: number of the person in a frame that each joint belongs to, (G,).
-        person: person of each joint, (G,).
-        kind: index of each joint in the skeleton, (G,).
-        skeleton: the joints.
     """
-    bodies = int(body.max(initial=-1)) + 1
-    joints, owner = np.full((bodies, len(skeleton), 3), np.nan), np.zeros(bodies, np.int64)
-    joints[body, kind], owner[body] = positions, person
-    parents, children, length = published_limbs(skeleton)
-    ratio = np.linalg.norm(joints[:, parents] - joints[:, children], axis=-1) / length
-    known = np.isfinite(ratio)
+    parents, children, length = published_limbs(bodies.skeleton)
+    ratio = np.linalg.norm(bodies.joints[:, parents] - bodies.joints[:, children], axis=-1) / length
+    known, owner = np.isfinite(ratio), bodies.person
     people = [each for each in np.unique(owner) if known[owner == each].sum() >= _FEWEST]
     if not people:
         return np.nan, np.inf
@@ -87,7 +119,7 @@ def relative_size(
         ratios.append((np.linalg.norm(joints[:, parents] - joints[:, children], axis=-1) / length).ravel())
     found = np.concatenate(ratios)
     found = found[np.isfinite(found)]
-    return (float(np.median(found)), len(found)) if len(found) >= _FEWEST_BONES else (np.nan, len(found))
+    return (float(np.median(found)), len(found)) if len(found) >= _FEWEST else (np.nan, len(found))
 
 
 def _midpoints(c: Floats, u: Floats, d: Floats, v: Floats) -> Floats:

@@ -12,7 +12,7 @@ from mvpose.arrays import Floats, Integers
 from mvpose.calibration.consistency import Reading
 from mvpose.calibration.findings import Finding
 from mvpose.calibration.mends import AXES, axis_vector
-from mvpose.calibration.normal_equations import JointViews
+from mvpose.calibration.rig_size import Bodies
 from mvpose.calibration.sightings import Sightings
 from mvpose.calibration.tracklets import Tracklets
 from mvpose.camera import Camera, Rig
@@ -126,7 +126,7 @@ def _off(middle: Floats, size: Floats) -> float:
 
 
 def world_findings(
-    rig: Rig, sightings: Sightings, rows: Integers, joints: Floats, views: JointViews, up: str | None
+    rig: Rig, sightings: Sightings, first: Integers, joints: Floats, up: str | None
 ) -> tuple[list[Finding], list[str]]:
     """Return whether the world stands as it should, and a line with the height of the floor.
 
@@ -136,24 +136,15 @@ def world_findings(
     Args:
         rig: cameras, read rightly otherwise.
         sightings: matched keypoints.
-        rows: rows of the sightings of ``views``, (k,).
+        first: a sighting of each joint, (G,).
         joints: places of joints, (G, 3), metres; NaN where unknown.
-        views: the sightings of each joint.
         up: axis of the world that points up by the user, "z", "-y" ...; None for z.
     """
     wanted = (*_SHOULDERS, *_HIPS, *_ANKLES)
     if not set(wanted) <= set(sightings.skeleton.joints):
         return [], []
-    first = rows[views.start[:-1]]
-    people = int(sightings.person.max(initial=0)) + 1
-    body, number = np.unique(sightings.frame[first] * people + sightings.person[first], return_inverse=True)
-    place = np.full((len(body), len(sightings.skeleton), 3), np.nan)
-    place[number, sightings.joint[first]] = joints
-    known = {joint: place[:, sightings.skeleton.index(joint)] for joint in wanted}
-    shoulders, hips = (known[left] + known[right] for left, right in (_SHOULDERS, _HIPS))
-    trunks = shoulders - hips
-    trunks = trunks[np.isfinite(trunks[:, 0])]
-    trunks = trunks / np.linalg.norm(trunks, axis=1, keepdims=True)
+    bodies = Bodies.of_joints(sightings, first, joints)
+    trunks = bodies.upright
     if len(trunks) < _FEWEST_TRUNKS or np.linalg.norm(trunks.mean(axis=0)) < _ALIGNED:
         return [], []
     mean = trunks.mean(axis=0) / np.linalg.norm(trunks.mean(axis=0))
@@ -161,7 +152,7 @@ def world_findings(
     angle = float(np.arccos(np.clip(mean @ vertical, -1.0, 1.0)))
     if angle > _TILTED:
         return [_turned(mean, vertical, angle, up)], []
-    ankles = np.concatenate([known[joint] for joint in _ANKLES]) @ vertical
+    ankles = np.concatenate([bodies.joint(joint) for joint in _ANKLES]) @ vertical
     ankles = ankles[np.isfinite(ankles)]
     if len(ankles) < _FEWEST_TRUNKS:
         return [], []
