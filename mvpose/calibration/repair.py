@@ -42,7 +42,8 @@ uncertainties."""
 
 _PLACES = {"extrinsics": POSE, "focal": FOCAL, "center": CENTER}
 _SPACING = 0.2  # seconds between the frames that are used: errors of detectors last as long
-_NARROW = RigUncertainty(np.radians(0.3), 0.02, 0.02)  # of the rig that has been adjusted once
+NARROW = RigUncertainty(np.radians(0.3), 0.02, 0.02)
+"""Uncertainty of a rig that has been adjusted once."""
 _MOST_TURNS = 3
 _LEAST_CAMERAS = 3
 _LEAST_SIGHTINGS = 100
@@ -215,7 +216,7 @@ def _alternate(
             if not mask.any():
                 break
             adjusted = adjust(rig, sightings, free=mask, prior=prior, start=adjusted.rig, offsets=offsets)
-        again = match_tracklets(adjusted.rig, tracklets, _NARROW)
+        again = match_tracklets(adjusted.rig, tracklets, NARROW)
         if _same_groups(again.person, person):
             break
         person, start, offsets = again.person, adjusted.rig, adjusted.parameters[:, CLOCK].ravel()

@@ -98,15 +98,15 @@ def _pose_of_pair(
     consistency: Consistency, reading: Reading, views: tuple[int, int], tracklets: Tracklets
 ) -> RelativePose | None:
     best, most = None, 0.0
-    for points in _candidates(consistency, reading, views):
-        for R, t in _hypotheses(points):
+    for candidate in _candidates(consistency, reading, views):
+        for R, t in _hypotheses(candidate):
             evidence = consistency.of_pair(placed(reading, views, R, t), *views)
             if evidence > most:
                 best, most = (R, t), evidence
     if best is None:
         return None
     R, t = best
-    points = None
+    points: _Points | None = None
     for _ in range(_ROUNDS):
         matched = _matched(consistency, placed(reading, views, R, t), views)
         if len(matched) < _FEWEST:
