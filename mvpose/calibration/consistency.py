@@ -10,7 +10,7 @@ Tracklets are matched as a whole over seconds. Single poses of different people 
 people who move rarely do.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Self
 

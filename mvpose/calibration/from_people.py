@@ -24,7 +24,7 @@ from mvpose.calibration.floor import floor_of
 from mvpose.calibration.normal_equations import PARAMETERS, normal_equations, with_errors
 from mvpose.calibration.pieces import cut_into_windows
 from mvpose.calibration.repair import NARROW, Repair, repair
-from mvpose.calibration.rig_size import Bodies, resized, size_of_people
+from mvpose.calibration.rig_size import Bodies, relative_size, resized
 from mvpose.calibration.sightings import sightings_of
 from mvpose.calibration.sufficiency import RECORD, travelled
 from mvpose.calibration.tracklet_matching import match_tracklets
@@ -33,7 +33,7 @@ from mvpose.calibration.view_pairs import RelativePose, relative_poses
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.files.message_text import listed
-from mvpose.reconstruction.bone_length_prior import STATURE
+from mvpose.reconstruction.bone_length_prior import STATURE, STATURE_DEVIATION
 
 _FAR = np.radians(15.0)  # of an edge from the average, beyond which it is wrong
 _LEAST_AGREEMENT = 0.75
@@ -89,14 +89,17 @@ def calibrate_from_people(
     names = camera_names(rig)
     measured = _views(names, distance) if distance else None
     if len(rig) < 3:
-        raise ValueError("cannot tell: nothing confirms the poses of two cameras; add a third that sees the same people")
+        raise ValueError(
+            "cannot tell: nothing confirms the poses of two cameras; add a third that sees the same people"
+        )
     tracklets = link(rig, frames, period=period)
     if not len(tracklets):
         raise ValueError(f"cannot tell: there are no detections; {RECORD}")
     consistency = Consistency(cut_into_windows(tracklets))
     result = _settled(_start(rig, tracklets, consistency), frames, period)
     found, warnings = result.rig, list(result.held)
-    agreement = consistency.agreement(Reading.as_given(found.packed))
+    reading = Reading.as_given(found.packed)
+    agreement = consistency.agreement(reading)
     apart = [f"{names[v]} ({agreement[v]:.2f})" for v in np.flatnonzero(agreement < _LEAST_AGREEMENT)]
     if apart:
         raise ValueError(
@@ -104,7 +107,8 @@ def calibrate_from_people(
             f"{_LEAST_AGREEMENT} or more): check that all cameras film the same people at the same time, and the lenses"
         )
     bodies = _bodies(found, tracklets)
-    size, sigma = size_of_people(bodies)
+    size, _ = relative_size(consistency, reading, tracklets.skeleton)
+    sigma = STATURE_DEVIATION
     if measured is not None and distance is not None:
         factor, sigma = distance[2] / float(np.linalg.norm(np.subtract(*found.centers[list(measured)]))), 0.0
     elif np.isfinite(size):
@@ -125,7 +129,7 @@ def calibrate_from_people(
     else:
         found = floor.leveled(found)
         if not floor.feet:
-            warnings.append("no feet are seen: the floor is where those of upright adults would be, a few centimetres off")
+            warnings.append("too few steps are seen: the floor is that below the hips of adults who stand")
     return PeopleCalibration(found, result, result.people, sigma, tuple(warnings))
 
 
@@ -145,9 +149,8 @@ def _start(rig: Rig, tracklets: Tracklets, consistency: Consistency) -> Rig:
     edges = [e for e in relative_poses(rig, tracklets, consistency) if e.agreement >= _LEAST_AGREEMENT]
     R, centers, known = averaged(edges, len(rig))
     if not known.all():
-        names = np.array(camera_names(rig))
-        parts = f"{listed(names[known])} see common people, {listed(names[~known])} not" if edges else "no two cameras do"
-        raise ValueError(f"cannot tell: the cameras do not see the same people at the same time: {parts}; {RECORD}")
+        alone = listed([name for name, seen in zip(camera_names(rig), known, strict=True) if not (edges and seen)])
+        raise ValueError(f"cannot tell: camera {alone} sees no people whom the others see at the same time; {RECORD}")
     return Rig([replace(c, R=turn, t=-turn @ x) for c, turn, x in zip(rig, R, centers, strict=True)])
 
 

@@ -1,11 +1,19 @@
 """The commands of the program."""
 
-from mvpose.cli import detect_command, doctor_command, estimate_command, networks_command, repair_command, view_command
+from mvpose.cli import (
+    calibrate_command,
+    detect_command,
+    doctor_command,
+    estimate_command,
+    networks_command,
+    repair_command,
+    view_command,
+)
 from mvpose.cli.program import PROGRAM
 
 app = PROGRAM.app()
 for command in (estimate_command.estimate, detect_command.detect, detect_command.run):
     app.command()(command)
 app.add_typer(networks_command.group, name="networks")
-for command in (doctor_command.doctor, repair_command.repair, view_command.view):
+for command in (calibrate_command.calibrate, doctor_command.doctor, repair_command.repair, view_command.view):
     app.command()(command)

@@ -108,6 +108,7 @@ MVPOSE = (  # run by tests/mvpose/cli
     "opensim-cmd run-tool person_3_scale.xml",  # tests/mvpose/formats/test_opensim_files.py
     "opensim-cmd run-tool person_3_ik.xml",
     "mvpose doctor CALIBRATION DETECTIONS",
+    "mvpose calibrate DETECTIONS --intrinsics FILE --out CALIBRATION",
     "mvpose repair CALIBRATION DETECTIONS --out NEW",
     "mvpose repair CALIBRATION DETECTIONS --mend inverted --mend unit:0.001@cam2 --free extrinsics "
     "--out mended/Calib.toml",

@@ -17,6 +17,7 @@ APPS = {"mvpose": mvpose_app, "simharness": simharness_app}
 MINE = "years of work"
 
 FILES = {
+    "mvpose calibrate --out": "mvpose calibrate dets --intrinsics calib --out {}",
     "mvpose repair --out": "mvpose repair calib dets --out {}",
     "mvpose repair --new-times": "mvpose repair calib dets --out new --new-times {}",
     "simharness schema --out": "simharness schema --out {}",

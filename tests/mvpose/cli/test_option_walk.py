@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lab_files import filmed, write_coco, write_openpose
+from lab_files import WALKERS, filmed, write_coco, write_openpose
 from onnx_graphs import picture
 from option_walk import Row, Walk, parameters
+from scipy.spatial.transform import Rotation
 from test_detect_command import SIZE, networks, write_folder  # noqa: F401
 
 from mvpose import Rig
@@ -17,6 +18,7 @@ from mvpose.formats.calibration import pose2sim, voxelpose
 
 BASES = {
     "estimate": "{lab}/Calib.toml {lab}/openpose --out {out} --fps 25 --method fast --no-page --no-doctor",
+    "calibrate": "{lab}/moving --intrinsics {lab}/Calib.toml --out {out}/new.toml --fps 10",
     "doctor": "{lab}/Calib.toml {lab}/openpose",
     "repair": "{lab}/Calib.toml {lab}/openpose --out {out}/new.toml --mend inverted@cam0",
     "detect": "{lab}/pictures/cam0 --out {out} --detector {detector} --pose {pose}",
@@ -64,6 +66,18 @@ ROWS = {
         "pictures": Row("--pictures {lab}/pictures", "--no-films", FILMED),
         "films": Row("--no-films", "--pictures {lab}/pictures", FILMED),
         "trust": Row("--trust", base="{lab}/Calib.toml {lab}/openpose --out {out} --up y --no-page --no-doctor"),
+    },
+    "calibrate": {
+        "intrinsics": Row("--intrinsics {lab}/Small.toml"),
+        "out": Row("--out {out}/other.toml"),
+        "stature": Row("--stature 1.8"),
+        "distance": Row("--distance cam0,cam1,3.5"),
+        "fps": Row("--fps 50"),
+        "times": READ["times"],
+        "size": Row("--size 1282x962"),
+        "cameras": READ["cameras"],
+        "frames": Row("--frames 2:55"),
+        "skeleton": READ["skeleton"],
     },
     "doctor": READ | {"as_json": Row("--json"), "out": Row("--out {out}"), "fps": Row("--fps 50")},
     "repair": READ
@@ -121,6 +135,9 @@ def walk(tmp_path_factory, networks):  # noqa: F811
     pose2sim.write_calibration(lab / "Calib.toml", rig)
     voxelpose.write_calibration(lab / "unsized.json", rig)
     write_openpose(lab / "openpose", names, pixels)
+    turns = Rotation.from_euler("z", np.linspace(0.0, 6.0, 60)).as_matrix()
+    around = rig.project(WALKERS[None] @ turns[:, None]).swapaxes(0, 1)
+    write_openpose(lab / "moving", names, around + np.random.default_rng(1).standard_normal(around.shape))
     write_openpose(lab / "small", names, 0.25 * pixels[:6])
     write_coco(lab / "coco", names, filmed()[2])
     (lab / "times.csv").write_text("".join(f"{k / 30 + (0.004 if k % 2 else 0.0)}\n" for k in range(12)))
