@@ -135,7 +135,7 @@ def walk(tmp_path_factory, networks):  # noqa: F811
     pose2sim.write_calibration(lab / "Calib.toml", rig)
     voxelpose.write_calibration(lab / "unsized.json", rig)
     write_openpose(lab / "openpose", names, pixels)
-    turns = Rotation.from_euler("z", np.linspace(0.0, 6.0, 60)).as_matrix()
+    turns = Rotation.from_rotvec(np.linspace(0.0, 6.0, 60)[:, None] * [0.0, 0.0, 1.0]).as_matrix()
     around = rig.project(WALKERS[None] @ turns[:, None]).swapaxes(0, 1)
     write_openpose(lab / "moving", names, around + np.random.default_rng(1).standard_normal(around.shape))
     write_openpose(lab / "small", names, 0.25 * pixels[:6])
