@@ -27,8 +27,8 @@ _ALIGNED = 0.7  # length of the mean of unit vectors along trunks, below which p
 
 
 @dataclass(frozen=True)
-class Floor:
-    """A floor in the world of a rig."""
+class FloorPlane:
+    """The floor in the world of a rig."""
 
     up: Floats
     """Unit vector away from it, (3,)."""
@@ -47,7 +47,7 @@ class Floor:
         return Rig([replace(c, R=R, t=-R @ x) for c, R, x in zip(rig, turned, centers, strict=True)])
 
 
-def floor_of(bodies: Bodies) -> Floor | None:
+def floor_of(bodies: Bodies) -> FloorPlane | None:
     """Return the floor, or None where people do not show which way is up.
 
     Args:
@@ -63,7 +63,7 @@ def floor_of(bodies: Bodies) -> Floor | None:
     holds = _footholds(bodies, frame)
     if len(holds) < _FEWEST:
         sole = middle - [0.0, 0.0, _HIP]
-        return Floor(along, frame.T @ sole, 0)
+        return FloorPlane(along, frame.T @ sole, 0)
 
     def residuals(plane: Floats) -> Floats:
         height = (holds[:, 2] - ANKLE - plane[2] - (holds[:, :2] - middle[:2]) @ plane[:2]) / _SCATTER
@@ -72,7 +72,7 @@ def floor_of(bodies: Bodies) -> Floor | None:
     start = np.array([0.0, 0.0, np.median(holds[:, 2]) - ANKLE])
     a, b, c = least_squares(residuals, start).x
     up = np.array([-a, -b, 1.0]) / np.sqrt(1.0 + a * a + b * b)
-    return Floor(frame.T @ up, frame.T @ np.array([*middle[:2], c]), len(holds))
+    return FloorPlane(frame.T @ up, frame.T @ np.array([*middle[:2], c]), len(holds))
 
 
 def _footholds(bodies: Bodies, frame: Floats) -> Floats:

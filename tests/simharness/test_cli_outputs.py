@@ -62,7 +62,7 @@ ELSEWHERE: set[str] = set()
 READ = {
     "calibration", "detections", "videos", "folder", "recording", "fit_on", "rival", "scenario", "suite", "file",
     "study", "stores", "room", "scenes", "other_scenes", "poses", "pictures", "times", "detector", "pose", "skeleton",
-    "package", "source", "predictions", "benchmark",
+    "package", "source", "predictions", "benchmark", "intrinsics",
 }  # fmt: skip
 """Parameters whose files are read alone."""
 
