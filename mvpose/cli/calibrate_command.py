@@ -42,7 +42,6 @@ def calibrate(
     """Find where cameras stand and look from people who move in front of them, without a board."""
     with PROGRAM.exit_on_error():
         from mvpose.calibration.from_people import calibrate_from_people
-        from mvpose.commands.errors import failing
         from mvpose.commands.output_files import check_new
 
         check_new(out)
@@ -50,10 +49,9 @@ def calibrate(
         if measured is not None and given("stature"):
             raise ValueError("--stature and --distance: give one of them")
         inputs = read_inputs(intrinsics, detections, replace(choices, up=None), examined=True)
-        with failing("the calibration"):
-            result = calibrate_from_people(
-                inputs.rig, inputs.frames, period=inputs.period, stature=stature, distance=measured
-            )
+        result = calibrate_from_people(
+            inputs.rig, inputs.frames, period=inputs.period, stature=stature, distance=measured
+        )
         if measured is None:
             note(
                 f"the size of the rig is that of people of {stature:.2f} m, which is known up to "
