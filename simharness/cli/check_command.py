@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mvpose.commands.errors import failing
-from mvpose.commands.option_groups import grouped, option
+from mvpose.commands.option_groups import given, grouped, option
 from mvpose.commands.output_files import check_place, write_text
 from mvpose.commands.programs import BAD_INPUT, FOUND
 from mvpose.commands.progress import reporter
@@ -24,6 +24,14 @@ if TYPE_CHECKING:
     from simharness.gate.compare import FailedCase, GateResult, Verdict
     from simharness.scenario.load import Study
 
+_OF_SUITES = {
+    "baseline": "--baseline",
+    "junit": "--junit",
+    "summary": "--summary",
+    "update": "--update-baseline",
+    "accept_better": "--accept-better",
+    "workers": "--workers",
+}
 _LISTED = 8  # changes of each kind: a bug that breaks everything breaks a hundred scores
 _MARKS = {
     "--baseline": b'"fingerprint"',
@@ -37,7 +45,10 @@ _STYLES: "dict[Verdict, str]" = {"worse": "red", "unexpected": "yellow", "better
 def check(
     suite: Annotated[
         Path,
-        typer.Argument(help="The suite: a scenario file, or the name of a shipped one: [cyan]ci[/].", metavar="SUITE"),
+        typer.Argument(
+            help="The suite: a scenario file, or the name of a shipped one: [cyan]ci[/]; or a folder of kept failures.",
+            metavar="SUITE",
+        ),
     ],
     baseline: Path | None = option(
         None,
@@ -59,9 +70,13 @@ def check(
     (section \[gate] of the suite), or a growth of the time per frame relative
     to a reference kernel. An improvement larger than its bound fails as well
     until it is accepted, because the suite may have become easier. Trials that
-    could not be run also fail the check.
+    could not be run also fail the check. Of a folder of kept failures all are
+    replayed: those with mended = true must not fail again.
     """
     with PROGRAM.exit_on_error():
+        if suite.is_dir():
+            _replay(suite)
+            return
         from simharness.scenario.load import load_study
 
         reports = {option: path for option, path in (("--junit", junit), ("--summary", summary)) if path is not None}
@@ -95,6 +110,27 @@ def check(
         raise typer.Exit(FOUND)
     if unwritten:
         raise typer.Exit(BAD_INPUT)
+
+
+def _replay(folder: Path) -> None:
+    """Replay the kept failures of a folder, and print what became of each."""
+    if options := [flag for name, flag in _OF_SUITES.items() if given(name)]:
+        raise ValueError(f"{options[0]}: kept failures are replayed as they are; leave it out")
+    from simharness.hunt.kept_failure import failures_in
+
+    again = False
+    for failure in failures_in(folder):
+        fails = failure.replay()[1]
+        again |= fails and failure.mended
+        state = {
+            (True, True): ("fails again", "red"),
+            (True, False): ("fails, as known", ""),
+            (False, True): ("is right", "green"),
+            (False, False): ("does not fail any more: set mended = true in its file", "yellow"),
+        }[fails, failure.mended]
+        say(Text.assemble(failure.name, ": ", state))
+    if again:
+        raise typer.Exit(FOUND)
 
 
 def _write(result: "GateResult", reports: Mapping[str, Path]) -> bool:

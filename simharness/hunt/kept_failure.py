@@ -61,6 +61,8 @@ class KeptFailure(FrozenFrame):
     noise_seeds: Annotated[int, Field(ge=0)] = 0
     noise_failed: Annotated[int, Field(ge=0)] = 0
     """Of how many seeds of additional noise the frame fails again."""
+    mended: bool = False
+    """Whether the method has been mended, so that the frame must not fail again."""
 
     def replay(self) -> tuple[Floats, bool]:
         """Return the joints (n, 17, 3) that the method finds in the frame now, and whether it still fails."""
@@ -244,6 +246,20 @@ def _lines(failure: KeptFailure) -> Iterator[str]:
 def is_failure(path: Path) -> bool:
     """Return whether a file is a kept failure, by its first lines."""
     return path.suffix == ".toml" and path.is_file() and b"\n[[cameras]]\n" in read_bytes(path, what="TOML")
+
+
+def failures_in(folder: Path) -> list[KeptFailure]:
+    """Read all kept failures of a folder, by name.
+
+    Raises:
+        ValueError: the folder has none, or one cannot be read.
+    """
+    found = [read_failure(path) for path in sorted(folder.glob("*.toml")) if is_failure(path)]
+    if not found:
+        raise ValueError(
+            f"{folder}: expected kept failures (TOML), which `simharness shrink` and `hunt` write; got none"
+        )
+    return found
 
 
 def read_failure(path: Path) -> KeptFailure:

@@ -44,6 +44,7 @@ USER_FILES = {
 NAMES = (  # mentioned
     "simharness blame",
     "simharness check",
+    "simharness check FOLDER",  # tests/simharness/hunt/test_shipped_failures.py
     "simharness export",
     "simharness fit-detector",
     "simharness score",
