@@ -45,7 +45,7 @@ class Inputs:
 
     rig: "Rig"
     """Its cameras, z up."""
-    frames: "list[Detections]"
+    frames: "Sequence[Detections]"
     """Detections of each of the T frames, with the times of the pictures, all on one skeleton."""
     numbers: "NDArray[np.int64]"
     """Number of each frame in the files, (T,)."""
