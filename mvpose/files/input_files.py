@@ -23,9 +23,7 @@ SETTINGS = MIB
 CALIBRATION = 4 * MIB
 """Largest calibration, bytes: the 511 cameras of the Panoptic Studio have half a megabyte."""
 TABLE = 512 * MIB
-"""Largest file of detections, joints, scores or motion that is read whole, bytes."""
-LONG = 16 * 1024 * MIB
-"""Largest file that is read in parts, bytes: hours of one camera."""
+"""Largest file of detections, joints, scores or motion that is read whole, bytes; in parts 32 times as many are."""
 
 _BITS_OF_FLOATS = 1000  # whole numbers that fit a float
 _DEEPEST = 64  # lists and tables in each other; the formats of the field need six
@@ -104,7 +102,7 @@ def json_list_parts(path: Path, *, what: str, size: int) -> Iterator[list[Any]]:
         ValueError: see :func:`read_bytes`, and :func:`parse_json`.
     """
     decoder, text, begun = json.JSONDecoder(), "", False
-    with _opened(path, what=what, most=LONG) as (file, whole):
+    with _opened(path, what=what, most=32 * TABLE) as (file, whole):
         decode = codecs.getincrementaldecoder("utf-8-sig")().decode
         try:
             while content := file.read(size):

@@ -59,13 +59,12 @@ class DetectionFile:
     def parts(self) -> "Iterator[DetectionFile]":
         """Yield the file; in parts where it is a long JSON list, whose values would not fit into memory."""
         if self.path.suffix.lower() == ".json" and self.path.is_file() and self.path.stat().st_size > LONG_LIST:
-            first = 0
+            part = self
             for entries in json_list_parts(self.path, what=WHAT, size=LONG_LIST):
-                part = DetectionFile(self.path, first)
+                part = DetectionFile(self.path, part.first + len(part.__dict__.get("json", ())))
                 part.__dict__["json"] = entries  # the cached property
-                first += len(entries)
                 yield part
-            if first:
+            if part is not self:
                 return
         yield self
 

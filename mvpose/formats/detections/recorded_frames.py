@@ -46,8 +46,6 @@ class ViewPeople:
     """By the number of the frame, increasing."""
     complete: bool
     """Whether pictures without people are among them."""
-    kind: str
-    """The format of the files: "OpenPose", "COCO", "MMPose" or "RTMLib"."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +60,6 @@ class RecordedFrames:
     """Whether a frame without entry has no picture of this camera; else it has one without people."""
     assignment: Assignment
     """Which source belongs to which camera."""
-    kinds: tuple[str, ...]
-    """Layout of the files of each camera."""
     skeleton: Skeleton = COCO17
     """Joints of the detections."""
     notes: tuple[str, ...] = ()
@@ -155,7 +151,8 @@ def read_recording(
     numbers = _frame_numbers(cameras, views, frames)
     joints = _joints(cameras, views)
     pictures = tuple(view.pictures for view in views)
-    empty = [camera for camera, each in zip(cameras, pictures, strict=True) if not any(_counts(each, numbers))]
+    shown = [any(len(each[number]) for number in numbers.tolist() if number in each) for each in pictures]
+    empty = [camera for camera, somebody in zip(cameras, shown, strict=True) if not somebody]
     others = [camera for camera in cameras if camera not in empty]
     if empty and others:
         mend = f", or leave it out: --cameras {','.join(others)}" if len(others) > 1 else ""
@@ -163,9 +160,8 @@ def read_recording(
             f"nobody is detected in any frame of the camera {listed(empty)}; check the files of detections{mend}"
         )
     notes = choice.notes if others else (*choice.notes, "nobody is detected in any frame of any camera")
-    kinds = tuple(view.kind for view in views)
     complete = tuple(view.complete for view in views)
-    return RecordedFrames(numbers, pictures, complete, assignment, kinds, joints, notes)
+    return RecordedFrames(numbers, pictures, complete, assignment, joints, notes)
 
 
 def read_frames(
@@ -287,7 +283,7 @@ def read_view(
         if pictures.joined:
             raise ValueError(f"{source.path}: has two entries of one frame; expected different numbers")
         pictures = pictures.renumbered(numbering(list(pictures)))
-    return ViewPeople(source, pictures, complete, kinds[-1].title)
+    return ViewPeople(source, pictures, complete)
 
 
 def _some(pictures: Mapping[int, PicturePeople], numbers: Iterable[int] | None = None) -> Iterator[PicturePeople]:
@@ -298,11 +294,6 @@ def _some(pictures: Mapping[int, PicturePeople], numbers: Iterable[int] | None =
 
 def _all_pictures(views: Sequence[ViewPeople]) -> list[PicturePeople]:
     return [each for view in views for each in _some(view.pictures)]
-
-
-def _counts(pictures: Mapping[int, PicturePeople], numbers: Integers) -> Iterator[int]:
-    """Yield the number of people in each picture of some frames."""
-    return (len(pictures[number]) for number in numbers.tolist() if number in pictures)
 
 
 def _converted(view: ViewPeople, choice: SkeletonChoice, *, all_joints: bool) -> ViewPeople:
