@@ -122,13 +122,13 @@ def estimate_into(
         RunError: the estimation or the page failed.
         OSError: the folder cannot be written.
     """
-    from mvpose.cli.results import formats_of, options_of, write_results
+    from mvpose.cli.results import folder_of_parts, formats_of, options_of, write_results
 
     wanted.check()
     from mvpose.cli.camera_pictures import assigned, for_frames, open_videos
     from mvpose.cli.estimation import estimate_people, estimator, examine
     from mvpose.estimators import SequenceEstimator
-    from mvpose.formats.people.outliers import within_limits
+    from mvpose.report.documents import program_version
 
     own = sources is None and wanted.pictures
     if own:
@@ -142,24 +142,25 @@ def estimate_into(
     tracks = isinstance(method, SequenceEstimator)
     for each in _without_effect(wanted, choices, inputs, tracks=tracks, pictures=sources is not None):
         note(each)
-    found = estimate_people(inputs, method, trust=wanted.trust)
-    people, left_out = within_limits(found, wanted.limits, tracked=tracks)
-    if sentences := left_out.sentences():
-        note(f"left out: {'; '.join(sentences)}")
-    diagnosis = examine(inputs) if wanted.doctor else None
-    write_results(
-        wanted.out,
-        people,
-        inputs,
-        formats=formats_of(wanted.formats),
-        options=options_of(wanted.files_up, together=wanted.together),
-        left_out=left_out,
-        page=wanted.page and bool(inputs.frames),
-        views=views,
-        films=wanted.films,
-        diagnosis=diagnosis,
-    )
-    typer.echo(f"{len(people)} people in {people.frames} frames: {wanted.out}")
+    with folder_of_parts(wanted.out, inputs, f"{program_version()} {method!r}") as place:
+        people = estimate_people(inputs, method, place, trust=wanted.trust)
+        left_out = people.limit(wanted.limits)
+        if sentences := left_out.sentences():
+            note(f"left out: {'; '.join(sentences)}")
+        diagnosis = examine(inputs) if wanted.doctor else None
+        write_results(
+            wanted.out,
+            people,
+            inputs,
+            formats=formats_of(wanted.formats),
+            options=options_of(wanted.files_up, together=wanted.together),
+            left_out=left_out,
+            page=wanted.page and bool(inputs.frames),
+            views=views,
+            films=wanted.films,
+            diagnosis=diagnosis,
+        )
+    typer.echo(f"{len(people.ids)} people in {people.frames} frames: {wanted.out}")
 
 
 def _of_pictures(choices: Choices, calibration: Path, sources: "Sequence[PictureSource]") -> Choices:

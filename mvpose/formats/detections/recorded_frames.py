@@ -4,6 +4,7 @@ The skeleton of files is that which is declared, or else the one with this numbe
 becomes COCO-17, or stays on its skeleton where all joints are requested and :mod:`mvpose.wholebody` knows it.
 """
 
+import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -79,6 +80,13 @@ class RecordedFrames:
             if points:
                 result[view] = np.quantile(np.concatenate(points), [0.001, 0.999], axis=0)
         return result
+
+    def digest(self, *others: Floats) -> str:
+        """Return a text that changes with the detections, and with other arrays."""
+        whole = hashlib.blake2b(self.skeleton.name.encode(), digest_size=16)
+        for array in (self.numbers, *others):
+            whole.update(array.tobytes())
+        return " ".join([whole.hexdigest(), *(each.digest for each in self.pictures)])
 
     def detections(self, times: Floats) -> Sequence[Detections]:
         """Return the detections of every frame; of more than :data:`IN_MEMORY` frames they are made when they are used.

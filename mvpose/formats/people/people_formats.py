@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import natural_order
@@ -28,6 +29,7 @@ from mvpose.formats.people import (
     trc,
 )
 from mvpose.formats.people.people_files import Export, Options, PeopleFiles, Up
+from mvpose.formats.people.people_parts import PeopleParts
 from mvpose.recording import People
 
 
@@ -47,26 +49,46 @@ class PeopleFormat:
     """Whether the reader takes the folder with its files."""
     requires: tuple[str, ...] = ()
     """Packages that it imports."""
+    parts: Literal["frames", "people", ""] = ""
+    """What the function that writes may be given one after another, appending to the files: some frames of all people,
+    or one person in all frames; "": all people in all frames, which takes the memory for them."""
+    join: Callable[[Sequence[Path], Path], None] | None = None
+    """Function that makes a file of those of parts, in place of appending."""
     install: str = "mvpose[recordings]"
     """What ``pip install`` needs for these packages."""
 
 
 FORMATS: dict[str, PeopleFormat] = {
     "parquet": PeopleFormat(
-        "poses.parquet", people_tables.write_parquet, people_tables.read, "poses.parquet", requires=("polars",)
+        "poses.parquet",
+        people_tables.write_parquet,
+        people_tables.read,
+        "poses.parquet",
+        requires=("polars",),
+        parts="frames",
+        join=people_tables.join_parquet,
     ),
-    "json": PeopleFormat("people.json", people_json.write, people_json.read, "people.json"),
+    "json": PeopleFormat("people.json", people_json.write, people_json.read, "people.json", parts="frames"),
     "npz": PeopleFormat("people.npz", people_npz.write, people_npz.read, "people.npz"),
-    "csv": PeopleFormat("poses.csv", people_tables.write_csv, people_tables.read, "poses.csv", requires=("polars",)),
-    "panoptic": PeopleFormat(
-        "hdPose3d/body3DScene_FRAME.json", panoptic_poses.write, panoptic_poses.read, "body3DScene_*.json", True
+    "csv": PeopleFormat(
+        "poses.csv", people_tables.write_csv, people_tables.read, "poses.csv", requires=("polars",), parts="frames"
     ),
-    "trc": PeopleFormat("person_ID.trc", trc.write, trc.read, "*.trc"),
-    "c3d": PeopleFormat("person_ID.c3d, or people.c3d", c3d.write, c3d.read, "*.c3d", requires=("c3d",)),
+    "panoptic": PeopleFormat(
+        "hdPose3d/body3DScene_FRAME.json",
+        panoptic_poses.write,
+        panoptic_poses.read,
+        "body3DScene_*.json",
+        in_folder=True,
+        parts="frames",
+    ),
+    "trc": PeopleFormat("person_ID.trc", trc.write, trc.read, "*.trc", parts="people"),
+    "c3d": PeopleFormat(
+        "person_ID.c3d, or people.c3d", c3d.write, c3d.read, "*.c3d", requires=("c3d",), parts="people"
+    ),
     "actors-mat": PeopleFormat("actorsGT.mat", read=actors_mat.read, found="*.mat"),
-    "bvh": PeopleFormat("person_ID.bvh", bvh.write),
+    "bvh": PeopleFormat("person_ID.bvh", bvh.write, parts="people"),
     "gltf": PeopleFormat("people.glb", gltf.write),
-    "lengths": PeopleFormat("bone_lengths.csv", people_tables.write_lengths),
+    "lengths": PeopleFormat("bone_lengths.csv", people_tables.write_lengths, parts="people"),
 }
 """Registered formats by name. Of a folder with files of several formats the first one is read."""
 
@@ -203,3 +225,52 @@ def write_people(
                 raise OSError(error.errno, error.strerror, str(path)) from None
             written.append(path)
     return written
+
+
+def write_parts(
+    parts: PeopleParts,
+    folder: Path,
+    *,
+    formats: Iterable[str],
+    options: Options | None = None,
+    progress: Callable[[int], None] = lambda _: None,
+) -> None:
+    """Write a long recording into a new folder, in one or more formats, part by part where the format can.
+
+    Args:
+        parts: people of the recording.
+        folder: a folder without files of these names.
+        formats: as for :func:`write_people`.
+        options: choices that formats leave open.
+        progress: called with the number of frames that were written since the last call.
+
+    Raises:
+        ValueError: people that a format cannot hold.
+        OSError: a file cannot be written.
+    """
+    options = options or Options()
+    for name in formats:
+        each, ids = FORMATS[name], parts.ids.tolist()
+        assert each.write is not None, "the names are checked"
+        by = "" if name == "c3d" and options.together else each.parts
+        given: Iterable[People] = [parts.whole(covariance=False)] if not by else parts.parts()
+        if by == "people":
+            given = (parts.whole([identity], covariance=name == "c3d") for identity in ids)
+        count = {"": 1, "frames": parts.count, "people": len(ids)}[by]
+        pieces: dict[Path, list[Path]] = {}
+        for row, people in enumerate(given):
+            for file, content in each.write(Export(people, options, row == 0, row == count - 1)):
+                path = folder / file
+                path.parent.mkdir(parents=True, exist_ok=True)
+                if each.join is None:
+                    with path.open("ab") as opened:
+                        opened.write(content)
+                else:
+                    pieces.setdefault(path, []).append(path.with_name(f"{path.name}.{row:06d}.parts"))
+                    pieces[path][-1].write_bytes(content)
+            progress(people.frames if by == "frames" else parts.frames // max(1, count))
+        for path, some in pieces.items():
+            assert each.join is not None
+            each.join(some, path)
+            for piece in some:
+                piece.unlink()
