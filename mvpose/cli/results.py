@@ -116,17 +116,12 @@ def write_results(
     """
     from mvpose.report.reprojection import compared_frames
 
-    numbers = inputs.numbers
     with atomic_folder(folder, ESTIMATE) as partial:
         others = [each for each in formats if each not in ALWAYS]
-        name = folder.absolute().name
         if inputs.long:
             with single_stage("write", parts.frames * (len(ALWAYS) + len(others))) as advance:
                 write_parts(parts, partial, formats=ALWAYS, progress=advance)
                 write_parts(parts, partial, formats=others, options=options, progress=advance)
-            rows = compared_frames(parts.frames)
-            people, name = parts.whole(rows=rows), f"{name}, every {rows[1]} frames"
-            inputs = replace(inputs, frames=[inputs.frames[row] for row in rows], numbers=inputs.numbers[rows])
         else:
             people = parts.whole()
             write_people(people, partial, formats=ALWAYS)  # in the axes of the cameras, which pages and commands expect
@@ -135,12 +130,17 @@ def write_results(
             "command": PROGRAM.command_line(),
             "cameras": [{"name": camera.name, "size": list(camera.size)} for camera in inputs.rig],
             "fps": round(parts.rate, 6),
-            "numbers": numbers.tolist(),  # of the frames in the files of detections; ours count from 0
+            "numbers": inputs.numbers.tolist(),  # of the frames in the files of detections; ours count from 0
             "people": parts.spans,  # TRC, C3D and BVH files begin at the first frame, which counts from 0
             "left_out": left_out.to_json(),
         }
         (partial / INPUTS).write_text(json.dumps(about) + "\n", encoding="utf-8")
         if page:
+            name = folder.absolute().name
+            if inputs.long:
+                rows = compared_frames(parts.frames)
+                people, name = parts.whole(rows=rows), f"{name}, one in {rows[1]} frames"
+                inputs = replace(inputs, frames=[inputs.frames[row] for row in rows], numbers=inputs.numbers[rows])
             _write_page(partial, name, people, inputs, views, films=films, diagnosis=diagnosis, left_out=left_out)
 
 

@@ -52,6 +52,8 @@ class PeopleFormat:
     parts: Literal["frames", "people", ""] = ""
     """What the function that writes may be given one after another, appending to the files: some frames of all people,
     or one person in all frames; "": all people in all frames, which takes the memory for them."""
+    errors: bool = False
+    """Whether a function that is given people uses their covariances, which take most of the memory."""
     join: Callable[[Sequence[Path], Path], None] | None = None
     """Function that makes a file of those of parts, in place of appending."""
     install: str = "mvpose[recordings]"
@@ -83,12 +85,12 @@ FORMATS: dict[str, PeopleFormat] = {
     ),
     "trc": PeopleFormat("person_ID.trc", trc.write, trc.read, "*.trc", parts="people"),
     "c3d": PeopleFormat(
-        "person_ID.c3d, or people.c3d", c3d.write, c3d.read, "*.c3d", requires=("c3d",), parts="people"
+        "person_ID.c3d, or people.c3d", c3d.write, c3d.read, "*.c3d", requires=("c3d",), parts="people", errors=True
     ),
     "actors-mat": PeopleFormat("actorsGT.mat", read=actors_mat.read, found="*.mat"),
-    "bvh": PeopleFormat("person_ID.bvh", bvh.write, parts="people"),
-    "gltf": PeopleFormat("people.glb", gltf.write),
-    "lengths": PeopleFormat("bone_lengths.csv", people_tables.write_lengths, parts="people"),
+    "bvh": PeopleFormat("person_ID.bvh", bvh.write, parts="people", errors=True),
+    "gltf": PeopleFormat("people.glb", gltf.write, errors=True),
+    "lengths": PeopleFormat("bone_lengths.csv", people_tables.write_lengths, parts="people", errors=True),
 }
 """Registered formats by name. Of a folder with files of several formats the first one is read."""
 
@@ -253,9 +255,9 @@ def write_parts(
         each, ids = FORMATS[name], parts.ids.tolist()
         assert each.write is not None, "the names are checked"
         by = "" if name == "c3d" and options.together else each.parts
-        given: Iterable[People] = [parts.whole(covariance=False)] if not by else parts.parts()
+        given: Iterable[People] = [parts.whole(covariance=each.errors)] if not by else parts.parts()
         if by == "people":
-            given = (parts.whole([identity], covariance=name == "c3d") for identity in ids)
+            given = (parts.whole([identity], covariance=each.errors) for identity in ids)
         count = {"": 1, "frames": parts.count, "people": len(ids)}[by]
         pieces: dict[Path, list[Path]] = {}
         for row, people in enumerate(given):
