@@ -120,7 +120,7 @@ def write_results(
         others = [each for each in formats if each not in ALWAYS]
         if inputs.long:
             with single_stage("write", parts.frames * (len(ALWAYS) + len(others))) as advance:
-                write_parts(parts, partial, formats=ALWAYS, progress=advance)
+                write_parts(parts, partial, formats=ALWAYS, options=Options(), progress=advance)
                 write_parts(parts, partial, formats=others, options=options, progress=advance)
         else:
             people = parts.whole()

@@ -11,7 +11,6 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import natural_order
@@ -49,50 +48,32 @@ class PeopleFormat:
     """Whether the reader takes the folder with its files."""
     requires: tuple[str, ...] = ()
     """Packages that it imports."""
-    parts: Literal["frames", "people", ""] = ""
-    """What the function that writes may be given one after another, appending to the files: some frames of all people,
-    or one person in all frames; "": all people in all frames, which takes the memory for them."""
-    errors: bool = False
-    """Whether a function that is given people uses their covariances, which take most of the memory."""
-    join: Callable[[Sequence[Path], Path], None] | None = None
-    """Function that makes a file of those of parts, in place of appending."""
     install: str = "mvpose[recordings]"
     """What ``pip install`` needs for these packages."""
 
 
 FORMATS: dict[str, PeopleFormat] = {
     "parquet": PeopleFormat(
-        "poses.parquet",
-        people_tables.write_parquet,
-        people_tables.read,
-        "poses.parquet",
-        requires=("polars",),
-        parts="frames",
-        join=people_tables.join_parquet,
+        "poses.parquet", people_tables.write_parquet, people_tables.read, "poses.parquet", requires=("polars",)
     ),
-    "json": PeopleFormat("people.json", people_json.write, people_json.read, "people.json", parts="frames"),
+    "json": PeopleFormat("people.json", people_json.write, people_json.read, "people.json"),
     "npz": PeopleFormat("people.npz", people_npz.write, people_npz.read, "people.npz"),
-    "csv": PeopleFormat(
-        "poses.csv", people_tables.write_csv, people_tables.read, "poses.csv", requires=("polars",), parts="frames"
-    ),
+    "csv": PeopleFormat("poses.csv", people_tables.write_csv, people_tables.read, "poses.csv", requires=("polars",)),
     "panoptic": PeopleFormat(
-        "hdPose3d/body3DScene_FRAME.json",
-        panoptic_poses.write,
-        panoptic_poses.read,
-        "body3DScene_*.json",
-        in_folder=True,
-        parts="frames",
+        "hdPose3d/body3DScene_FRAME.json", panoptic_poses.write, panoptic_poses.read, "body3DScene_*.json", True
     ),
-    "trc": PeopleFormat("person_ID.trc", trc.write, trc.read, "*.trc", parts="people"),
-    "c3d": PeopleFormat(
-        "person_ID.c3d, or people.c3d", c3d.write, c3d.read, "*.c3d", requires=("c3d",), parts="people", errors=True
-    ),
+    "trc": PeopleFormat("person_ID.trc", trc.write, trc.read, "*.trc"),
+    "c3d": PeopleFormat("person_ID.c3d, or people.c3d", c3d.write, c3d.read, "*.c3d", requires=("c3d",)),
     "actors-mat": PeopleFormat("actorsGT.mat", read=actors_mat.read, found="*.mat"),
-    "bvh": PeopleFormat("person_ID.bvh", bvh.write, parts="people", errors=True),
-    "gltf": PeopleFormat("people.glb", gltf.write, errors=True),
-    "lengths": PeopleFormat("bone_lengths.csv", people_tables.write_lengths, parts="people", errors=True),
+    "bvh": PeopleFormat("person_ID.bvh", bvh.write),
+    "gltf": PeopleFormat("people.glb", gltf.write),
+    "lengths": PeopleFormat("bone_lengths.csv", people_tables.write_lengths),
 }
 """Registered formats by name. Of a folder with files of several formats the first one is read."""
+
+_BY_FRAMES = ("parquet", "json", "csv", "panoptic")  # written some frames after others; what follows is appended
+_BY_PERSON = ("trc", "c3d", "bvh", "lengths")  # written one person after the other; others need all in memory
+_WITHOUT_ERRORS = ("trc", "npz")  # formats that do not use covariances, which take most of the memory
 
 
 def register(name: str, added: PeopleFormat) -> None:
@@ -230,49 +211,34 @@ def write_people(
 
 
 def write_parts(
-    parts: PeopleParts,
-    folder: Path,
-    *,
-    formats: Iterable[str],
-    options: Options | None = None,
-    progress: Callable[[int], None] = lambda _: None,
+    parts: PeopleParts, folder: Path, *, formats: Iterable[str], options: Options, progress: Callable[[int], None]
 ) -> None:
     """Write a long recording into a new folder, in one or more formats, part by part where the format can.
 
     Args:
         parts: people of the recording.
         folder: a folder without files of these names.
-        formats: as for :func:`write_people`.
+        formats: as for :func:`write_people`, checked.
         options: choices that formats leave open.
         progress: called with the number of frames that were written since the last call.
-
-    Raises:
-        ValueError: people that a format cannot hold.
-        OSError: a file cannot be written.
     """
-    options = options or Options()
     for name in formats:
-        each, ids = FORMATS[name], parts.ids.tolist()
-        assert each.write is not None, "the names are checked"
-        by = "" if name == "c3d" and options.together else each.parts
-        given: Iterable[People] = [parts.whole(covariance=each.errors)] if not by else parts.parts()
-        if by == "people":
-            given = (parts.whole([identity], covariance=each.errors) for identity in ids)
-        count = {"": 1, "frames": parts.count, "people": len(ids)}[by]
-        pieces: dict[Path, list[Path]] = {}
+        write, ids = FORMATS[name].write, parts.ids.tolist()
+        assert write is not None, "the names are checked"
+        covariance = name not in _WITHOUT_ERRORS
+        given, count = parts.parts(), parts.count
+        if name in _BY_PERSON and not (name == "c3d" and options.together):
+            given, count = (parts.whole([identity], covariance=covariance) for identity in ids), len(ids)
+        elif name not in _BY_FRAMES:
+            given, count = iter([parts.whole(covariance=covariance)]), 1
+        pieces: list[Path] = []
         for row, people in enumerate(given):
-            for file, content in each.write(Export(people, options, row == 0, row == count - 1)):
-                path = folder / file
+            for file, content in write(Export(people, options, row == 0, row == count - 1)):
+                path = folder / (f"{file}.{row}" if name == "parquet" else file)
                 path.parent.mkdir(parents=True, exist_ok=True)
-                if each.join is None:
-                    with path.open("ab") as opened:
-                        opened.write(content)
-                else:
-                    pieces.setdefault(path, []).append(path.with_name(f"{path.name}.{row:06d}.parts"))
-                    pieces[path][-1].write_bytes(content)
-            progress(people.frames if by == "frames" else parts.frames // max(1, count))
-        for path, some in pieces.items():
-            assert each.join is not None
-            each.join(some, path)
-            for piece in some:
-                piece.unlink()
+                with path.open("ab") as opened:
+                    opened.write(content)
+                pieces.append(path)
+            progress(people.frames if name in _BY_FRAMES else parts.frames // count)
+        if name == "parquet":
+            people_tables.join_parquet(pieces, folder / file)

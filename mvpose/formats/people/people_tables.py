@@ -49,10 +49,12 @@ def write_parquet(export: Export) -> Iterator[tuple[str, bytes]]:
 
 
 def join_parquet(parts: Sequence[Path], path: Path) -> None:
-    """Write the rows of several Parquet files as one, without holding them all in memory."""
+    """Write the rows of several Parquet files as one, without holding them all in memory, and remove these files."""
     import polars as pl
 
     pl.scan_parquet(list(parts)).sink_parquet(path, row_group_size=_ROWS)
+    for part in parts:
+        part.unlink()
 
 
 def table(export: Export) -> Any:
