@@ -137,7 +137,8 @@ class People(Sealed):
                 covariance[k, columns] = frame.covariance[kept]
             if freedom is not None and frame.freedom is not None:
                 freedom[k, columns] = frame.freedom[kept]
-        return cls(_times(frames, period), ids, joints, scores, covariance, skeleton, freedom)
+        given = np.array([np.nan if frame.time is None else frame.time for frame in frames], float)
+        return cls(frame_times(given, period), ids, joints, scores, covariance, skeleton, freedom)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -227,13 +228,12 @@ def _ids(k: int, frame: Estimate, untracked: bool) -> Integers:
     return frame.ids
 
 
-def _times(frames: list[Estimate], period: float) -> Floats:
-    """Return the time of each frame, (T,), seconds."""
+def frame_times(given: Floats, period: float) -> Floats:
+    """Return the time of each frame, (T,), seconds, given those that are known, else NaN; see :class:`People`."""
     if not 0.0 < period < np.inf:
         raise ValueError(f"period must be above 0 s and finite, got {period}")
-    given = np.array([np.nan if frame.time is None else frame.time for frame in frames], float)
     known = np.flatnonzero(np.isfinite(given))
-    numbers = np.arange(len(frames), dtype=np.float64)
+    numbers = np.arange(len(given), dtype=np.float64)
     if not len(known):
         return numbers * period
     first, last = known[0], known[-1]

@@ -24,8 +24,8 @@ from simharness.scoring.assessment import assess
 from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.pcp import GROUPS, percent
 from simharness.statistics.intervals import Interval, mean_interval
-from simharness.statistics.resampling import pseudo_values
 from simharness.trial.conditioned_trial import estimate_frames
+from tools.jackknife import pseudo_values
 from tools.network_profile.error_curves import part_counts
 from tools.network_profile.exact_labels import label_scenes
 from tools.network_profile.profiled_scenes import ProfiledScene

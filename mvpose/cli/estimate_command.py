@@ -131,13 +131,13 @@ def estimate_into(
         RunError: the estimation or the page failed.
         OSError: the folder cannot be written.
     """
-    from mvpose.cli.results import formats_of, options_of, write_results
+    from mvpose.cli.results import folder_of_parts, formats_of, options_of, write_results
 
     wanted.check()
     from mvpose.cli.camera_pictures import assigned, for_frames, open_videos
     from mvpose.cli.estimation import estimate_people, estimator, examine
     from mvpose.estimators import SequenceEstimator
-    from mvpose.formats.people.outliers import within_limits
+    from mvpose.report.documents import program_version
     from mvpose.report.film_file import NEEDS, has_pyav
 
     own = sources is None and wanted.pictures
@@ -154,28 +154,30 @@ def estimate_into(
         note(each)
     if wanted.films and wanted.page and views is not None and not has_pyav():
         note(f"no films: this {NEEDS}")
-    found = estimate_people(inputs, method, trust=wanted.trust)
-    people, left_out = within_limits(found, wanted.limits, tracked=tracks)
-    if sentences := left_out.sentences():
-        note(f"left out: {'; '.join(sentences)}")
-    if wanted.filter and tracks:
-        from mvpose.formats.people.filters import filter_of, filtered
+    with folder_of_parts(wanted.out, inputs, f"{program_version()} {method!r}") as place:
+        people = estimate_people(inputs, method, place, trust=wanted.trust)
+        left_out = people.limit(wanted.limits)
+        if sentences := left_out.sentences():
+            note(f"left out: {'; '.join(sentences)}")
+        if wanted.filter and tracks:
+            from mvpose.formats.people.filters import filter_of, filtered
 
-        people = filtered(people, *filter_of(wanted.filter))
-    diagnosis = examine(inputs) if wanted.doctor else None
-    write_results(
-        wanted.out,
-        people,
-        inputs,
-        formats=formats_of(wanted.formats),
-        options=options_of(wanted.files_up, together=wanted.together),
-        left_out=left_out,
-        page=wanted.page and bool(inputs.frames),
-        views=views,
-        films=wanted.films and has_pyav(),
-        diagnosis=diagnosis,
-    )
-    typer.echo(f"{len(people)} people in {people.frames} frames: {wanted.out}")
+            name, cutoff = filter_of(wanted.filter)
+            people.change(lambda person: filtered(person, name, cutoff))
+        diagnosis = examine(inputs) if wanted.doctor else None
+        write_results(
+            wanted.out,
+            people,
+            inputs,
+            formats=formats_of(wanted.formats),
+            options=options_of(wanted.files_up, together=wanted.together),
+            left_out=left_out,
+            page=wanted.page and bool(inputs.frames),
+            views=views,
+            films=wanted.films and has_pyav(),
+            diagnosis=diagnosis,
+        )
+    typer.echo(f"{len(people.ids)} people in {people.frames} frames: {wanted.out}")
 
 
 def _of_pictures(choices: Choices, calibration: Path, sources: "Sequence[PictureSource]") -> Choices:

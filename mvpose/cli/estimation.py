@@ -7,8 +7,9 @@ Short examination of the calibration of every recording that is estimated: the d
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -23,10 +24,13 @@ from mvpose.detections import Detections
 from mvpose.estimate import Estimate
 from mvpose.estimators import Estimator, SequenceEstimator
 from mvpose.files.message_text import listed
+from mvpose.formats.people.people_parts import FRAMES, PeopleParts
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS, preset
-from mvpose.recording import People
 from mvpose.report.verdict import sentence
 from mvpose.skeleton import COCO17
+from mvpose.tracking.smoothing import TrackingPipeline, track
+from mvpose.tracking.state import TrackerState
+from mvpose.tracking.tracker import Tracker
 from mvpose.wholebody import body_of, body_part, whole_body
 
 MOST_FRAMES = 100
@@ -82,6 +86,7 @@ MISS = 1.18
 """Residual above which a keypoint is missed: OKS 0.5, the loosest threshold of COCO's evaluation."""
 
 
+_COMPARED = 3000  # frames of which people are compared with their detections; of longer recordings every n-th
 _SEEN = 0.3  # score above which a keypoint counts: those below are guesses of the detector
 _AREA = 0.53  # of a box that a person covers, as in COCO's evaluation without masks
 _FEWEST = 30  # keypoints of a camera from which a median is known
@@ -117,36 +122,44 @@ def estimator(method: str, *, lag: float, period: float) -> Estimator:
     return preset(method, lag=lag, period=period)
 
 
-def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -> People:
-    """Estimate the people of all frames.
+def estimate_people(inputs: Inputs, method: Estimator, folder: Path, *, trust: bool = False) -> PeopleParts:
+    """Estimate the people of all frames, and write them in parts; an interrupted estimation goes on from its parts.
 
     Args:
         inputs: the recording.
         method: one of :func:`estimator`; one without memory numbers the people of each frame anew.
+        folder: an existing folder for the parts: empty, or that of an interrupted estimation of the same.
         trust: accept people who contradict their detections.
 
     Raises:
         ValueError: people who contradict their detections, :func:`mvpose.cli.estimation.check`.
         RunError: the estimator failed.
+        OSError: the folder cannot be written.
     """
-    estimates = []
-    method = whole_body(method) if inputs.skeleton != COCO17 else method
-    tracks = isinstance(method, SequenceEstimator)
-    with single_stage("estimate", len(inputs.frames)) as advance, failing("estimation"):
-        results = (
-            method.track(inputs.rig, inputs.frames)
-            if isinstance(method, SequenceEstimator)
-            else (method.estimate(inputs.rig, frame) for frame in inputs.frames)
-        )
-        for estimate in results:
-            estimates.append(estimate)
+    parts = PeopleParts(folder, inputs.skeleton, inputs.period, tracked=isinstance(method, SequenceEstimator))
+    total = len(inputs.frames)
+    if parts.frames and parts.frames < total and not _state_file(folder, parts.frames).is_file():
+        parts = parts.emptied()
+    if done := parts.frames:
+        note(f"goes on from frame {done} of {total}, where an earlier run was interrupted")
+    with single_stage("estimate", total, done=done) as advance:
+        batch: list[Estimate] = []
+        for estimate, save_state in _estimates(inputs, method, folder, done):
+            batch.append(estimate)
             advance(1)
+            if len(batch) == FRAMES or done + len(batch) == total:
+                rows = [k for k in range(done, done + len(batch)) if k % (-(-total // _COMPARED)) == 0]
+                compared = [batch[k - done] for k in rows]
+                extra = evidence(inputs.rig, [inputs.frames[k] for k in rows], compared)
+                done += len(batch)
+                if done < total:
+                    save_state(done)
+                parts.add(batch, extra)
+                batch = []
+                if len(parts.extras) == 1 and not trust:
+                    contradictions(inputs, parts.extras)  # before hours of work
     try:
-        bodies = [body_of(each, inputs.skeleton) for each in estimates]
-        remarks = check(inputs.rig, agreement(inputs.rig, [body_part(frame) for frame in inputs.frames], bodies))
-        remarks += check_postures(
-            np.concatenate([np.zeros((0, 17, 3)), *(each.joints for each in bodies)]), inputs.doubt
-        )
+        remarks = contradictions(inputs, parts.extras)
     except ValueError as error:
         if not trust:
             raise
@@ -155,7 +168,87 @@ def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -
         remarks += ["--trust has no effect: nothing contradicts the people"] if trust else []
     for remark in remarks:
         note(remark)
-    return People.of_estimates(estimates, inputs.skeleton, inputs.period, untracked=not tracks)
+    return parts
+
+
+@dataclass(frozen=True)
+class _Following:
+    """A tracker that goes on where it is; the protocol is that of :class:`mvpose.estimators.SequenceEstimator`."""
+
+    tracker: Tracker
+    lag: float
+
+    def estimate(self, rig: Rig, detections: Detections) -> Estimate:
+        """Estimate one frame alone."""
+        return self.tracker.pipeline.estimate(rig, detections)
+
+    def track(self, rig: Rig, frames: Iterable[Detections]) -> Iterator[Estimate]:
+        """Yield the estimates of the next frames."""
+        return track(self.tracker, rig, frames, lag=self.lag)
+
+
+def _estimates(
+    inputs: Inputs, method: Estimator, folder: Path, done: int
+) -> Iterator[tuple[Estimate, Callable[[int], None]]]:
+    """Yield the estimates of all frames from ``done`` on, and a function that saves the tracker before a later frame.
+
+    Its file is what another run needs to go on there with the same bytes. Estimates of a lag that has not passed are no
+    part of it: they come again.
+    """
+    if done == len(inputs.frames):
+        return
+    tracker: Tracker | None = None
+    states: dict[int, TrackerState] = {}
+    if isinstance(method, TrackingPipeline):
+        tracker = Tracker(method.pipeline, model=method.model)
+        if done:
+            state = TrackerState.load(_state_file(folder, done))
+            tracker = Tracker.restored(state, method.pipeline, model=method.model)
+        method = _Following(tracker, method.lag)
+    method = whole_body(method) if inputs.skeleton != COCO17 else method
+
+    def frames() -> Iterator[Detections]:
+        for row in range(done, len(inputs.frames)):
+            if tracker is not None and row > done and row % FRAMES == 0:
+                states[row] = tracker.state()
+            yield inputs.frames[row]
+
+    def save_state(row: int) -> None:
+        if tracker is not None:
+            (states.pop(row, None) or tracker.state()).save(_state_file(folder, row))
+        elif not isinstance(method, SequenceEstimator):
+            _state_file(folder, row).touch()
+
+    results = (
+        method.track(inputs.rig, frames())
+        if isinstance(method, SequenceEstimator)
+        else (method.estimate(inputs.rig, frame) for frame in frames())
+    )
+    while True:
+        with failing("estimation"):
+            if (estimate := next(results, None)) is None:
+                return
+        yield estimate, save_state
+
+
+def _state_file(folder: Path, row: int) -> Path:
+    return folder / f"before-{row:08d}.npz"
+
+
+def contradictions(inputs: Inputs, extras: Sequence[Mapping[str, Floats]]) -> list[str]:
+    """Return remarks about people who agree with their detections loosely, or whom no posture explains.
+
+    Args:
+        inputs: the recording.
+        extras: :func:`evidence` of some frames.
+
+    Raises:
+        ValueError: as :func:`check` and :func:`check_postures`.
+    """
+    joined = {key: np.concatenate([each[key] for each in extras]) for key in (extras[0] if extras else ())}
+    if not joined:
+        return []
+    return [*check(inputs.rig, agreement(inputs.rig, joined)), *check_postures(joined["bodies"], inputs.doubt)]
 
 
 @dataclass(frozen=True)
@@ -171,25 +264,32 @@ class Agreement:
     """Median length from shoulder to ankle, metres; NaN where nobody is complete."""
 
 
-def agreement(rig: Rig, frames: Sequence[Detections], estimates: Sequence[Estimate]) -> Agreement:
-    """Measure the agreement of the people of all frames with their detections."""
-    found: list[tuple[Integers, Floats]] = []
-    counts, matched = np.zeros(len(rig)), np.zeros(len(rig))
-    bodies = []
-    for frame, estimate in zip(frames, estimates, strict=True):
-        labels = estimate.matching.labels_of(len(frame))
-        counts += np.bincount(frame.view, minlength=len(rig))
+def evidence(rig: Rig, frames: Sequence[Detections], estimates: Sequence[Estimate]) -> dict[str, Floats]:
+    """Return what :func:`agreement` and :func:`check_postures` need of some frames, by name.
+
+    That is ``bodies``, the people on COCO-17 (n, 17, 3); ``seen``, for each detection its camera and whether it belongs
+    to a person, (m, 2); and ``residuals``, (m, 17), NaN for those that belong to nobody.
+    """
+    bodies, seen, residuals = ([np.zeros((0, *shape))] for shape in ((17, 3), (2,), (17,)))
+    for whole, estimate in zip(frames, estimates, strict=True):
+        frame, people = body_part(whole), body_of(estimate, whole.skeleton)
+        labels = people.matching.labels_of(len(frame))
         rows = np.flatnonzero(labels >= 0)
-        matched += np.bincount(frame.view[rows], minlength=len(rig))
-        if len(estimate):
-            found.append((frame.view[rows], _residuals(rig, frame, estimate, rows, labels[rows])))
-            bodies.append(_lengths(estimate.joints))
-    shares = np.where(counts > 0, matched / np.maximum(counts, 1), np.nan)
-    if not found:
-        return Agreement(np.full(len(rig), np.nan), shares, float("nan"))
-    view, residual = (np.concatenate(each) for each in zip(*found, strict=True))
-    medians = [_median(residual[view == k]) for k in range(len(rig))]
-    return Agreement(np.array(medians), shares, _median(np.concatenate(bodies), fewest=1))
+        seen.append(np.column_stack([frame.view, labels >= 0]))
+        residuals.append(np.full((len(frame), 17), np.nan))
+        if len(people):
+            residuals[-1][rows] = _residuals(rig, frame, people, rows, labels[rows])
+            bodies.append(people.joints)
+    return {"bodies": np.concatenate(bodies), "seen": np.concatenate(seen), "residuals": np.concatenate(residuals)}
+
+
+def agreement(rig: Rig, found: Mapping[str, Floats]) -> Agreement:
+    """Measure the agreement of people with their detections, given :func:`evidence`."""
+    view, matched = found["seen"].astype(int).T
+    counts = np.bincount(view, minlength=len(rig))
+    shares = np.where(counts > 0, np.bincount(view, matched, len(rig)) / np.maximum(counts, 1), np.nan)
+    medians = [_median(found["residuals"][view == k]) for k in range(len(rig))]
+    return Agreement(np.array(medians), shares, _median(_lengths(found["bodies"]), fewest=1))
 
 
 def check(rig: Rig, agreed: Agreement) -> list[str]:

@@ -45,7 +45,7 @@ class Inputs:
 
     rig: "Rig"
     """Its cameras, z up."""
-    frames: "list[Detections]"
+    frames: "Sequence[Detections]"
     """Detections of each of the T frames, with the times of the pictures, all on one skeleton."""
     numbers: "NDArray[np.int64]"
     """Number of each frame in the files, (T,)."""
@@ -57,6 +57,15 @@ class Inputs:
     """Why the given upward axis may be wrong; "" where nothing speaks against it."""
     whole: bool = True
     """Whether these are all frames of the detections."""
+    digest: str = ""
+    """Text that changes with anything in cameras, detections and times."""
+
+    @property
+    def long(self) -> bool:
+        """Whether the recording is too long to be kept in memory."""
+        from mvpose.formats.detections import recorded_frames
+
+        return len(self.frames) > recorded_frames.IN_MEMORY
 
     @property
     def skeleton(self) -> "mvpose.Skeleton":
@@ -173,7 +182,8 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
         plausibility.check_up(rig)
     times, period = _times(choices, recorded.numbers, names, project)
     paths = tuple(source.path for source in recorded.assignment.sources)
-    return Inputs(rig, recorded.detections(times), recorded.numbers, period, paths, doubt, frames is None)
+    digest = recorded.digest(rig.packed, times)
+    return Inputs(rig, recorded.detections(times), recorded.numbers, period, paths, doubt, frames is None, digest)
 
 
 def doubt_about(rig: "Rig", up: str) -> str:

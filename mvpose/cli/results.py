@@ -1,8 +1,12 @@
 """Files of tracked people in a folder that appears when it is complete."""
 
+import contextlib
 import json
+import shutil
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from mvpose.cli.inputs import Inputs
@@ -10,9 +14,12 @@ from mvpose.cli.program import PROGRAM
 from mvpose.commands.errors import failing
 from mvpose.commands.programs import note
 from mvpose.commands.progress import single_stage
-from mvpose.files.atomic_files import atomic_folder
+from mvpose.files.atomic_files import atomic_folder, write_atomic
+from mvpose.files.input_files import read_bytes
 from mvpose.files.message_text import prefixed
 from mvpose.formats.people import Options, check_formats, write_people
+from mvpose.formats.people.people_formats import write_parts
+from mvpose.formats.people.people_parts import PeopleParts
 from mvpose.formats.people.people_tables import INPUTS
 from mvpose.recording import People
 
@@ -51,9 +58,35 @@ def options_of(up: str | None, *, together: bool) -> Options:
     return Options(up="y" if up == "y" else "z" if up == "z" else None, together=together)
 
 
+@contextlib.contextmanager
+def folder_of_parts(out: Path, inputs: Inputs, identity: str) -> Iterator[Path]:
+    """Give a folder for the parts of an estimation.
+
+    That of a long recording stays until the block ends without an error, ``.NAME.parts`` beside the results: another
+    run of the same estimation goes on there.
+
+    Args:
+        out: folder of the results.
+        inputs: the recording.
+        identity: text that changes with all that determines the estimates, beside the inputs.
+    """
+    if not inputs.long:
+        with TemporaryDirectory() as temporary:
+            yield Path(temporary)
+        return
+    folder = out.resolve().with_name(f".{out.resolve().name}.parts")
+    about, wanted = folder / "identity", f"{identity} {inputs.digest}".encode()
+    if not about.is_file() or read_bytes(about, what="the identity of an estimation") != wanted:
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        write_atomic(about, wanted)
+    yield folder
+    shutil.rmtree(folder)
+
+
 def write_results(
     folder: Path,
-    people: People,
+    parts: PeopleParts,
     inputs: Inputs,
     *,
     formats: Sequence[str],
@@ -68,7 +101,7 @@ def write_results(
 
     Args:
         folder: folder of the results, which appears when it is complete.
-        people: the people.
+        parts: the people.
         inputs: what they were estimated from.
         formats: names of formats.
         options: what the files are to be like.
@@ -81,28 +114,34 @@ def write_results(
     Raises:
         OSError: the folder cannot be written; nothing is left of it.
     """
+    from mvpose.report.reprojection import compared_frames
+
     with atomic_folder(folder, ESTIMATE) as partial:
-        write_people(people, partial, formats=ALWAYS)  # in the axes of the cameras, which pages and commands expect
-        write_people(people, partial, formats=[each for each in formats if each not in ALWAYS], options=options)
+        others = [each for each in formats if each not in ALWAYS]
+        if inputs.long:
+            with single_stage("write", parts.frames * (len(ALWAYS) + len(others))) as advance:
+                write_parts(parts, partial, formats=ALWAYS, options=Options(), progress=advance)
+                write_parts(parts, partial, formats=others, options=options, progress=advance)
+        else:
+            people = parts.whole()
+            write_people(people, partial, formats=ALWAYS)  # in the axes of the cameras, which pages and commands expect
+            write_people(people, partial, formats=others, options=options)
         about = {
             "command": PROGRAM.command_line(),
             "cameras": [{"name": camera.name, "size": list(camera.size)} for camera in inputs.rig],
-            "fps": round(people.rate, 6),
+            "fps": round(parts.rate, 6),
             "numbers": inputs.numbers.tolist(),  # of the frames in the files of detections; ours count from 0
-            "people": [_span(people, row) for row in range(len(people))],
+            "people": parts.spans,  # TRC, C3D and BVH files begin at the first frame, which counts from 0
             "left_out": left_out.to_json(),
         }
         (partial / INPUTS).write_text(json.dumps(about) + "\n", encoding="utf-8")
         if page:
             name = folder.absolute().name
+            if inputs.long:
+                rows = compared_frames(parts.frames)
+                people, name = parts.whole(rows=rows), f"{name}, one in {rows[1]} frames"
+                inputs = replace(inputs, frames=[inputs.frames[row] for row in rows], numbers=inputs.numbers[rows])
             _write_page(partial, name, people, inputs, views, films=films, diagnosis=diagnosis, left_out=left_out)
-
-
-def _span(people: People, row: int) -> dict[str, int]:
-    """Return where a person is there: TRC, C3D and BVH files begin at its first frame, which counts from 0."""
-    span = people.span(row)
-    seen = int(people.present[:, row].any(axis=1).sum())
-    return {"id": int(people.ids[row]), "first_frame": span.start, "last_frame": span.stop - 1, "frames": seen}
 
 
 def _write_page(

@@ -196,9 +196,10 @@ def reporter() -> Iterator[Reporter]:
 
 
 @contextlib.contextmanager
-def single_stage(name: str, total: int) -> Iterator[Advance]:
+def single_stage(name: str, total: int, *, done: int = 0) -> Iterator[Advance]:
     """Report a command of one stage on stderr; one without steps is not shown."""
-    with reporter() if total else contextlib.nullcontext(Silence()) as shown, shown.stage(name, total) as advance:
+    shown = reporter() if total else contextlib.nullcontext(Silence())
+    with shown as bars, bars.stage(name, total, done=done) as advance:
         yield advance
 
 

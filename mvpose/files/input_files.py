@@ -4,14 +4,16 @@ Every reader of the package takes the bytes of a file from :func:`read_bytes`, a
 this module, so that a pipe, a device, an enormous or a deeply nested file is refused in the same way everywhere.
 """
 
+import codecs
+import contextlib
 import json
 import os
 import re
 import stat
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from mvpose.files.message_text import one_line, shown
 
@@ -21,10 +23,11 @@ SETTINGS = MIB
 CALIBRATION = 4 * MIB
 """Largest calibration, bytes: the 511 cameras of the Panoptic Studio have half a megabyte."""
 TABLE = 512 * MIB
-"""Largest file of detections, joints, scores or motion, bytes: hours of one camera."""
+"""Largest file of detections, joints, scores or motion that is read whole, bytes; in parts 32 times as many are."""
 
 _BITS_OF_FLOATS = 1000  # whole numbers that fit a float
 _DEEPEST = 64  # lists and tables in each other; the formats of the field need six
+_SPACE, _ENTRY = re.compile(r"[ \t\r\n]*"), re.compile(r"[ \t\r\n]*(?=[^\]\s])")
 _KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe",
@@ -47,6 +50,22 @@ def read_bytes(path: Path, *, what: str, most: int = TABLE) -> bytes:
         ValueError: the file does not exist, cannot be read, is larger than ``most``, or is no regular file: reading a
             pipe or a device could wait for ever.
     """
+    with _opened(path, what=what, most=most) as (file, size):
+        content = file.read(size + 1)
+    if len(content) > size:
+        raise ValueError(
+            f"{one_line(str(path), 200)}: is being written, or is no file of a disk; expected {what}. Copy it first"
+        )
+    return content
+
+
+@contextlib.contextmanager
+def _opened(path: Path, *, what: str, most: int) -> Iterator[tuple[IO[bytes], int]]:
+    """Give a regular file that is open, and its size.
+
+    Raises:
+        ValueError: as :func:`read_bytes`.
+    """
     name = one_line(str(path), 200)
     try:
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))  # a pipe would block the opening
@@ -64,14 +83,59 @@ def read_bytes(path: Path, *, what: str, most: int = TABLE) -> bytes:
         if about.st_size > most:
             raise ValueError(f"{name}: is larger than {megabytes(most)}, the most that is read of {what}")
         with os.fdopen(handle, "rb", closefd=False) as opened:
-            content = opened.read(about.st_size + 1)
+            yield opened, about.st_size
     except OSError as error:
         raise ValueError(f"{name}: cannot be read ({error.strerror}); expected {what}") from None
     finally:
         os.close(handle)
-    if len(content) > about.st_size:
-        raise ValueError(f"{name}: is being written, or is no file of a disk; expected {what}. Copy it first")
-    return content
+
+
+def json_list_parts(path: Path, *, what: str, size: int) -> Iterator[list[Any]]:
+    """Yield the entries of a JSON file that is a list, in parts; none of another file.
+
+    Args:
+        path: the file.
+        what: the expected content, for the message.
+        size: bytes that are read for a part; no entry may have more than 16 times as many.
+
+    Raises:
+        ValueError: see :func:`read_bytes`, and :func:`parse_json`.
+    """
+    decoder, text, begun = json.JSONDecoder(), "", False
+    with _opened(path, what=what, most=32 * TABLE) as (file, whole):
+        decode = codecs.getincrementaldecoder("utf-8-sig")().decode
+        try:
+            while content := file.read(size):
+                text += decode(content)
+                if not begun and not text.lstrip().startswith("["):
+                    return
+                at = _SPACE.match(text).end() + 1 if not begun else 0  # type: ignore[union-attr]
+                begun, entries = True, []
+                while (entry := _ENTRY.match(text, at)) is not None:
+                    try:
+                        value, end = decoder.raw_decode(text, entry.end())
+                    except json.JSONDecodeError:
+                        if len(text) - entry.end() > 16 * size:
+                            raise
+                        break  # the rest of the entry is in the next part
+                    following = _SPACE.match(text, end).end()  # type: ignore[union-attr]
+                    if text[following : following + 1] not in (",", "]"):
+                        break
+                    entries.append(value)
+                    at = following + (text[following] == ",")
+                    if text[following] == "]":
+                        break
+                text = text[at:]
+                check_values(entries)
+                if entries:
+                    yield entries
+            if text.strip() != "]":
+                raise ValueError("the list does not end")
+        except (ValueError, RecursionError) as error:
+            raise ValueError(
+                f"{one_line(str(path), 200)}: broken or truncated JSON ({error}; the file has {whole} bytes); expected "
+                f"{what}. It was probably cut off: copy or download it again"
+            ) from None
 
 
 def read_json(path: Path, *, what: str, most: int = TABLE) -> Any:

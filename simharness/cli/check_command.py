@@ -24,14 +24,7 @@ if TYPE_CHECKING:
     from simharness.gate.compare import FailedCase, GateResult, Verdict
     from simharness.scenario.load import Study
 
-_OF_SUITES = {
-    "baseline": "--baseline",
-    "junit": "--junit",
-    "summary": "--summary",
-    "update": "--update-baseline",
-    "accept_better": "--accept-better",
-    "workers": "--workers",
-}
+_OF_SUITES = ("baseline", "junit", "summary", "update_baseline", "accept_better", "workers")
 _LISTED = 8  # changes of each kind: a bug that breaks everything breaks a hundred scores
 _MARKS = {
     "--baseline": b'"fingerprint"',
@@ -58,7 +51,7 @@ def check(
     ),
     junit: Path | None = option(None, "Write a JUnit report (XML) to this file.", metavar="FILE", dir_okay=False),
     summary: Path | None = option(None, "Write a summary (Markdown) to this file.", metavar="FILE", dir_okay=False),
-    update: bool = option(
+    update_baseline: bool = option(
         False, "Measure the suite and write the file of --baseline, instead of comparing with it.", "--update-baseline"
     ),
     accept_better: bool = option(False, "Let improvements beyond their bounds pass in this run.", "--accept-better"),
@@ -80,19 +73,19 @@ def check(
         from simharness.scenario.load import load_study
 
         reports = {option: path for option, path in (("--junit", junit), ("--summary", summary)) if path is not None}
-        if update and reports:
+        if update_baseline and reports:
             raise ValueError(
                 f"{next(iter(reports))}: cannot be combined with --update-baseline, which compares nothing; "
                 "remove one of them"
             )
-        if update and accept_better:
+        if update_baseline and accept_better:
             raise ValueError("--accept-better: --update-baseline accepts every change; remove one of them")
-        if update and baseline is None:
+        if update_baseline and baseline is None:
             raise ValueError("--update-baseline: expected --baseline FILE, where the scores are written")
-        for option, path in ({"--baseline": baseline} if update and baseline else reports).items():
+        for option, path in ({"--baseline": baseline} if update_baseline and baseline else reports).items():
             check_place(path, option=option, mark=_MARKS[option])
         study = load_study(suite)
-        if update and baseline:
+        if update_baseline and baseline:
             _update(study, baseline, workers)
             return
         from simharness.gate.suite import baseline_of, kept_trials, shipped_baseline
@@ -114,8 +107,8 @@ def check(
 
 def _replay(folder: Path) -> None:
     """Replay the kept failures of a folder, and print what became of each."""
-    if options := [flag for name, flag in _OF_SUITES.items() if given(name)]:
-        raise ValueError(f"{options[0]}: kept failures are replayed as they are; leave it out")
+    if options := [name.replace("_", "-") for name in _OF_SUITES if given(name)]:
+        raise ValueError(f"--{options[0]}: kept failures are replayed as they are; leave it out")
     from simharness.hunt.kept_failure import failures_in
 
     again = False

@@ -5,8 +5,6 @@ observations", Annals of Statistics 1989); all quantities of a frame are drawn t
 sums over frames are computed for all resamples at once: ``f(weights @ sums)``.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import norm, t
@@ -76,25 +74,3 @@ def interval(values: ArrayLike, *, level: float = 0.95, blocks: int | None = Non
         ends[:, known] = np.nanquantile(flat[:, known], [tail, 1 - tail], axis=0)
     low, high = ends.reshape(2, *values.shape[1:])
     return low, high
-
-
-def pseudo_values(figure: Callable[[Floats], Floats], sums: ArrayLike) -> Floats:
-    """Return the pseudo-value of each scene, (n,), whose mean and deviation are those of a figure of sums.
-
-    The pseudo-value is n times the figure of all scenes minus n - 1 times that of all but this one (Tukey, "Bias and
-    confidence in not quite large samples", Annals of Mathematical Statistics 1958). For a mean it is the scene's value.
-    Intervals and tests of means so apply to ratios and other smooth figures.
-
-    Args:
-        figure: function of sums, ``(..., *shape)``, that returns figures, ``(...)``.
-        sums: contribution of each scene, ``(n, *shape)``.
-    """
-    sums = np.asarray(sums, float)
-    n, whole = len(sums), sums.sum(axis=0)
-    return np.asarray(n * figure(whole) - (n - 1) * figure(whole - sums), float)
-
-
-def _frames_per_block(time: Floats, block: float) -> int:
-    """Return the number of frames in a block."""
-    step = (time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else block
-    return int(np.clip(round(block / step), 1, len(time))) if step > 0 else 1

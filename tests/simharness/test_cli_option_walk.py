@@ -114,7 +114,7 @@ ROWS = {
         "baseline": Row("--baseline {lab}/other.json", base="ci --baseline {lab}/base.json"),
         "junit": Row("--junit {out}/report.xml"),
         "summary": Row("--summary {out}/report.md"),
-        "update": Row("--update-baseline"),
+        "update_baseline": Row("--update-baseline"),
         "accept_better": Row("--accept-better"),
     },
     "blame": OVERRIDES

@@ -30,9 +30,10 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.pcp import Part
 from simharness.scoring.score_summary import VariantScores
 from simharness.statistics.intervals import mean_interval
-from simharness.statistics.resampling import block_weights, blocks, interval, pseudo_values, resampled
+from simharness.statistics.resampling import block_weights, blocks, interval, resampled
 from simharness.trial.identity import provenance
 from simharness.trial.run_trial import TrialResult, run_trial
+from tools.jackknife import pseudo_values
 
 COMMAND = "tools.paper_tables.seed_scores"
 """Module that is run."""

@@ -8,8 +8,8 @@ import polars as pl
 from mvpose.arrays import Floats
 from simharness.outputs.study.tables import NOT_BLAMED
 from simharness.statistics.intervals import mean_interval
-from simharness.statistics.resampling import pseudo_values
 from simharness.study.study_folder import Results
+from tools.jackknife import pseudo_values
 
 Ends = list[float | None]
 

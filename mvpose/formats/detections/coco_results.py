@@ -26,7 +26,7 @@ def _read(file: detection_file.DetectionFile, skeleton: JointNames | None) -> di
     if not isinstance(content, list) or not all(isinstance(each, dict) for each in content):
         raise ValueError(f"{path}: expected {_WHAT}, got a {type(content).__name__}")
     rows: dict[int, list[tuple[Floats, Any, Any]]] = {}
-    for index, entry in enumerate(content):
+    for index, entry in enumerate(content, file.first):
         frame, (box, score) = _frame(path, index, entry), _box(path, index, entry)
         if entry.get("keypoints") == []:  # not detected
             rows.setdefault(frame, [])

@@ -1,6 +1,6 @@
 """Files of detections of one camera: their content, the people in a picture, and what a format is."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.files.archives import arrays_of
-from mvpose.files.input_files import read_bytes, read_json
+from mvpose.files.input_files import MIB, json_list_parts, read_bytes, read_json
 from mvpose.files.message_text import listed, prefixed, shown
 from mvpose.formats.joint_names import KNOWN, JointNames
 
 WHAT = "detections of one camera: OpenPose, COCO or AlphaPose results, MMPose predictions or RTMLib arrays"
 """Expected content of a file, for messages."""
+
+LONG_LIST = 16 * MIB
+"""Size from which a list is read in parts of this size, bytes."""
 
 _GREATEST_SCORE = 2.0  # heat maps and SimCC overshoot 1, mostly by a few per cent; 2 is a visible joint of COCO
 
@@ -50,6 +53,20 @@ class DetectionFile:
     """A file of detections of unknown format. Its content is parsed at most once, when a format looks at it."""
 
     path: Path
+    first: int = 0
+    """Row of its first entry, where it is a part of a long list."""
+
+    def parts(self) -> "Iterator[DetectionFile]":
+        """Yield the file; in parts where it is a long JSON list, whose values would not fit into memory."""
+        if self.path.suffix.lower() == ".json" and self.path.is_file() and self.path.stat().st_size > LONG_LIST:
+            part = self
+            for entries in json_list_parts(self.path, what=WHAT, size=LONG_LIST):
+                part = DetectionFile(self.path, part.first + len(part.__dict__.get("json", ())))
+                part.__dict__["json"] = entries  # the cached property
+                yield part
+            if part is not self:
+                return
+        yield self
 
     @cached_property
     def content(self) -> bytes:

@@ -33,13 +33,15 @@ def _read(file: detection_file.DetectionFile, skeleton: JointNames | None) -> di
     info = file.object.get("instance_info")
     if isinstance(info, list):
         return _frames(file.path, info, skeleton or _named_joints(file.path, file.object))
-    return _frames(file.path, file.json, skeleton)
+    return _frames(file.path, file.json, skeleton, file.first)
 
 
-def _frames(path: Path, frames: Any, skeleton: JointNames | None) -> dict[int, detection_file.PicturePeople]:
-    """Return the people of frames, which count from 0 or 1."""
+def _frames(
+    path: Path, frames: Any, skeleton: JointNames | None, first: int = 0
+) -> dict[int, detection_file.PicturePeople]:
+    """Return the people of frames, which count from 0 or 1; ``first`` is the row of the first one."""
     pictures = {}
-    for row, frame in enumerate(frames if isinstance(frames, list) else [frames]):
+    for row, frame in enumerate(frames if isinstance(frames, list) else [frames], first):
         if not isinstance(frame, dict) or not isinstance(frame.get("instances"), list):
             raise ValueError(f"{path}: entry {row}: expected frame_id and instances, got {shown(frame)}")
         number = frame.get("frame_id", row)

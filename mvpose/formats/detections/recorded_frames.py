@@ -4,9 +4,11 @@ The skeleton of files is that which is declared, or else the one with this numbe
 becomes COCO-17, or stays on its skeleton where all joints are requested and :mod:`mvpose.wholebody` knows it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+import hashlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from mvpose.files.input_files import file_numbers, natural_order
 from mvpose.files.message_text import listed
 from mvpose.formats.detections.detection_file import DetectionFile, DetectionFormat, PicturePeople, summary
 from mvpose.formats.detections.detection_formats import FORMATS, format_of, suffixes
+from mvpose.formats.detections.picture_store import PictureStore
 from mvpose.formats.detections.skeleton_choice import SkeletonChoice, choose_skeletons
 from mvpose.formats.detections.sources import Assignment, Source, assign, find_sources
 from mvpose.formats.joint_names import KNOWN, JointNames, to_coco17
@@ -24,6 +27,11 @@ from mvpose.wholebody import known_names, skeleton_by_name, with_body_boxes
 
 MOST_FRAMES = 2_000_000
 """Largest number of frames of a recording: 11 hours at 50 Hz."""
+
+IN_MEMORY = 20_000
+"""Frames of a recording whose detections are kept in memory; those of a longer one are made when they are used."""
+
+_LOOKED_AT = 20_000  # pictures of a camera that its skeleton and the extents of its keypoints are taken from, at most
 
 Numbering = Callable[[Sequence[int]], Mapping[int, int]]
 """Function of the numbers of the pictures of a camera that returns the frame of each picture to be taken."""
@@ -35,12 +43,10 @@ class ViewPeople:
 
     source: Source
     """Where they were read."""
-    pictures: Mapping[int, PicturePeople]
+    pictures: PictureStore
     """By the number of the frame, increasing."""
     complete: bool
     """Whether pictures without people are among them."""
-    kind: str
-    """The format of the files: "OpenPose", "COCO", "MMPose" or "RTMLib"."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +55,12 @@ class RecordedFrames:
 
     numbers: Integers
     """Number of each frame in the files, (T,), increasing."""
-    pictures: tuple[dict[int, PicturePeople], ...]
-    """For each camera its pictures by frame; a frame without entry has no picture of this camera."""
+    pictures: tuple[PictureStore, ...]
+    """For each camera its pictures by frame."""
+    complete: tuple[bool, ...]
+    """Whether a frame without entry has no picture of this camera; else it has one without people."""
     assignment: Assignment
     """Which source belongs to which camera."""
-    kinds: tuple[str, ...]
-    """Layout of the files of each camera."""
     skeleton: Skeleton = COCO17
     """Joints of the detections."""
     notes: tuple[str, ...] = ()
@@ -70,21 +76,52 @@ class RecordedFrames:
         """
         result = np.full((len(self.pictures), 2, 2), np.nan)
         for view, pictures in enumerate(self.pictures):
-            points = [each.keypoints[each.scores > 0] for each in pictures.values() if len(each)]
+            points = [each.keypoints[each.scores > 0] for each in _some(pictures, self.numbers) if len(each)]
             if points:
                 result[view] = np.quantile(np.concatenate(points), [0.001, 0.999], axis=0)
         return result
 
-    def detections(self, times: Floats) -> list[Detections]:
-        """Return the detections of every frame.
+    def digest(self, *others: Floats) -> str:
+        """Return a text that changes with the detections, and with other arrays."""
+        whole = hashlib.blake2b(self.skeleton.name.encode(), digest_size=16)
+        for array in (self.numbers, *others):
+            whole.update(array.tobytes())
+        return " ".join([whole.hexdigest(), *(each.digest for each in self.pictures)])
+
+    def detections(self, times: Floats) -> Sequence[Detections]:
+        """Return the detections of every frame; of more than :data:`IN_MEMORY` frames they are made when they are used.
 
         Args:
             times: time of each picture, (T, V), seconds. It becomes NaN where a camera has no picture.
         """
-        return [
-            _joined([pictures.get(number) for pictures in self.pictures], times[row], self.skeleton)
-            for row, number in enumerate(self.numbers.tolist())
+        frames = _FramesOnDisk(self, times)
+        return list(frames) if len(frames) <= IN_MEMORY else frames
+
+    def frame(self, row: int, times: Floats | None) -> Detections:
+        """Return the detections of one frame, given the time of each picture, (V,)."""
+        number, nobody = int(self.numbers[row]), PicturePeople.nobody(len(self.skeleton))
+        found = [
+            pictures.get(number, None if complete else nobody)
+            for pictures, complete in zip(self.pictures, self.complete, strict=True)
         ]
+        return _joined(found, times, self.skeleton)
+
+
+@dataclass(frozen=True)
+class _FramesOnDisk(Sequence[Detections]):
+    """Detections of a long recording."""
+
+    recorded: RecordedFrames
+    times: Floats
+
+    def __len__(self) -> int:
+        return len(self.recorded)
+
+    def __getitem__(self, row: Any) -> Any:
+        if isinstance(row, slice):
+            return [self[each] for each in range(*row.indices(len(self)))]
+        row = range(len(self))[row]  # raises an IndexError, which ends an iteration
+        return self.recorded.frame(row, self.times[row])
 
 
 def read_recording(
@@ -121,14 +158,9 @@ def read_recording(
     views = [_converted(view, choice, all_joints=all_joints) for view in views]
     numbers = _frame_numbers(cameras, views, frames)
     joints = _joints(cameras, views)
-    kept = set(numbers.tolist())
-    pictures = []
-    for view in views:
-        chosen = {number: picture for number, picture in view.pictures.items() if number in kept}
-        if not view.complete:
-            chosen |= dict.fromkeys(kept - chosen.keys(), PicturePeople.nobody())
-        pictures.append(chosen)
-    empty = [camera for camera, each in zip(cameras, pictures, strict=True) if not any(map(len, each.values()))]
+    pictures = tuple(view.pictures for view in views)
+    shown = [any(len(each[number]) for number in numbers.tolist() if number in each) for each in pictures]
+    empty = [camera for camera, somebody in zip(cameras, shown, strict=True) if not somebody]
     others = [camera for camera in cameras if camera not in empty]
     if empty and others:
         mend = f", or leave it out: --cameras {','.join(others)}" if len(others) > 1 else ""
@@ -136,8 +168,8 @@ def read_recording(
             f"nobody is detected in any frame of the camera {listed(empty)}; check the files of detections{mend}"
         )
     notes = choice.notes if others else (*choice.notes, "nobody is detected in any frame of any camera")
-    kinds = tuple(view.kind for view in views)
-    return RecordedFrames(numbers, tuple(pictures), assignment, kinds, joints, notes)
+    complete = tuple(view.complete for view in views)
+    return RecordedFrames(numbers, pictures, complete, assignment, joints, notes)
 
 
 def read_frames(
@@ -181,7 +213,7 @@ def read_frames(
 
         views.append(read_view(source, skeleton=skeleton, format=format, numbering=numbering))
         own = views[-1].pictures
-        if own and not own.keys() & set(frames.tolist()):
+        if own and not any(number in own for number in frames.tolist()):
             raise ValueError(
                 f"{source.path}: has frames {min(own)} to {max(own)}, none of the requested frames {frames[0]} to "
                 f"{frames[-1]}; expected the numbers of the frames"
@@ -235,30 +267,41 @@ def read_view(
             at all.
     """
     chosen = None if format is None else FORMATS[format]
-    kinds = []
-    if source.path.is_dir():
+    kinds: list[DetectionFormat] = []
+
+    def of_folder() -> Iterator[tuple[int, PicturePeople]]:
         found = (each for each in source.path.iterdir() if each.suffix.lower() in suffixes())
         files = sorted(found, key=natural_order)
         if not files:
             raise ValueError(f"{source.path}: an empty folder; expected a *.json file for each picture")
         paths = dict(sorted(zip(file_numbers(files), files, strict=True)))
-        pictures = {}
         for number, frame in numbering(list(paths)).items():
             people, kind = _of_picture(DetectionFile(paths[number]), chosen, skeleton)
-            pictures[frame] = people
-            kinds.append(kind)
-    else:
-        file = DetectionFile(source.path)
-        kinds = [chosen or format_of(file)]
-        read = dict(sorted(kinds[0].read(file, skeleton).items()))
-        frames = numbering(list(read)) if kinds[0].complete else dict(zip(read, read, strict=True))
-        pictures = {frame: read[number] for number, frame in frames.items()}
-    shown = dict(sorted(pictures.items()))
-    return ViewPeople(source, shown, all(each.complete for each in kinds), kinds[-1].title)
+            kinds[:] = [*(each for each in kinds if each is not kind), kind]
+            yield frame, people
+
+    def of_file() -> Iterator[tuple[int, PicturePeople]]:
+        for file in DetectionFile(source.path).parts():
+            kinds[:] = kinds or [chosen or format_of(file)]
+            yield from kinds[0].read(file, skeleton).items()
+
+    pictures = PictureStore(of_folder() if source.path.is_dir() else of_file())
+    complete = all(each.complete for each in kinds)
+    if not source.path.is_dir() and complete:
+        if pictures.joined:
+            raise ValueError(f"{source.path}: has two entries of one frame; expected different numbers")
+        pictures = pictures.renumbered(numbering(list(pictures)))
+    return ViewPeople(source, pictures, complete)
+
+
+def _some(pictures: Mapping[int, PicturePeople], numbers: Iterable[int] | None = None) -> Iterator[PicturePeople]:
+    """Yield pictures of a camera, :data:`_LOOKED_AT` at most, evenly spaced; of some frames, or all."""
+    there = list(pictures) if numbers is None else [number for number in map(int, numbers) if number in pictures]
+    return (pictures[number] for number in there[:: -(-len(there) // _LOOKED_AT) or 1])
 
 
 def _all_pictures(views: Sequence[ViewPeople]) -> list[PicturePeople]:
-    return [each for view in views for each in view.pictures.values()]
+    return [each for view in views for each in _some(view.pictures)]
 
 
 def _converted(view: ViewPeople, choice: SkeletonChoice, *, all_joints: bool) -> ViewPeople:
@@ -268,10 +311,8 @@ def _converted(view: ViewPeople, choice: SkeletonChoice, *, all_joints: bool) ->
         ValueError: all joints are requested of a skeleton that is not known.
     """
     convert = _whole if all_joints else _body
-    pictures = {
-        number: convert(view.source.path, replace(each, joints=choice.named(each))) if len(each) else each
-        for number, each in view.pictures.items()
-    }
+    path = view.source.path
+    pictures = view.pictures.converted(lambda each: convert(path, replace(each, joints=choice.named(each))))
     return replace(view, pictures=pictures)
 
 
@@ -320,8 +361,7 @@ def _joints(cameras: Sequence[str], views: Sequence[ViewPeople]) -> Skeleton:
     found = {
         each.joints.name: camera
         for camera, view in zip(cameras, views, strict=True)
-        for each in view.pictures.values()
-        if len(each)
+        for each in view.pictures.examples()
     }
     if len(found) > 1:
         text = listed([f"{camera} {name}" for name, camera in found.items()])

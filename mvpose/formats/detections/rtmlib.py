@@ -11,7 +11,7 @@ def _read(file: DetectionFile, skeleton: JointNames | None) -> dict[int, Picture
     path = file.path
     if file.json is not None:
         frames = [(each.get("keypoints"), each.get("scores")) for each in file.entries]
-        return {k: picture_people(f"{path}: frame {k}", *frame, skeleton) for k, frame in enumerate(frames)}
+        return {k: picture_people(f"{path}: frame {k}", *each, skeleton) for k, each in enumerate(frames, file.first)}
     keypoints, scores = file.arrays.get("keypoints"), file.arrays.get("scores")
     if keypoints is None or scores is None or keypoints.ndim not in (3, 4) or keypoints.shape[:-1] != scores.shape:
         raise ValueError(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mvpose.files.input_files import MIB, natural_order
 from mvpose.files.message_text import listed, one_line
-from mvpose.formats.detections.detection_file import DetectionFile
+from mvpose.formats.detections.detection_file import LONG_LIST, DetectionFile
 from mvpose.formats.detections.detection_formats import FORMATS, suffixes
 from mvpose.formats.pose2sim_project import folder_names
 
@@ -87,7 +87,9 @@ def _files(folder: Path) -> list[Path]:
 def _is_of_one_picture(path: Path) -> bool:
     """Return whether a file holds the people of one picture, so that its folder holds those of one camera."""
     file = DetectionFile(path)
-    return any(path.suffix.lower() in each.suffixes and each.of_picture(file) for each in FORMATS.values())
+    return path.stat().st_size <= LONG_LIST and any(
+        path.suffix.lower() in each.suffixes and each.of_picture(file) for each in FORMATS.values()
+    )
 
 
 def _is_detections(path: Path) -> bool:

@@ -116,13 +116,16 @@ class LeftOut:
         }
 
 
-def within_limits(people: People, limits: OutputLimits, *, tracked: bool = True) -> tuple[People, LeftOut]:
+def within_limits(
+    people: People, limits: OutputLimits, *, tracked: bool = True, errors: Floats | None = None
+) -> tuple[People, LeftOut]:
     """Return people without what is beyond the limits, and what that was.
 
     Args:
         people: the people.
         limits: the limits.
         tracked: whether identities say who somebody is in the next frame; else speed and duration are not judged.
+        errors: :func:`expected_errors`, where they are known without covariances.
     """
     present = people.present
     kept, counts = present.copy(), np.zeros((4, len(people)), np.int64)
@@ -131,7 +134,7 @@ def within_limits(people: People, limits: OutputLimits, *, tracked: bool = True)
         counts[rule] = (kept & which).sum(axis=(0, 2))
         kept[which] = False
 
-    leave_out(0, expected_errors(people) > limits.max_error)
+    leave_out(0, (expected_errors(people) if errors is None else errors) > limits.max_error)
     if tracked:
         leave_out(1, ~_reachable(people, kept, limits.max_speed))
     broken = 2 * kept.sum(axis=2) < present.sum(axis=2)

@@ -154,6 +154,10 @@ class Export:
     """People of a recording."""
     options: Options
     """Choices that formats leave open."""
+    first: bool = True
+    """Whether these are the first frames, or the first person, of a recording that is written in parts."""
+    last: bool = True
+    """Whether they are the last."""
 
     def axes(self, usual: Up) -> Floats:
         """Return the rotation from our axes to those of a file, (3, 3), for a format with a usual up axis."""

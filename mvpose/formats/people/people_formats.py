@@ -29,6 +29,7 @@ from mvpose.formats.people import (
     trc,
 )
 from mvpose.formats.people.people_files import Export, Options, PeopleFiles, Up
+from mvpose.formats.people.people_parts import PeopleParts
 from mvpose.recording import People
 
 
@@ -75,6 +76,17 @@ FORMATS: dict[str, PeopleFormat] = {
     "lengths": PeopleFormat("bone_lengths.csv", people_tables.write_lengths),
 }
 """Registered formats by name. Of a folder with files of several formats the first one is read."""
+
+_BY_FRAMES = ("parquet", "json", "csv", "panoptic")  # written some frames after others; what follows is appended
+_BY_PERSON = (
+    "trc",
+    "c3d",
+    "bvh",
+    "mot",
+    "angles",
+    "lengths",
+)  # written one person after the other; others need all in memory
+_WITHOUT_ERRORS = ("trc", "npz")  # formats that do not use covariances, which take most of the memory
 
 
 def register(name: str, added: PeopleFormat) -> None:
@@ -209,3 +221,37 @@ def write_people(
                 raise OSError(error.errno, error.strerror, str(path)) from None
             written.append(path)
     return written
+
+
+def write_parts(
+    parts: PeopleParts, folder: Path, *, formats: Iterable[str], options: Options, progress: Callable[[int], None]
+) -> None:
+    """Write a long recording into a new folder, in one or more formats, part by part where the format can.
+
+    Args:
+        parts: people of the recording.
+        folder: a folder without files of these names.
+        formats: as for :func:`write_people`, checked.
+        options: choices that formats leave open.
+        progress: called with the number of frames that were written since the last call.
+    """
+    for name in formats:
+        write, ids = FORMATS[name].write, parts.ids.tolist()
+        assert write is not None, "the names are checked"
+        covariance = name not in _WITHOUT_ERRORS
+        given, count = parts.parts(), parts.count
+        if name in _BY_PERSON and not (name == "c3d" and options.together):
+            given, count = (parts.whole([identity], covariance=covariance) for identity in ids), len(ids)
+        elif name not in _BY_FRAMES:
+            given, count = iter([parts.whole(covariance=covariance)]), 1
+        pieces: list[Path] = []
+        for row, people in enumerate(given):
+            for file, content in write(Export(people, options, row == 0, row == count - 1)):
+                path = folder / (f"{file}.{row}" if name == "parquet" else file)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                with path.open("ab") as opened:
+                    opened.write(content)
+                pieces.append(path)
+            progress(people.frames if name in _BY_FRAMES else parts.frames // count)
+        if name == "parquet":
+            people_tables.join_parquet(pieces, folder / file)

@@ -50,8 +50,8 @@ def write(export: Export) -> Iterator[tuple[str, bytes]]:
             for column in np.flatnonzero(present[k])
         ]
         frames.append(_compact({"frame": int(people.numbers[k]), "time": round(time, _DECIMALS), "bodies": bodies}))
-    text = json.dumps(head, indent=1)[:-2] + ',\n "frames": [\n' + ",\n".join(frames) + "\n]}\n"
-    yield "people.json", text.encode()
+    begin = json.dumps(head, indent=1)[:-2] + ',\n "frames": [\n' if export.first else ",\n"
+    yield "people.json", (begin + ",\n".join(frames) + ("\n]}\n" if export.last else "")).encode()
 
 
 def _compact(value: object) -> str:

@@ -25,6 +25,7 @@ INPUTS = "inputs.json"
 """Name of the file beside the table, in a folder of ``mvpose estimate``, that says how many frames there are."""
 
 _COLUMNS = ("frame", "time", "person", "joint", "x", "y", "z", "score")
+_ROWS = 250_000  # of a group in a Parquet file
 _MOST_FRAMES = 2_000_000  # as of recordings that are read
 _COVARIANCE = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2), "yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
 
@@ -34,7 +35,9 @@ def write_csv(export: Export) -> Iterator[tuple[str, bytes]]:
     import polars as pl
 
     content = io.BytesIO()
-    table(export).with_columns(pl.col("time", "x", "y", "z", "score").round(6)).write_csv(content)
+    table(export).with_columns(pl.col("time", "x", "y", "z", "score").round(6)).write_csv(
+        content, include_header=export.first
+    )
     yield "poses.csv", content.getvalue()
 
 
@@ -43,6 +46,15 @@ def write_parquet(export: Export) -> Iterator[tuple[str, bytes]]:
     content = io.BytesIO()
     table(export).write_parquet(content)
     yield "poses.parquet", content.getvalue()
+
+
+def join_parquet(parts: Sequence[Path], path: Path) -> None:
+    """Write the rows of several Parquet files as one, without holding them all in memory, and remove these files."""
+    import polars as pl
+
+    pl.scan_parquet(list(parts)).sink_parquet(path, row_group_size=_ROWS)
+    for part in parts:
+        part.unlink()
 
 
 def table(export: Export) -> Any:
@@ -77,7 +89,8 @@ def write_lengths(export: Export) -> Iterator[tuple[str, bytes]]:
     Both sides of the body have the same lengths; ``hip`` and ``shoulder`` are half the distance between both sides.
     """
     lines = [f"{fit.identity},{bone},{metres:.4f}" for fit in export.bodies for bone, metres in fit.lengths.items()]
-    yield "bone_lengths.csv", ("\n".join(["person,bone,metres", *lines]) + "\n").encode()
+    head = ["person,bone,metres"] if export.first else []
+    yield "bone_lengths.csv", "".join(f"{line}\n" for line in (*head, *lines)).encode()
 
 
 def read(files: PeopleFiles) -> People:

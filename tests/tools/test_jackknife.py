@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simharness.statistics.intervals import mean_interval
-from simharness.statistics.resampling import pseudo_values
+from tools.jackknife import pseudo_values
 
 
 def ratio(sums):
