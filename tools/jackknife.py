@@ -22,9 +22,3 @@ def pseudo_values(figure: Callable[[Floats], Floats], sums: ArrayLike) -> Floats
     sums = np.asarray(sums, float)
     n, whole = len(sums), sums.sum(axis=0)
     return np.asarray(n * figure(whole) - (n - 1) * figure(whole - sums), float)
-
-
-def _frames_per_block(time: Floats, block: float) -> int:
-    """Return the number of frames in a block."""
-    step = (time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else block
-    return int(np.clip(round(block / step), 1, len(time))) if step > 0 else 1

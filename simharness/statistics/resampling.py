@@ -74,3 +74,9 @@ def interval(values: ArrayLike, *, level: float = 0.95, blocks: int | None = Non
         ends[:, known] = np.nanquantile(flat[:, known], [tail, 1 - tail], axis=0)
     low, high = ends.reshape(2, *values.shape[1:])
     return low, high
+
+
+def _frames_per_block(time: Floats, block: float) -> int:
+    """Return the number of frames in a block."""
+    step = (time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else block
+    return int(np.clip(round(block / step), 1, len(time))) if step > 0 else 1
