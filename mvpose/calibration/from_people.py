@@ -32,7 +32,6 @@ from mvpose.calibration.tracklets import Tracklets, chosen_frames, link
 from mvpose.calibration.view_pairs import RelativePose, relative_poses
 from mvpose.camera import Rig
 from mvpose.detections import Detections
-from mvpose.files.message_text import listed
 from mvpose.reconstruction.bone_length_prior import STATURE, STATURE_DEVIATION
 
 _FAR = np.radians(15.0)  # of an edge from the average, beyond which it is wrong
@@ -103,7 +102,7 @@ def calibrate_from_people(
     apart = [f"{names[v]} ({agreement[v]:.2f})" for v in np.flatnonzero(agreement < _LEAST_AGREEMENT)]
     if apart:
         raise ValueError(
-            f"no poses explain the detections of camera {listed(apart)} (agreement with the others, expected "
+            f"no poses explain the detections of camera {', '.join(apart)} (agreement with the others, expected "
             f"{_LEAST_AGREEMENT} or more): check that all cameras film the same people at the same time, and the lenses"
         )
     bodies = _bodies(found, tracklets)
@@ -149,7 +148,7 @@ def _start(rig: Rig, tracklets: Tracklets, consistency: Consistency) -> Rig:
     edges = [e for e in relative_poses(rig, tracklets, consistency) if e.agreement >= _LEAST_AGREEMENT]
     R, centers, known = averaged(edges, len(rig))
     if not known.all():
-        alone = listed([name for name, seen in zip(camera_names(rig), known, strict=True) if not (edges and seen)])
+        alone = ", ".join([name for name, seen in zip(camera_names(rig), known, strict=True) if not (edges and seen)])
         raise ValueError(f"cannot tell: camera {alone} sees no people whom the others see at the same time; {RECORD}")
     return Rig([replace(c, R=turn, t=-turn @ x) for c, turn, x in zip(rig, R, centers, strict=True)])
 

@@ -23,7 +23,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.commands.output_files import write_text
 from mvpose.commands.progress import Reporter
-from mvpose.files.input_files import read_bytes
+from mvpose.files.input_files import parse_json, read_bytes
 from simharness.hunt.frozen_frame import freeze
 from simharness.hunt.hunted_trial import HuntFinding, HuntOutput, hunt_in_trial
 from simharness.hunt.kept_failure import KeptFailure, judge_of, keep, write_failure
@@ -185,11 +185,11 @@ def _stored(hunt: Hunt, path: Path) -> dict[int, HuntedPoint]:
     """
     axes = [vars(each) for each in hunt.plan.search.axes]
     about = {key: getattr(hunt, key) for key in ("variants", "properties", "seed")}
-    heading = json.loads(json.dumps({"scenario": fingerprint(hunt.plan.base), "search": axes, **about}))
+    heading = parse_json(json.dumps({"scenario": fingerprint(hunt.plan.base), "search": axes, **about}))
     lines = read_bytes(path, what="trials").decode().splitlines(keepends=True) if path.exists() else []
     if lines and not lines[-1].endswith("\n"):  # cut off when the process was killed
         del lines[-1]
-    rows = list(map(json.loads, lines))
+    rows = list(map(parse_json, lines))
     if rows and rows[0] != heading:
         raise ValueError(f"{path}: holds another hunt, or one of other code; choose another --out or remove it")
     write_text("".join(lines) or json.dumps(heading) + "\n", path)

@@ -72,7 +72,7 @@ ROWS = {
         "out": Row("--out {out}/other.toml"),
         "stature": Row("--stature 1.8"),
         "distance": Row("--distance cam0,cam1,3.5"),
-        "fps": Row("--fps 50"),
+        "fps": Row("--fps 11"),
         "times": READ["times"],
         "size": Row("--size 1282x962"),
         "cameras": READ["cameras"],

@@ -119,6 +119,7 @@ AROUND = {
     "simharness/outputs/benchmark/panoptic_sequence.py": "a file that was just written",
     "simharness/outputs/benchmark/mjcf_scene.py": "files that were just written",
     "simharness/cli/run_command.py": "a file that was just written",
+    "simharness/hunt/hunt_run.py": "appended to, read by the reader",
     "simharness/outputs/study/page.py": "a file of a result folder, if regular",
 }
 SHIPPED = {
