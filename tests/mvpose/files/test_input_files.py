@@ -120,6 +120,7 @@ AROUND = {
     "simharness/outputs/benchmark/mjcf_scene.py": "files that were just written",
     "simharness/cli/run_command.py": "a file that was just written",
     "simharness/hunt/hunt_run.py": "appended to, read by the reader",
+    "mvpose/formats/people/people_parts.py": "files that were just written",
     "simharness/outputs/study/page.py": "a file of a result folder, if regular",
 }
 SHIPPED = {
