@@ -17,12 +17,13 @@ from mvpose.cli.inputs import Choices, read_inputs
 from mvpose.formats.calibration import pose2sim
 from mvpose.formats.detections import recorded_frames
 from mvpose.formats.people import people_parts, read_people
+from mvpose.formats.people.filters import filtered
 from mvpose.formats.people.outliers import OutputLimits, within_limits
 from mvpose.formats.people.people_parts import PeopleParts
 from mvpose.recording import People
 
 FRAMES = 40
-FORMATS = "trc,csv,c3d,panoptic,npz,lengths"
+FORMATS = "trc,csv,c3d,panoptic,npz,lengths,mot,angles"
 
 
 @pytest.fixture(scope="module")
@@ -167,6 +168,11 @@ def test_people_of_parts_are_those_of_the_whole(lab, tmp_path_factory, size, lag
             if len(people):
                 np.testing.assert_array_equal(people.covariance, expected.covariance[rows])
     assert [each["id"] for each in parts.spans] == limited.ids.tolist()
+    parts.change(lambda person: filtered(person, "butterworth", 3.0))
+    smooth, rows = filtered(limited, "butterworth", 3.0).joints, np.arange(3, FRAMES, 5)
+    assert not len(limited) or not np.array_equal(smooth, limited.joints, equal_nan=True)
+    np.testing.assert_array_equal(parts.whole().joints, smooth)
+    np.testing.assert_array_equal(parts.whole(rows=rows).joints, smooth[rows])
 
 
 def test_nobody_at_all(tmp_path):
