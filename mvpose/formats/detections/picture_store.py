@@ -1,6 +1,7 @@
 """People in the pictures of one camera, kept in a file: as objects, those of an hour would not fit into memory."""
 
 import hashlib
+import weakref
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import copy
@@ -25,7 +26,9 @@ class PictureStore(Mapping[int, PicturePeople]):
     """
 
     def __init__(self, pictures: Iterable[tuple[int, PicturePeople]]) -> None:
-        self._file = TemporaryFile()  # noqa: SIM115, it is open as long as this object
+        self._file = TemporaryFile()  # noqa: SIM115, it is open as long as this object and its copies
+        weakref.finalize(self, self._file.close)
+        self._origin: PictureStore | None = None  # of a copy: keeps the file open
         self._convert: Callable[[PicturePeople], PicturePeople] = lambda picture: picture
         self._skeletons: dict[JointNames, int] = {}
         records, place, digest = array("q"), 0, hashlib.blake2b(digest_size=16)
@@ -76,12 +79,13 @@ class PictureStore(Mapping[int, PicturePeople]):
     def converted(self, convert: Callable[[PicturePeople], PicturePeople]) -> "PictureStore":
         """Return the same pictures; a function is applied to each with people when it is read."""
         result = copy(self)
-        result._convert = convert
+        result._origin, result._convert = self, convert
         return result
 
     def renumbered(self, numbers: Mapping[int, int]) -> "PictureStore":
         """Return some pictures under new numbers, given those of the frames by the present ones."""
         result, rows = copy(self), [self._row(number) for number in numbers]
+        result._origin = self
         result._table = self._table[rows].copy()
         result._table[:, 0] = list(numbers.values())
         result._table = result._table[np.argsort(result._table[:, 0], kind="stable")]
