@@ -98,3 +98,21 @@ def test_the_memory_of_backgrounds_is_bounded(monkeypatch):
         renderer.render(camera, scene)
     assert len(kept._kept) == 2
     assert_same(renderer.render(VIEWS[0], scene, parts=True), RasterRenderer().render(VIEWS[0], scene, parts=True))
+
+
+def test_where_not_all_fit_some_stay_from_round_to_round(monkeypatch):
+    """Cameras take turns; those that do not come back make room after two rounds."""
+    renderer, scene = RasterRenderer(), [*PEOPLE, *STILL]
+    renderer.render(VIEWS[0], scene)
+    (kept,) = (each.backgrounds for each in renderer._scenes)
+    one = next(iter(kept._kept.values())).nbytes
+    monkeypatch.setattr(backgrounds, "MOST_BYTES", int(2.5 * one))
+    rounds = []
+    others = [camera_at((2.0, y, 1.5), (0.0, 0.0, 1.0)) for y in (2.0, 2.5)]
+    for cameras in [VIEWS] * 2 + [others] * 5:
+        for camera in cameras:
+            renderer.render(camera, scene)
+        rounds.append(set(map(id, kept._kept.values())))
+    assert rounds[0] & rounds[1]
+    assert rounds[-1] == rounds[-2]
+    assert not rounds[-1] & rounds[1]
