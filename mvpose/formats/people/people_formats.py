@@ -77,15 +77,9 @@ FORMATS: dict[str, PeopleFormat] = {
 }
 """Registered formats by name. Of a folder with files of several formats the first one is read."""
 
-_BY_FRAMES = ("parquet", "json", "csv", "panoptic")  # written some frames after others; what follows is appended
-_BY_PERSON = (
-    "trc",
-    "c3d",
-    "bvh",
-    "mot",
-    "angles",
-    "lengths",
-)  # written one person after the other; others need all in memory
+# Written some frames after others, what follows is appended; one person after the other; others need all in memory.
+_BY_FRAMES = ("parquet", "json", "csv", "panoptic")
+_BY_PERSON = ("trc", "c3d", "bvh", "mot", "angles", "lengths")
 _WITHOUT_ERRORS = ("trc", "npz")  # formats that do not use covariances, which take most of the memory
 
 
