@@ -68,8 +68,6 @@ def compile_pictures() -> None:
     from simharness.capture.rendering.lit_scene import LitScene
     from simharness.capture.rendering.scene_geometry import SceneGeometry
     from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
-    from simharness.capture.sensor import develop
-    from simharness.scenario.sections.cameras_section import SensorSection
 
     triangle = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]], np.float32)
     faces, colors, zeros = np.array([[0, 1, 2]], np.int32), np.ones((1, 3), np.float32), np.zeros(3, np.float32)
@@ -83,8 +81,7 @@ def compile_pictures() -> None:
     drawn, view = DrawnPixels(shown, inverse_depth, np.zeros((6, 3))), PixelRays(np.zeros(3), np.eye(3))
     labels, ids = geometry.topology.mesh, np.full((2, 2), -1, np.int16)
     empty = Background(view.to_rays, inverse_depth, shown, drawn.corners, labels, ids)
-    rgb = scene.draw(scene.background(empty, view), np.zeros((0, 3), np.int32), drawn, view)
-    develop(rgb, SensorSection(shot_noise=0.01), seed=0, view=0, frame=0)
+    scene.draw(scene.background(empty, view), np.zeros((0, 3), np.int32), drawn, view)
 
 
 def compile_kernels(variants: Iterable[str]) -> None:
