@@ -249,7 +249,7 @@ class Rig(Sealed):
                     f"the translation of {', '.join(far)} alone is probably in millimetres or centimetres; those of "
                     "the other cameras are right; "
                     if few
-                    else "the calibration is probably in millimetres or centimetres; "
+                    else "the calibration is probably in millimetres (--unit mm) or centimetres (--unit cm); "
                 )
                 + "`mvpose doctor` says what it is, and what mends it",
                 self.cameras,

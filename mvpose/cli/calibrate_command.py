@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mvpose.calibration.from_people import PeopleCalibration
 
 
-@grouped(without=["joints", "up"])
+@grouped(without=["joints", "up", "unit"])
 def calibrate(
     detections: DetectionPaths,
     intrinsics: Annotated[

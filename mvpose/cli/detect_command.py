@@ -98,7 +98,7 @@ def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: N
         wanted.check()
         _check_folder(detections)
         # What does not fit is found before hours of detection.
-        rig = read_calibration(calibration, size=UNKNOWN_SIZE, only=choices.only, key="--cameras")
+        rig = read_calibration(calibration, size=UNKNOWN_SIZE, only=choices.only, key="--cameras", unit=choices.unit)
         sources = assigned(rig.cameras, open_videos(videos))
         check_sizes(rig.cameras, sources)
         if (stated := picture_size(choices.size)) is not None and any(source.size != stated for source in sources):

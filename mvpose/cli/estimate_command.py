@@ -188,7 +188,7 @@ def _of_pictures(choices: Choices, calibration: Path, sources: "Sequence[Picture
 
     if choices.times is None:
         choices = replace(choices, fps=choices.fps or common_rate(sources))
-    rig = read_calibration(calibration, size=UNKNOWN_SIZE, only=choices.only, key="--cameras")
+    rig = read_calibration(calibration, size=UNKNOWN_SIZE, only=choices.only, key="--cameras", unit=choices.unit)
     sizes = {source.size for source in sources}
     if choices.size is None and len(sizes) == 1 and UNKNOWN_SIZE in {camera.size for camera in rig}:
         choices = replace(choices, size="x".join(map(str, sizes.pop())))

@@ -302,7 +302,7 @@ def check(rig: Rig, agreed: Agreement) -> list[str]:
     if np.isfinite(agreed.body) and not _BODIES[0] < agreed.body < _BODIES[1]:
         raise ValueError(
             f"the people measure {agreed.body:.2g} m from shoulder to ankle, expected {_BODIES[0]} to {_BODIES[1]} m: "
-            f"the translations of the calibration are not in metres; {mend}"
+            f"the translations of the calibration are not in metres (--unit states what they are in); {mend}"
         )
     wrong = [k for k in range(len(rig)) if agreed.residuals[k] > MISS]
     if wrong:

@@ -105,6 +105,11 @@ class Choices:
         "Joints to estimate: the 17 of COCO, or all of the detections, with hands, face, feet.",
         metavar="body|all",
     )
+    unit: str | None = option(
+        None,
+        "Unit of the calibration's lengths, for formats that do not fix it: m, cm, mm. [dim]\\[default: m][/]",
+        metavar="UNIT",
+    )
     up: str | None = option(
         None, "Axis of the calibration's world that points up: z, y, -y ... [dim]\\[default: z][/]", metavar="AXIS"
     )
@@ -146,7 +151,8 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
         frames, place = project.frames()
         if frames is not None:
             note(f"frames {frames[0]} to {frames[1]}: {place}; --frames goes before it")
-    rig = _read_rig(calibration, choices.only, examined=examined)
+    rig = _read_rig(calibration, choices, size, examined=examined)
+    unsized = any(camera.size == plausibility.UNKNOWN_SIZE for camera in rig)
     names = [camera.name for camera in rig]
     with single_stage("read", len(rig)) as advance:
         recorded = read_recording(
@@ -161,25 +167,19 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     for each in (recorded.assignment.text(names), *recorded.notes):
         note(each)
     extents = recorded.extents()
-    if size is not None:
-        with _noted() if examined else contextlib.nullcontext():
-            plausibility.check_size(rig, size)
-            if given("size") and all(camera.size == size for camera in rig):
-                note("--size has no effect: the calibration states the same")
-    rig, about_size = plausibility.with_sizes(rig, extents, size=size)
+    rig, about_size = plausibility.with_sizes(rig, extents)
     if about_size:
         note(about_size)
-    with _noted() if examined else contextlib.nullcontext():
-        plausibility.check_principal_points(rig)
+    if unsized:
+        with _noted() if examined else contextlib.nullcontext():
+            plausibility.check_principal_points(rig)
     with _noted() if examined else contextlib.nullcontext():
         plausibility.check_extents(rig, extents)
-    doubt = ""
+    doubt = "" if choices.up is None else doubt_about(rig, choices.up)
     if choices.up is not None:
-        if doubt := doubt_about(rig, choices.up):
+        if doubt:
             note(doubt)
         rig = plausibility.turned_up(rig, choices.up)
-    elif not examined:
-        plausibility.check_up(rig)
     times, period = _times(choices, recorded.numbers, names, project)
     paths = tuple(source.path for source in recorded.assignment.sources)
     digest = recorded.digest(rig.packed, times)
@@ -195,27 +195,40 @@ def doubt_about(rig: "Rig", up: str) -> str:
     return "" if right else f"--up={up}: the cameras stand upright where the {stands} axis of the world points up"
 
 
-def _read_rig(path: Path, only: Sequence[str], *, examined: bool) -> "Rig":
-    """Read a calibration; for the doctor also one whose cameras make no rig, such as one in millimetres.
+def _read_rig(path: Path, choices: Choices, size: tuple[int, int] | None, *, examined: bool) -> "Rig":
+    """Read a calibration, and judge it before detections are read, which may take minutes.
+
+    For the doctor, also one whose cameras make no rig, such as one in millimetres, is read.
 
     Raises:
         ValueError: anything wrong with the file.
     """
-    from mvpose import Rig
-    from mvpose.camera import UnlikelyRigError
-    from mvpose.formats.calibration.calibration_formats import read_calibration
-    from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
+    import numpy as np
 
+    from mvpose import Rig
+    from mvpose.formats.calibration.calibration_formats import read_calibration, unlikely_rig
+    from mvpose.formats.detections import plausibility
+
+    only, unknown = choices.only, plausibility.UNKNOWN_SIZE
     try:
-        return read_calibration(path, size=UNKNOWN_SIZE, only=only, key="--cameras")
+        rig = read_calibration(path, size=unknown, only=only, key="--cameras", unit=choices.unit)
     except ValueError as error:
-        cause: BaseException | None = error
-        while cause is not None and not isinstance(cause, UnlikelyRigError):
-            cause = cause.__context__
-        if not examined or cause is None:
+        if not examined or (unlikely := unlikely_rig(error)) is None:
             raise
-        note(str(cause))
-        return Rig.unchecked([camera for camera in cause.cameras if not only or camera.name in only])
+        note(str(unlikely))
+        rig = Rig.unchecked([camera for camera in unlikely.cameras if not only or camera.name in only])
+    if size is not None:
+        with _noted() if examined else contextlib.nullcontext():
+            plausibility.check_size(rig, size)
+            if given("size") and all(camera.size == size for camera in rig):
+                note("--size has no effect: the calibration states the same")
+        rig, _ = plausibility.with_sizes(rig, np.empty((0, 2, 2)), size=size)
+    if all(camera.size != unknown for camera in rig):
+        with _noted() if examined else contextlib.nullcontext():
+            plausibility.check_principal_points(rig)
+    if choices.up is None and not examined:
+        plausibility.check_up(rig)
+    return rig
 
 
 @contextlib.contextmanager

@@ -95,7 +95,8 @@ def repair(
                     note(f"--{name} has no effect: --mend changes the calibration without the people")
         if out is not None:
             write_new(calibration, out, inputs.rig)
-            lines.append(f"{out}: repaired calibration; `mvpose doctor` examines it")
+            unit = "" if choices.unit is None else ", in metres"
+            lines.append(f"{out}: repaired calibration{unit}; `mvpose doctor` examines it")
         if new_times is not None:
             _write_times(new_times, inputs)
             lines.append(f"{new_times}: corrected times of the pictures, for --times")

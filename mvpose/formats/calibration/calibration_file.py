@@ -104,6 +104,8 @@ class CalibrationFormat:
     """Reader."""
     write: Callable[[Path, Rig], None] | None = None
     """Writer, which raises a ValueError where the format cannot hold the rig; None: the format is only read."""
+    unit: str = ""
+    """Unit of lengths, m, cm or mm, that the format prescribes; "": none, and metres unless the user states another."""
 
 
 def _keys(entries: dict[str, Any]) -> str:

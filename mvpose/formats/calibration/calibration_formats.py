@@ -15,15 +15,17 @@ Readers convert to our conventions: metres, z up, ``x_cam = R x + t``, OpenCV's 
 
 import difflib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from mvpose import Camera, Rig
+from mvpose.camera import UnlikelyRigError
 from mvpose.files.message_text import one_line
 from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, qualisys, voxelpose
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
-from mvpose.formats.calibration.camera_folder import only_file, read_folder, suffix_of, write_folder
+from mvpose.formats.calibration.camera_folder import only_file, read_folder, suffix_of, unit_of, write_folder
 
 FORMATS: list[CalibrationFormat] = [
     panoptic.FORMAT,
@@ -88,7 +90,12 @@ def register(added: CalibrationFormat) -> None:
 
 
 def read_calibration(
-    path: str | Path, *, size: tuple[int, int], only: Sequence[str] = (), key: str = "cameras.only"
+    path: str | Path,
+    *,
+    size: tuple[int, int],
+    only: Sequence[str] = (),
+    key: str = "cameras.only",
+    unit: str | None = None,
 ) -> Rig:
     """Read a calibration file of any registered format.
 
@@ -99,22 +106,48 @@ def read_calibration(
             EasyMocap and OpenCV).
         only: names of the cameras to take, in this order; empty: all (of Panoptic: the HD cameras).
         key: key of a file that holds these names, for messages.
+        unit: unit of its lengths, in :data:`UNITS`, for files of formats that prescribe none; None: metres.
 
     Raises:
-        ValueError: the file does not exist, no registered format recognises it, or its reader finds a fault; every
-            message names the file.
+        ValueError: the file does not exist, no registered format recognises it, its reader finds a fault, or it is in
+            another unit; every message names the file.
     """
     try:
         place, chosen = _format_of(Path(path))
+        scale = 1.0 if unit is None else _scale(unit, path, unit_of(place) if chosen is None else chosen.unit)
         with np.errstate(over="ignore", invalid="ignore"):  # of values that the cameras refuse
             rig = (read_folder if chosen is None else chosen.read)(place, size=size, only=only)
     except ValueError as error:
-        raise ValueError(one_line(str(error))) from None
+        if (unlikely := unlikely_rig(error)) is None or unit is None:
+            raise ValueError(one_line(str(error))) from None
+        rig = Rig.unchecked(unlikely.cameras)
     try:
+        if unit is not None:
+            rig = Rig([replace(camera, t=scale * camera.t) for camera in rig])
         return select(rig, only, key=key)
     except ValueError as error:
         raise ValueError(one_line(f"{path}: {error}")) from None
 
+
+def unlikely_rig(error: ValueError) -> UnlikelyRigError | None:
+    """Return the error about where cameras stand from which the error of a reader comes; None for another one."""
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, UnlikelyRigError):
+        cause = cause.__context__
+    return cause
+
+
+def _scale(unit: str, path: str | Path, prescribed: str) -> float:
+    """Return by how much lengths that were read are to be multiplied, given their unit."""
+    if unit not in UNITS:
+        raise ValueError(f"--unit must be one of {', '.join(UNITS)}, got {unit!r}")
+    if prescribed not in ("", unit):
+        raise ValueError(f"--unit {unit}: files such as {path} are in {prescribed}, which is read so; leave --unit out")
+    return 1.0 if prescribed else UNITS[unit]
+
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+"""Metres of the units of lengths."""
 
 _SHOWN = 12  # names that a message repeats
 

@@ -37,6 +37,8 @@ SIZE = ("size", "imagesize", "resolution", "imgsize", "framesize", "calibrations
 _SIDES = (("imagewidth", "imageheight"), ("width", "height"), ("W", "H"))
 _FOCAL = ("fx", "fy", "cx", "cy")
 _INVERSE = ("cameratoworld", "c2w", "camtoworld")
+_INTRINSICS, _POSE = "intrinsics", "rotation and translation"
+_NONE = (None, "null", "None")  # that programs write for what is not known yet
 _EXPECTED = "camera_matrix (or K), distortion_coefficients, R or rvec, T or tvec, and the size of the pictures"
 
 
@@ -44,10 +46,15 @@ def is_camera(entry: Any, *, placed: bool = False) -> bool:
     """Return whether a value is a map with intrinsics of a camera, and if ``placed`` with its pose as well."""
     if not isinstance(entry, dict):
         return False
+    return not (lacking(entry) if placed else lacking(entry)[:1] == [_INTRINSICS])
+
+
+def lacking(entry: Mapping[str, Any]) -> list[str]:
+    """Return what an entry has nothing of: the intrinsics, the pose."""
     flat = _flat(entry)
-    if placed and all(find(flat, names) is None for names in (ROTATION, BOTH, _INVERSE)):
-        return False
-    return find(flat, MATRIX) is not None or all(key in flat for key in _FOCAL)
+    intrinsics = find(flat, MATRIX) is not None or all(key in flat for key in _FOCAL)
+    placed = any(find(flat, names) is not None for names in (ROTATION, BOTH, _INVERSE))
+    return [*([] if intrinsics else [_INTRINSICS]), *([] if placed else [_POSE])]
 
 
 def read_camera(name: str, entry: Mapping[str, Any], size: tuple[int, int]) -> Camera:
@@ -62,6 +69,8 @@ def read_camera(name: str, entry: Mapping[str, Any], size: tuple[int, int]) -> C
         ValueError: a value that is missing or of a wrong form; the message names the camera.
     """
     flat = _flat(entry)
+    if find(flat, ("fisheye",)) is True:
+        raise ValueError(f"camera {name!r} has a fisheye lens; calibrate it as a pinhole with k1 k2 p1 p2")
     K = find(flat, MATRIX)
     if K is None and all(key in flat for key in _FOCAL):
         fx, fy, cx, cy = (float(as_array(flat[key], (), f"camera {name!r}: {key}")) for key in _FOCAL)
@@ -88,7 +97,7 @@ def find(entry: Mapping[str, Any], names: tuple[str, ...]) -> Any:
     """Return the value of the first of some names in an entry; None where it has none of them, or only maps."""
     plain = {_plain(key): value for key, value in reversed(list(entry.items())) if not isinstance(value, dict)}
     for name in names:
-        if name in plain:
+        if name in plain and not (plain[name] is None or (isinstance(plain[name], str) and plain[name] in _NONE)):
             return plain[name]
     return None
 

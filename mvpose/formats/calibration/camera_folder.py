@@ -2,6 +2,7 @@
 
 A file of one camera holds its values (:mod:`.camera_entry`): YAML, XML or JSON of OpenCV's FileStorage, plain JSON,
 or TOML; there may be two files, of intrinsics and extrinsics: ``cam1_intrinsics.yml`` and ``cam1_extrinsics.yml``.
+Cameras of the Panoptic Studio are known by their keys (:data:`.panoptic.OWN`), and are in centimetres.
 """
 
 import re
@@ -15,6 +16,7 @@ from mvpose.files.message_text import listed, prefixed, shown
 from mvpose.formats.calibration.calibration_file import CalibrationFile
 from mvpose.formats.calibration.camera_entry import is_camera, read_camera
 from mvpose.formats.calibration.opencv import values_of, write_values
+from mvpose.formats.calibration.panoptic import OWN, read_entry
 from mvpose.formats.pose2sim_project import FILE, folder_names, project_tables
 
 SUFFIXES = (".json", ".yml", ".yaml", ".xml", ".toml")
@@ -23,6 +25,7 @@ SUFFIXES = (".json", ".yml", ".yaml", ".xml", ".toml")
 _PARTS = re.compile(
     r"[-_ .]*(intrinsics?|extrinsics?|intri|extri|calibration|calib|params?|parameters)$", re.IGNORECASE
 )
+_QUALISYS = ".qca.txt"
 _WHAT = "a folder of calibrations: a file for each camera, or one file of all cameras"
 
 
@@ -64,6 +67,24 @@ def read_folder(folder: Path, *, size: tuple[int, int], only: Sequence[str]) -> 
     Raises:
         ValueError: a file that is none of a single camera, or a fault of one.
     """
+    entries = _entries(folder)
+    with prefixed(folder):
+        return Rig(
+            [
+                read_entry(name, {"name": name, **entry}) if entry.keys() >= OWN else read_camera(name, entry, size)
+                for name, entry in entries.items()
+                if not only or name in only
+            ]
+        )
+
+
+def unit_of(folder: Path) -> str:
+    """Return the unit that the files of a folder are known to have; "" where they are of no program with one."""
+    return "cm" if any(entry.keys() >= OWN for entry in _entries(folder).values()) else ""
+
+
+def _entries(folder: Path) -> dict[str, dict[str, Any]]:
+    """Return the values of each camera, by its name."""
     entries: dict[str, dict[str, Any]] = {}
     for file in _files(folder):
         values = _camera_values(file)
@@ -73,8 +94,7 @@ def read_folder(folder: Path, *, size: tuple[int, int], only: Sequence[str]) -> 
         if twice:
             raise ValueError(f"{file}: two files of the camera {name!r} have {shown(twice[0])}; remove one of them")
         both |= values
-    with prefixed(folder):
-        return Rig([read_camera(name, entry, size) for name, entry in entries.items() if not only or name in only])
+    return entries
 
 
 def write_folder(folder: Path, rig: Rig, *, suffix: str) -> None:
@@ -96,7 +116,9 @@ def suffix_of(folder: Path) -> str:
 
 
 def _files(folder: Path) -> list[Path]:
-    found = [each for each in folder.iterdir() if each.suffix.lower() in SUFFIXES and not each.name.startswith(".")]
+    there = [each for each in folder.iterdir() if not each.name.startswith(".")]
+    found = [each for each in there if each.suffix.lower() in SUFFIXES]
+    found = found or [each for each in there if each.name.lower().endswith(_QUALISYS)]  # else converted from these
     settings = [folder / FILE] if folder / FILE in found and project_tables(folder) else []
     return sorted((each for each in found if each not in settings), key=natural_order)
 

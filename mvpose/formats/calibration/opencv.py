@@ -6,21 +6,25 @@ OpenCV prescribes no layout for many cameras. The reader accepts:
   ``calibrateCamera`` returns, under any of the usual names (:mod:`.camera_entry`);
 - a stereo calibration, as OpenCV's ``stereo_calib`` sample writes it: ``M1 D1 M2 D2`` (``intrinsics.yml``) and ``R T``
   (``extrinsics.yml``, beside it); R and T transform camera 1 into camera 2, and the world frame is that of camera 1;
+- ``camera_array.toml`` of caliscope, which has a table for each camera in ``cameras``, also for those that it has not
+  calibrated yet;
 - one file for each camera, whose name is that of the file: :mod:`.camera_folder`.
 
 The writer uses the first layout.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mvpose import Camera, Rig
-from mvpose.files.message_text import prefixed
+from mvpose.camera import UnlikelyRigError
+from mvpose.files.message_text import listed, prefixed
 from mvpose.formats.calibration import file_storage
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
-from mvpose.formats.calibration.camera_entry import check_names, is_camera, read_camera
+from mvpose.formats.calibration.camera_entry import check_names, is_camera, lacking, read_camera
 
 _K = ("camera_matrix", "K", "cameraMatrix", "intrinsics", "M")  # of a stereo pair, with 1 and 2 appended
 _TERMS = ("distortion_coefficients", "dist", "distCoeffs", "distortion", "D")
@@ -33,12 +37,13 @@ _WHAT = f"an OpenCV calibration: {_EXPECTS}"
 _LONGEST_BASELINE = 20.0  # metres, between the cameras of a stereo pair
 
 
-def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
+def read_calibration(path: str | Path, *, size: tuple[int, int], only: Sequence[str] = ()) -> Rig:
     """Read a calibration written by ``cv2.FileStorage``.
 
     Args:
         path: the file; of a stereo pair in two files either of them.
         size: width and height of the images in pixels, for files that do not hold them.
+        only: names of cameras to take, if the file has them all; empty: all.
 
     Returns:
         The cameras in the order of the file; those of a stereo pair are called "1" and "2".
@@ -56,7 +61,31 @@ def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
         if not entries:
             keys = ", ".join(list(values)[:8]) or "no keys"
             raise ValueError(f"no camera found, only {keys}; expected {_WHAT}")
-        return Rig([read_camera(name, entry, size) for name, entry in entries.items()])
+        if only and set(only) <= entries.keys():
+            entries = {name: entries[name] for name in only}
+        _check_calibrated(entries)
+        cameras = [read_camera(name, entry, size) for name, entry in entries.items()]
+        if stereo and (baseline := float(np.linalg.norm(cameras[1].t))) > _LONGEST_BASELINE:
+            raise UnlikelyRigError(
+                f"the two cameras are {baseline:g} apart, which cannot be metres: state the unit (--unit mm), or "
+                "divide T by 1000",
+                cameras,
+            )
+        return Rig(cameras)
+
+
+def _check_calibrated(entries: dict[str, dict[str, Any]]) -> None:
+    """Check that no camera lacks its intrinsics, or its pose, as those that caliscope has not calibrated yet.
+
+    Raises:
+        ValueError: one that does; the message names what is missing, and the cameras that are complete.
+    """
+    missing = {name: lacking(entry) for name, entry in entries.items()}
+    complete = [name for name, each in missing.items() if not each]
+    bare = [f"{name} lacks {', '.join(each)}" for name, each in missing.items() if each]
+    if bare and (complete or any("size" in entry for entry in entries.values())):
+        others = f", or take the others: --cameras {','.join(complete)}" if len(complete) > 1 else ""
+        raise ValueError(f"not all cameras are calibrated: {listed(bare)}; finish the calibration{others}")
 
 
 def write_calibration(path: str | Path, rig: Rig) -> None:
@@ -105,19 +134,20 @@ FORMAT = CalibrationFormat(
     "OpenCV (YAML, XML, JSON)",
     _EXPECTS,
     lambda file: file.storage is not None or bool(_entries(file.json or file.toml or {})),
-    lambda path, *, size, only: read_calibration(path, size=size),
+    read_calibration,
     write_calibration,
 )
 
 
 def _entries(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    listed = values.get("cameras")
-    if isinstance(listed, dict):
-        return _entries(listed)
-    if isinstance(listed, list):
-        if not all(isinstance(each, dict) for each in listed):
+    found = values.get("cameras")
+    if isinstance(found, dict):
+        known = _entries(found) or any(isinstance(each, dict) and "size" in each for each in found.values())
+        return {name: each for name, each in found.items() if isinstance(each, dict)} if known else {}
+    if isinstance(found, list):
+        if not all(isinstance(each, dict) for each in found):
             raise ValueError(f"cameras must be a list of maps; expected {_WHAT}")
-        return {f"{each.get('name', k)}": each for k, each in enumerate(listed)}
+        return {f"{each.get('name', k)}": each for k, each in enumerate(found)}
     return {name: each for name, each in values.items() if is_camera(each)}
 
 
@@ -143,12 +173,6 @@ def _stereo(values: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
         raise ValueError(
             f"{matrices}1 and {matrices}2 without {' and '.join(missing)}, "
             f"missing in {file_storage.missing_half(path)}, too"
-        )
-    baseline = float(np.linalg.norm(values["T"]))
-    if baseline > _LONGEST_BASELINE:
-        raise ValueError(
-            f"the two cameras are {baseline:g} apart, which cannot be metres: calibrate with the size of the board's "
-            "squares in metres, or divide T by 1000"
         )
     terms: list[Any] = [next((values[f"{key}{k}"] for key in _TERMS if f"{key}{k}" in values), []) for k in (1, 2)]
     poses = ((np.eye(3), np.zeros(3)), (values["R"], values["T"]))

@@ -2,6 +2,7 @@
 
 ``cameras`` is a list, each with ``name type resolution K distCoef R t``: centimetres, ``x_cam = R X + t``, distCoef
 k1 k2 p1 p2 k3. The file's world has y down; ours is (x, y, z) = (X, Z, -Y) / 100, so the floor Y = 0 is z = 0.
+A file of one camera holds an entry of the list, which :data:`OWN` tells from those of other programs.
 """
 
 import json
@@ -24,6 +25,9 @@ _WHAT = f"a Panoptic calibration: {_EXPECTS}"
 _AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # X = x, Y = -z, Z = y
 _CENTIMETRES = 100.0
 
+OWN = {"type", "panel", "node", "distCoef"}
+"""Keys that a camera of the Panoptic Studio has, and those of other programs have not together."""
+
 
 def read_calibration(path: str | Path, *, types: Collection[str] = ("hd",)) -> Rig:
     """Read a Panoptic calibration file.
@@ -45,7 +49,7 @@ def read_calibration(path: str | Path, *, types: Collection[str] = ("hd",)) -> R
         raise ValueError(f"{path}: no list 'cameras'; expected {_WHAT}")
     with prefixed(path):
         chosen = [
-            _camera(index, entry)
+            read_entry(f"cameras[{index}]", entry)
             for index, entry in enumerate(entries)
             if not types or not isinstance(entry, dict) or entry.get("type", "hd") in types
         ]
@@ -94,13 +98,19 @@ FORMAT = CalibrationFormat(
     _recognises,
     lambda path, *, size, only: read_calibration(path, types=() if only else ("hd",)),
     write_calibration,
+    "cm",
 )
 
 
-def _camera(index: int, entry: Any) -> Camera:
+def read_entry(where: str, entry: Any) -> Camera:
+    """Return the camera of an entry of the list.
+
+    Raises:
+        ValueError: a key that is missing, or a value of a wrong shape; the message names the place or the camera.
+    """
     missing = [key for key in _KEYS if key not in entry] if isinstance(entry, dict) else list(_KEYS)
     if missing:
-        raise ValueError(f"cameras[{index}] lacks {', '.join(missing)}; expected {', '.join(_KEYS)}")
+        raise ValueError(f"{where} lacks {', '.join(missing)}; expected {', '.join(_KEYS)}")
     name = str(entry["name"])
     t = as_array(np.asarray(entry["t"], dtype=object).ravel(), (3,), f"camera {name!r}: t")
     return camera(

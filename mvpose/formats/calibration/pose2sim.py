@@ -1,8 +1,8 @@
-"""Pose2Sim calibrations (``Calib.toml``); Anipose and caliscope write almost the same.
+"""Pose2Sim calibrations (``Calib.toml``); Anipose (``calibration.toml``) and caliscope write almost the same.
 
 One section for each camera with ``name size matrix distortions rotation translation fisheye``: ``rotation`` is a
 Rodrigues vector, ``x_cam = R X + T``, metres, z up. Pose2Sim itself writes four distortion terms, k1 k2 p1 p2, without
-k3; files with five terms are read, too.
+k3; files with five terms are read, too. Anipose's lengths are in the unit of its board, which the file does not state.
 """
 
 import json
@@ -25,8 +25,8 @@ _EXPECTS = "a section for each camera, with " + ", ".join(_KEYS)
 _WHAT = f"a Pose2Sim calibration (TOML): {_EXPECTS}"
 
 
-def read_calibration(path: str | Path) -> Rig:
-    """Read a Pose2Sim calibration file.
+def read_calibration(path: str | Path, *, only: Sequence[str] = ()) -> Rig:
+    """Read a Pose2Sim calibration file, at least the cameras named in ``only`` if there are any.
 
     Returns:
         The cameras in the order of the file; their names are the key ``name``, or else the name of the section.
@@ -41,8 +41,12 @@ def read_calibration(path: str | Path) -> Rig:
         sections = parse_toml(content.decode("utf-8-sig"))
     except ValueError as error:
         raise ValueError(f"{path}: not TOML ({one_line(str(error), 160)}); expected {_WHAT}") from None
+    sections.pop(_METADATA, None)
+    names = {key: str(each.get("name", key)) if isinstance(each, dict) else key for key, each in sections.items()}
+    if set(only) <= set(names.values()):
+        sections = {key: each for key, each in sections.items() if not only or names[key] in only}
     with prefixed(path):
-        return Rig([_camera(name, entry) for name, entry in sections.items() if name != _METADATA])
+        return Rig([_camera(name, entry) for name, entry in sections.items()])
 
 
 def write_calibration(path: str | Path, rig: Rig) -> None:
@@ -75,7 +79,7 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
 
 
 def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
-    return read_calibration(path)
+    return read_calibration(path, only=only)
 
 
 FORMAT = CalibrationFormat(

@@ -91,4 +91,5 @@ FORMAT = CalibrationFormat(
     _EXPECTS,
     lambda file: file.content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and b"<fov_video" in file.content,
     _read,
+    unit="mm",
 )

@@ -83,6 +83,7 @@ FORMAT = CalibrationFormat(
     lambda file: any(isinstance(entry, dict) and "fx" in entry for entry in (file.json or {}).values()),
     lambda path, *, size, only: read_calibration(path, size=size),
     write_calibration,
+    "mm",
 )
 
 

@@ -35,6 +35,7 @@ READ = {
     "cameras": Row("--cameras cam0,cam1,cam3"),
     "frames": Row("--frames 2:10"),
     "skeleton": Row("--skeleton body25b"),
+    "unit": Row("--unit cm"),
     "up": Row("--up y"),
 }
 RESULTS = {
