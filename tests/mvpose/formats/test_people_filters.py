@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_smoothing_spline
 
-from mvpose.formats.people.filters import filter_of, filtered
+from mvpose.formats.people.filters import filter_of, filtered, freedom, smoothed, spline
 from mvpose.recording import People
 
 RATE = 60.0
@@ -30,6 +31,31 @@ def test_the_gain_of_the_butterworth_filter_is_that_of_two_passes_and_there_is_n
     np.testing.assert_allclose(found[:, 1], 1.5, atol=1e-9)
     if hertz == cutoff:
         assert gain == pytest.approx(np.sqrt(0.5), abs=0.02)
+
+
+@pytest.mark.parametrize("frames", [5, 40, 300])
+@pytest.mark.parametrize("weight", [0.1, 10.0, 1e4])
+def test_smoothing_splines_are_those_of_scipy(frames, weight):
+    values = np.random.default_rng(frames).normal(size=(frames, 3))
+    reference = [
+        make_smoothing_spline(np.arange(float(frames)), each, lam=weight)(np.arange(frames)) for each in values.T
+    ]
+    np.testing.assert_allclose(smoothed(values, weight), np.transpose(reference), atol=1e-9)
+    assert freedom(frames, weight) == pytest.approx(np.trace(smoothed(np.eye(frames), weight)), abs=0.2)
+
+
+@pytest.mark.parametrize("frames", [60, 600, 3000])
+@pytest.mark.parametrize("hertz", [0.2, 2.0, 5.0])
+def test_the_spline_that_is_chosen_is_near_the_best(frames, hertz):
+    times, rng = np.arange(frames) / RATE, np.random.default_rng(0)
+    true = np.sin(2 * np.pi * hertz * times)[:, None] * [1.0, 0.5, 0.1]
+    noisy = true + rng.normal(0, 0.02, true.shape)
+
+    def error(values):
+        return np.sqrt(np.mean((values - true) ** 2, axis=0))
+
+    best = np.min([error(smoothed(noisy, weight)) for weight in np.logspace(-2, 10, 97)], axis=0)
+    assert np.all(error(spline(noisy, times, 6.0)) < 1.3 * best)
 
 
 @pytest.mark.parametrize("name", ["butterworth", "spline"])
