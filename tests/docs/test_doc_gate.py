@@ -13,6 +13,7 @@ from easy_suite import EASY
 from known_commands import CHECK_OF_REPAIR, CHECK_OF_TRACKING, CHECKS, OWN_GATE
 
 
+@pytest.mark.slow
 def test_the_check(easy_workplace):
     plain, full = CHECKS
     own = "--baseline easy.json --workers 1"

@@ -41,6 +41,7 @@ def lab(tmp_path_factory):
     return Lab("walkers", rig, folder, ("--fps", "10", "--frames", f"{FIRST}:{FIRST + 39}"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["untouched", "millimetres, one", "moved by 2 degrees"])
 def test_a_break_is_found_named_and_mended_by_what_is_printed(lab, tmp_path, name):
     row = measure(lab, name, tmp_path)

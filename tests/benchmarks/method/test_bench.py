@@ -223,6 +223,7 @@ def numbers(value):
     return [value] if isinstance(value, int | float) else []
 
 
+@pytest.mark.slow
 def test_the_command_line_prints_a_section_and_writes_its_figures(tmp_path):
     file = tmp_path / "hard.json"
     done = subprocess.run(

@@ -24,6 +24,7 @@ ERRING = {
 }
 
 
+@pytest.mark.slow
 def test_the_same_detector_holds_and_another_fails():
     """The check is passed by the very draws of the network, and failed by a detector that misses nearly everybody."""
     short = ["duration=0.8", 'rendering.renderer="rays"', "people.count=2", "clutter.boxes=0"]

@@ -22,6 +22,7 @@ def call(program, *arguments):
     assert result.exit_code == 0, result.output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("head", ["simcc", pytest.param("heatmap", marks=pytest.mark.slow)])
 def test_people_of_pictures_are_those_of_the_export(tmp_path, head):
     """Joints lie in bodies, and the colours are on them: they are off by the thickness of a limb."""

@@ -84,6 +84,7 @@ class TestNearTests:
         )
         return Checkout(tmp_path)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("body", "limit", "caught", "what"),
         [
@@ -181,6 +182,7 @@ class TestEffect:
         assert found.p == pytest.approx(2 * 2 / 2**12)
         assert found.text.startswith("pcp -0.5 (-0.5 to -0.5), full, suite")
 
+    @pytest.mark.slow
     def test_a_shift_at_all_of_many_seeds_is_clear_among_hundreds_of_scores(self):
         cases = [f"case{k}" for k in range(220)]
         before = {(case, seed, "full", "pcp"): 90.0 for case in cases for seed in range(24)}

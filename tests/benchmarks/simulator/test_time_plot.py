@@ -181,6 +181,7 @@ def test_without_the_network_the_other_rows_remain():
     assert len(stages) == 6  # no sum with it
 
 
+@pytest.mark.slow
 def test_a_quick_run_has_all_sections_that_are_plotted(tmp_path, capsys):
     file, folder = tmp_path / "bench.json", tmp_path / "time"
     assert bench(["--quick", "--only", "published", "reid", "curve", "--json", str(file)]) == 0

@@ -27,6 +27,7 @@ def test_everybody_is_seen_by_every_camera_and_nobody_leaves_without_an_end():
         assert all(rig[view].inside(points).all() for view, points in zip(frame.view, frame.keypoints, strict=True))
 
 
+@pytest.mark.slow
 def test_people_stay_as_long_as_asked_on_average_and_their_number_holds():
     _, detections = stream(2, 5, stay=2.0, phantoms=0.0, rate=2.0, conditions=EXACT)
     people = [len(frame) / 2 for frame in itertools.islice(detections, 2000)]

@@ -115,6 +115,7 @@ def _turned(given: AnnotatedRecording, view: int, degrees: float, *, after: floa
     return replace(given, detections=tuple(frames))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not SHELF.exists(), reason="real Shelf is not here")
 def test_a_camera_of_shelf_that_turns_is_named_and_none_that_stands():
     given = read_recording("shelf", SHELF)

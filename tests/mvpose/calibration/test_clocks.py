@@ -75,6 +75,7 @@ def test_people_who_stand_still_tell_nothing():
     assert {each.severity for each in clocks.findings()} == {"unknown"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [1, 3])
 def test_lost_pictures_are_found_where_they_were_lost(motion, lost):
     steps = steps_of(np.zeros(4))

@@ -54,11 +54,13 @@ def test_the_world_is_that_of_the_floor(found):
     assert abs(found[0].R[0, 2]) < 0.02 or abs(found[0].R[0] @ [0, 1, 0]) < 1e-9  # x is to the right of the first
 
 
+@pytest.mark.slow
 def test_where_the_given_cameras_stand_has_no_effect(found, frames):
     again = calibrate_from_people(scattered(RIG, 7), frames, period=PERIOD).rig
     np.testing.assert_allclose(again.centers, found.centers, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("options", "factor"), [({"stature": 1.87}, 1.1), ({"distance": ("cam0", "cam2", 7.0)}, None)])
 def test_the_size_is_that_of_the_stature_or_of_the_distance(found, frames, options, factor):
     named = Rig([replace(c, name=f"cam{k}") for k, c in enumerate(RIG)])

@@ -78,6 +78,7 @@ BROKEN = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BROKEN)
 def test_the_printed_mend_gives_back_the_rig(recording, name):
     """Whatever the mistake, also where the cameras make no rig: its mend is named, and undoes it."""

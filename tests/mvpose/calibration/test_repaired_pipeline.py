@@ -45,6 +45,7 @@ def errors(estimates, motion):
     return np.array(result)
 
 
+@pytest.mark.slow
 def test_clocks_that_are_off_cost_little_after_repair(motion):
     plain = preset("fast")
     perfect = errors([plain.estimate(RIG, each) for each in filmed(motion, np.zeros(4))], motion)

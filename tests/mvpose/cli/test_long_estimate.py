@@ -1,5 +1,6 @@
 """``mvpose estimate`` of long recordings: in parts on disk, with the results of the whole, also after a kill."""
 
+import functools
 import json
 
 import numpy as np
@@ -49,6 +50,19 @@ def estimate(lab, out, *options):
     return CliRunner().invoke(app, list(map(str, words)))
 
 
+@pytest.fixture(scope="module")
+def whole(lab, tmp_path_factory):
+    """Return a function that gives the folder of an estimation in one piece, made once for all options."""
+
+    @functools.cache
+    def made(*options):
+        out = tmp_path_factory.mktemp("whole") / "out"
+        assert estimate(lab, out, *options).exit_code == 0
+        return out
+
+    return made
+
+
 @pytest.fixture
 def in_parts(monkeypatch):
     """Return a function that makes recordings long from a few frames on, with parts of some frames."""
@@ -72,22 +86,22 @@ def content(folder):
 
 
 @pytest.mark.parametrize("method", ["track", "fast"])
-@pytest.mark.parametrize("size", [1, 7, 39])
-def test_files_of_parts_are_those_of_the_whole(lab, tmp_path, in_parts, method, size):
+@pytest.mark.parametrize("size", [7, *(pytest.param(size, marks=pytest.mark.slow) for size in (1, 39))])
+def test_files_of_parts_are_those_of_the_whole(lab, tmp_path, in_parts, whole, method, size):
     options = ("--format", FORMATS, "--method", method)
-    assert estimate(lab, tmp_path / "whole", *options).exit_code == 0
+    expected = whole(*options)
     in_parts(size)
     result = estimate(lab, tmp_path / "parts", *options)
     assert result.exit_code == 0, result.output
-    whole, parts = content(tmp_path / "whole"), content(tmp_path / "parts")
-    tables = [each.pop("poses.parquet") for each in (whole, parts)]
+    files, parts = content(expected), content(tmp_path / "parts")
+    tables = [each.pop("poses.parquet") for each in (files, parts)]
     assert pl.read_parquet(tables[0]).equals(pl.read_parquet(tables[1]))
-    archives = [read_people(tmp_path / each / "people.npz") for each in ("whole", "parts")]
+    archives = [read_people(each / "people.npz") for each in (expected, tmp_path / "parts")]
     np.testing.assert_array_equal(archives[0].joints, archives[1].joints)
-    assert set(whole) == set(parts)
-    for name in set(whole) - {"people.npz"}:
-        assert whole[name] == parts[name], name
-    about = [json.loads((tmp_path / each / "inputs.json").read_text()) for each in ("whole", "parts")]
+    assert set(files) == set(parts)
+    for name in set(files) - {"people.npz"}:
+        assert files[name] == parts[name], name
+    about = [json.loads((each / "inputs.json").read_text()) for each in (expected, tmp_path / "parts")]
     for key in ("fps", "numbers", "people", "left_out"):
         assert about[0][key] == about[1][key]
     assert (tmp_path / "parts" / "recording.html").is_file()
@@ -99,11 +113,13 @@ class Killed(BaseException):
 
 
 @pytest.mark.parametrize(("method", "lag"), [("track", 0.2), ("track", 0.0), ("track-fast", 0.5), ("full", 0.2)])
-@pytest.mark.parametrize("killed", [0, 9, 17, 34, FRAMES - 1])
-def test_a_killed_estimation_goes_on_with_the_same_bytes(lab, tmp_path, in_parts, monkeypatch, method, lag, killed):
-    in_parts(8)
+@pytest.mark.parametrize("killed", [17, *(pytest.param(at, marks=pytest.mark.slow) for at in (0, 9, 34, FRAMES - 1))])
+def test_a_killed_estimation_goes_on_with_the_same_bytes(
+    lab, tmp_path, in_parts, whole, monkeypatch, method, lag, killed
+):
     options = ("--method", method, "--no-page", *(("--lag", lag) if "track" in method else ()))
-    assert estimate(lab, tmp_path / "whole", *options).exit_code == 0
+    expected = whole(*options)
+    in_parts(8)
     made = recorded_frames.RecordedFrames.frame
     asked = []
 
@@ -127,7 +143,7 @@ def test_a_killed_estimation_goes_on_with_the_same_bytes(lab, tmp_path, in_parts
     if parts > 0:
         assert f"goes on from frame {8 * parts} of {FRAMES}" in result.stderr
         assert min(set(asked) - {0}) >= 8 * parts  # frame 0 tells the skeleton
-    assert content(tmp_path / "again") == content(tmp_path / "whole")
+    assert content(tmp_path / "again") == content(expected)
     assert not list(tmp_path.glob(".*"))
 
 
@@ -145,6 +161,7 @@ def test_parts_of_other_detections_or_of_another_method_are_not_used(lab, tmp_pa
         assert "goes on" not in result.stderr
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(size=st.integers(1, 45), lag=st.sampled_from([0.0, 0.04, 0.2, 0.7, np.inf]), all_=st.booleans())
 def test_people_of_parts_are_those_of_the_whole(lab, tmp_path_factory, size, lag, all_):

@@ -262,6 +262,7 @@ def flipped(signs, size):
     return measurement(lambda *_: {}), measurement(size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("score", ["pcp", TIME])
 def test_random_changes_of_whole_seeds_are_called_regressions_no_more_often_than_the_level(score):
     """All sign patterns of six seeds: the share that fails is at most the level."""
@@ -298,6 +299,7 @@ def test_a_score_that_is_missing_in_one_measurement_is_left_out_of_both():
     assert {change.difference for change in comparison.changes if change.score != TIME} == {0.0}
 
 
+@pytest.mark.slow
 def test_a_loss_with_too_few_seeds_is_undecided():
     """All scores of both variants fall at all of six seeds: 1 / 64, and 26 tests or more."""
 
@@ -326,6 +328,7 @@ def test_a_study_of_one_case_is_not_compared_twice():
     assert {change.case for change in comparison.changes} == {None}
 
 
+@pytest.mark.slow
 def test_time_is_compared_by_the_middle_half_of_its_ratios():
     slower = regressions(lambda trial: {TIME: math.log(2.0)} if trial.variant == "full" else {})
     assert named(slower) == {(TIME, "full", case) for case in (None, *CASES)}
@@ -343,6 +346,7 @@ def test_a_slowdown_in_one_case_is_found_in_that_case():
     assert named(slower) == {(TIME, variant, CASES[4]) for variant in ("fast", "full")}
 
 
+@pytest.mark.slow
 def test_the_interval_of_time_contains_the_ratio():
     def holds(run):
         def change(trial):

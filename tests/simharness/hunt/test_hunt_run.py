@@ -48,6 +48,7 @@ def content(folder):
     return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
 
 
+@pytest.mark.slow
 def test_a_hunt_finds_keeps_and_continues(hunt):
     options = ["--trials", "4", "--keep", "2"]
     result, folder = hunt(*options)

@@ -31,6 +31,7 @@ def test_a_difference_is_over_the_trials_that_both_have(tmp_path, variant):
     assert cells[0].text == "−4.0"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variant", ["full", "fast"])
 @pytest.mark.parametrize("share", [0.1, 0.9, 1.0])
 def test_the_page_is_made_from_the_trials_that_finished(tmp_path, variant, share):

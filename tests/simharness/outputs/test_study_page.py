@@ -178,6 +178,7 @@ def test_every_case_has_a_row_for_each_variant(page, tmp_path):
     assert "<h2>Cases</h2>" not in render_study(make_study(tmp_path))
 
 
+@pytest.mark.slow
 def test_curves_and_breaking_points_are_of_one_case_each(tmp_path, page_of_grid):
     results = make_study(tmp_path, factors=GRID, cases=("crowd", "empty"))
     more = pl.when(pl.col("case") == "empty").then(10.0).otherwise(0.0)
@@ -327,6 +328,7 @@ class TestCommand:
         assert f"whose report is {tmp_path / 'report.html'}" in self.refused(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_variant_that_tracks_people_has_curves_over_time(tmp_path, page_of_grid):
     """Other variants have no line there, and heat maps without numbers; studies without such a variant have no tab."""
     page = render_study(make_study(tmp_path, factors=GRID, variants=("full", "track")))

@@ -73,6 +73,7 @@ def test_two_workers_give_the_results_of_one():
     np.testing.assert_array_equal(np.concatenate(shared), np.concatenate(map_frames(function, range(23))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_an_error_ends_the_run_and_names_the_frames(workers):
     with pytest.raises(RunError, match=r"frame.* KeyError: 'planted'") as caught:

@@ -197,6 +197,7 @@ class TestPairing:
         assert few.real == {key: each for key, each in many.real.items() if key[1] < 3}
         assert len(many.real) > len(few.real)
 
+    @pytest.mark.slow
     def test_phantoms_change_no_bit_of_what_is_seen_of_people(self):
         few, lasting, shared = (
             see(setting("phantoms", {"detector.phantoms.rate": rate}, case))
@@ -209,6 +210,7 @@ class TestPairing:
         few, many = (see(setting("crowd", {"people.count": count})) for count in (3, 4))
         assert np.array_equal(few.sequence.joints, many.sequence.joints[:, :3])
 
+    @pytest.mark.slow
     def test_things_change_only_what_is_seen_of_those_whom_they_hide(self):
         free, hidden = (see(setting("clutter", {"clutter.coverage": share})) for share in (0.0, 0.3))
         assert np.array_equal(free.sequence.joints, hidden.sequence.joints)
@@ -237,6 +239,7 @@ class TestPairing:
         assert np.array_equal(good.visibility, bad.visibility)
         assert good.real != bad.real
 
+    @pytest.mark.slow
     def test_clothes_move_nobody(self):
         apart, alike = (see(setting("look_alike", {"people.look_alike": dial})) for dial in (0.0, 1.0))
         assert np.array_equal(apart.sequence.joints, alike.sequence.joints)

@@ -89,6 +89,7 @@ def without_times(table):
     return table.select(column for column in table.columns if not column.startswith("time_"))
 
 
+@pytest.mark.slow
 def test_a_changed_score_is_computed_without_simulation(run, stages, code, monkeypatch):
     before = run()
     assert calls(stages)["capture_trial"] == 3

@@ -62,6 +62,7 @@ def test_every_fault_of_scenario_files_has_a_case():
     assert set(CASES) == {"none", *FaultsSection.model_fields}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fault", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in CASES]
 )

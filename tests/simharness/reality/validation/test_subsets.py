@@ -55,6 +55,7 @@ def test_the_curve_is_the_mean_over_subsets(passes):
     assert curve[2] < 100.0
 
 
+@pytest.mark.slow
 def test_the_result_does_not_depend_on_the_workers():
     recordings, changes = [walkers(frames=3, noise=4.0)], [Unchanged(), *map(CameraSubset, camera_subsets(3))]
     alone, shared = (run_passes(recordings, changes, variants=("fast",), workers=workers)[0] for workers in (1, 2))

@@ -96,6 +96,7 @@ def test_skill_is_against_the_rivals_that_are_given(recorded):
     assert subsets.rivals["shipped profile"][0].mean > subsets.error.mean
 
 
+@pytest.mark.slow
 def test_twins_with_a_worse_detector_fail(recorded):
     worse = [filmed(noise=25.0, seed=seed) for seed in (1, 2)]
     failed = {each.group for each in validate(recorded, worse, plan=PLAN).failed}
@@ -142,6 +143,7 @@ class TestCommand:
     def described(self, tmp_path, recorded):
         return describe(recorded, tmp_path, name="hall")
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("noise", "code"), [(3.0, 0), (25.0, 1)])
     def test_the_exit_code_is_the_verdict(self, described, tmp_path, monkeypatch, noise, code):
         """Twins are given, because filming them takes longer than all the rest."""
@@ -160,6 +162,7 @@ class TestCommand:
         assert ("fails" in result.stdout) == (code == 1)
         assert "skill against rivals" in result.stdout
 
+    @pytest.mark.slow
     def test_the_figures_of_another_recording_are_a_rival(self, described, tmp_path, monkeypatch):
         given = validation_module.SimulatedTwins([filmed(seed=1)] * 2, filmed(seed=2))
         monkeypatch.setattr(validation_module, "simulate_predictions", lambda *_, **__: given)

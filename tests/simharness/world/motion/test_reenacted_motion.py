@@ -163,6 +163,7 @@ def test_a_moved_recording_gives_the_moved_motion(recorded, person):
     np.testing.assert_allclose(moved.angles, still.angles, atol=0.02)
 
 
+@pytest.mark.slow
 def test_the_rate_of_the_recording_does_not_matter(recorded):
     joints = np.stack([record(name, k, rate=50.0)[1] for k, name in enumerate(ACTIVITIES)], axis=1)
     for person, mover in enumerate(recorded.cast):
@@ -191,6 +192,7 @@ class TestScenario:
 
         return partial(plan, recorded.tracks.joints)
 
+    @pytest.mark.slow
     def test_people_perform_their_tracks_from_the_start_on(self, recorded, planned):
         plan = planned(start=1.0)
         assert plan.props == ()
