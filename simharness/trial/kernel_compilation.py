@@ -79,9 +79,7 @@ def compile_pictures() -> None:
     assert scene is not None  # it has sources and a floor
     shown, inverse_depth = np.full((2, 2), -1, np.int32), np.zeros((2, 2), np.float32)
     drawn, view = DrawnPixels(shown, inverse_depth, np.zeros((6, 3))), PixelRays(np.zeros(3), np.eye(3))
-    labels, ids = geometry.topology.mesh, np.full((2, 2), -1, np.int16)
-    empty = Background(view.to_rays, inverse_depth, shown, drawn.corners, labels, ids)
-    scene.draw(scene.background(empty, view), np.zeros((0, 3), np.int32), drawn, view)
+    scene.draw(scene.background(Background(view.to_rays, inverse_depth, shown, drawn.corners), view), drawn, view)
 
 
 def compile_kernels(variants: Iterable[str]) -> None:

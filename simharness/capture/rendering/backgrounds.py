@@ -53,11 +53,6 @@ class Background:
     """Visible face, (h, w) int32; -1 without a surface."""
     corners: NDArray[np.float64]
     """Homogeneous pixel coordinates of the vertices, (n, 3)."""
-    labels: NDArray[np.int16]
-    """What the faces are labelled with, (k + 1,): see
-    :attr:`~simharness.capture.rendering.scene_topology.SceneTopology.mesh`."""
-    ids: NDArray[np.int16]
-    """Label of each pixel, (h, w)."""
     lit: LitBackground | None = None
     """The same in the light of the latest request."""
     used: int = 0
@@ -66,7 +61,7 @@ class Background:
     @property
     def nbytes(self) -> int:
         """Bytes of memory, with those of colours, whether they were requested or not."""
-        count = self.inverse_depth.nbytes + self.triangle.nbytes + self.corners.nbytes + self.ids.nbytes
+        count = self.inverse_depth.nbytes + self.triangle.nbytes + self.corners.nbytes
         if self.lit is not None:
             count += self.lit.shadow_place.nbytes + self.lit.shadow_depth.nbytes + self.lit.runs.nbytes
         return count + 3 * self.triangle.size

@@ -21,7 +21,6 @@ from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.shaded_pixels import BlockGrid, ShadowLayers, dim, runs_below
 from simharness.capture.rendering.shading_kernels import FaceLight, shade_lit
 from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
-from simharness.capture.rendering.vertex_kernels import picture_spans
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.types.srgb import LUMINANCE
@@ -239,24 +238,21 @@ class LitScene:
         fill_empty(rgb, triangle < 0, self.lighting, view.to_rays, self.room.exposure)
         still, samples, room = self.geometry.still, self.room.samples, self.room
         if len(still.topology.faces):
-            drawn = DrawnPixels(triangle, inverse_depth, background.corners)
-            spans, emission = picture_spans(*triangle.shape), still.topology.emission
+            pixels = DrawnPixels(triangle, inverse_depth, background.corners).shown(triangle >= 0)
+            emission = still.topology.emission
             light = FaceLight(emission, room.exposure, room.light, samples.corner_samples, samples.divisions)
-            shade_lit(spans, drawn, still.faces, view.to_rays, light, (0, 0), MATTE, tone.table(), rgb)
+            shade_lit(pixels, background.corners, still.faces, view.to_rays, light, (0, 0), MATTE, tone.table(), rgb)
         blocks = ShadowGrid.around_probes(room).blocks
         runs = runs_below(triangle, inverse_depth, view, blocks, float(_HEIGHTS[-1]))
         nothing = np.zeros((0, 0), np.uint16), np.zeros((0, 0), np.float32)
         background.lit = LitBackground(self.lighting, self.room, rgb, *nothing, runs)
         return background.lit
 
-    def draw(
-        self, lit: LitBackground, spans: NDArray[np.int32], drawn: DrawnPixels, view: PixelRays
-    ) -> NDArray[np.uint8]:
+    def draw(self, lit: LitBackground, drawn: DrawnPixels, view: PixelRays) -> NDArray[np.uint8]:
         """Return the picture, (h, w, 3): the background with the moving meshes and what they keep from it.
 
         Args:
             lit: the background in this light.
-            spans: spans of pixels that may show moving meshes.
             drawn: what the pixels show.
             view: rays of the pixels.
         """
@@ -269,5 +265,6 @@ class LitScene:
         posed, emission = self._posed_finishes, topology.emission[first[0] :]
         finishes = MATTE if posed is None else posed.arrays(view)
         light = FaceLight(emission, self.room.exposure, self.moving_light, samples.corner_samples, samples.divisions)
-        shade_lit(spans, drawn, self.geometry.faces, view.to_rays, light, first, finishes, tone.table(), rgb)
+        pixels, faces = drawn.shown(drawn.triangle >= first[0]), self.geometry.faces
+        shade_lit(pixels, drawn.corners, faces, view.to_rays, light, first, finishes, tone.table(), rgb)
         return rgb

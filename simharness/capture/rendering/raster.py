@@ -12,26 +12,17 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mvpose.camera import Camera
 from simharness.capture.rendering.backgrounds import Background, Backgrounds, LitBackground, fill_empty
 from simharness.capture.rendering.lens import through_lens
 from simharness.capture.rendering.lit_scene import LitScene
-from simharness.capture.rendering.raster_kernels import LONGEST_SIDE, draw_projected, rasterise
+from simharness.capture.rendering.raster_kernels import LONGEST_SIDE, pixels_of, rasterise
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, Renderer, Unavailable, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.shading_kernels import DistantLight, shade
 from simharness.capture.rendering.shadow_maps import NO_SHADOW, SHADOW_SIZE, LightView, shadow_places
 from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
-from simharness.capture.rendering.vertex_kernels import (
-    copied_pixels,
-    covering_spans,
-    mark_visible,
-    picture_spans,
-    project_vertices,
-    restore_pixels,
-)
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.world.rigs.projection import projection_matrix
@@ -94,40 +85,31 @@ class RasterRenderer:
 
 
 def _picture(scene: _Scene, camera: Camera, color: bool, lighting: Lighting, parts: bool) -> Image:
-    """Draw the moving meshes into the background of a camera, and take them out again when the picture is done."""
+    """Draw the moving meshes over the background of a camera."""
     geometry, background = scene.geometry, _background(scene, camera)
     topology, (width, height) = geometry.topology, camera.size
-    inverse_depth, triangle, first = background.inverse_depth, background.triangle, topology.still[0]
-    projected = project_vertices(geometry.vertices, projection_matrix(camera), NEAR, background.corners, width, height)
-    view, drawn = PixelRays(camera.center, background.to_rays), DrawnPixels(triangle, inverse_depth, projected[0])
-    sources = None
+    inverse_depth, triangle, first = background.inverse_depth.copy(), background.triangle.copy(), topology.still[0]
+    moving = pixels_of(geometry.moving_vertices, projection_matrix(camera))
+    corners = np.concatenate([background.corners, moving])
+    rasterise(topology.faces, corners, NEAR, inverse_depth, triangle, first)
+    view, drawn = PixelRays(camera.center, background.to_rays), DrawnPixels(triangle, inverse_depth, corners)
+    rgb = np.zeros((height, width, 3), np.uint8)
     if color:
         scene.lit = sources = LitScene.in_light(geometry, lighting, scene.lit)
-    if sources is not None:
-        lit = sources.background(background, view)
-    elif color:
-        lit = _lit(background, geometry, view, lighting)
-    else:
-        rgb = np.zeros((height, width, 3), np.uint8)
-    ids = _ids(background, topology.mesh).copy()
-    spans = covering_spans(projected[2], topology.moving_starts, height, width)
-    hidden = copied_pixels(spans, inverse_depth, triangle)
-    try:
-        draw_projected(topology.faces, projected, NEAR, inverse_depth, triangle, first)
-        mark_visible(spans, triangle, topology.mesh, ids)
-        with np.errstate(divide="ignore"):
-            depth = np.reciprocal(inverse_depth)  # infinite without a surface
-        labels = topology.parts[triangle] if parts else None
         if sources is not None:
-            rgb = sources.draw(lit, spans, drawn, view)
-        elif color:
-            rgb, maps = lit.rgb.copy(), geometry.shadows(lighting)
+            rgb = sources.draw(sources.background(background, view), drawn, view)
+        else:
+            lit, maps = _lit(background, geometry, view, lighting), geometry.shadows(lighting)
+            rgb = lit.rgb.copy()
             if len(topology.faces):
-                light, places = _distant(lighting, maps.light), (lit.shadow_place, lit.shadow_depth)
-                shade(drawn, geometry.faces, view, light, (maps.still, maps.moving), places, first, rgb)
-    finally:
-        restore_pixels(spans, *hidden, inverse_depth, triangle)
-    return Image(rgb=rgb, depth=depth, ids=ids, parts=labels)
+                # New are the moving meshes, and what of the others their shadows may fall on.
+                shaded_from = np.append(maps.moving.blocks, np.float32(0.0))
+                new = drawn.shown((triangle >= first) | (shaded_from[lit.shadow_place] > lit.shadow_depth))
+                light = _distant(lighting, maps.light)
+                shade(new, drawn, geometry.faces, view, light, (maps.still, maps.moving), rgb)
+    with np.errstate(divide="ignore"):
+        depth = np.reciprocal(inverse_depth)  # infinite without a surface
+    return Image(rgb=rgb, depth=depth, ids=topology.mesh[triangle], parts=topology.parts[triangle] if parts else None)
 
 
 def _background(scene: _Scene, camera: Camera) -> Background:
@@ -137,21 +119,11 @@ def _background(scene: _Scene, camera: Camera) -> Background:
     if found is None:
         still = scene.geometry.still
         inverse_depth, triangle = np.zeros(shape, np.float32), np.full(shape, -1, np.int32)
-        faces = still.topology.faces
-        corners = rasterise(still.vertices, faces, projection, NEAR, inverse_depth, triangle)
-        labels, ids = scene.geometry.topology.mesh, np.empty(shape, np.int16)
-        mark_visible(picture_spans(*shape), triangle, labels, ids)
-        rays = np.ascontiguousarray(np.linalg.inv(projection[:, :3]))
-        found = Background(rays, inverse_depth, triangle, corners, labels, ids)
+        corners = pixels_of(still.vertices, projection)
+        rasterise(still.topology.faces, corners, NEAR, inverse_depth, triangle, 0)
+        found = Background(np.ascontiguousarray(np.linalg.inv(projection[:, :3])), inverse_depth, triangle, corners)
         scene.backgrounds.keep(projection, camera.size, found)
     return found
-
-
-def _ids(background: Background, labels: NDArray[np.int16]) -> NDArray[np.int16]:
-    """Return the mesh at every pixel of a background; it changes with the order of the meshes in the scene."""
-    if background.labels is not labels:
-        background.labels, background.ids = labels, labels[background.triangle]
-    return background.ids
 
 
 def _lit(background: Background, geometry: SceneGeometry, view: PixelRays, lighting: Lighting) -> LitBackground:
@@ -164,7 +136,7 @@ def _lit(background: Background, geometry: SceneGeometry, view: PixelRays, light
         places = shadow_places(drawn.triangle, drawn.inverse_depth, view, maps.light.projection, SHADOW_SIZE)
         if len(geometry.topology.faces):
             light = _distant(lighting, maps.light)
-            shade(drawn, geometry.faces, view, light, (maps.still, NO_SHADOW), places, 0, rgb)
+            shade(drawn.shown(drawn.triangle >= 0), drawn, geometry.faces, view, light, (maps.still, NO_SHADOW), rgb)
         background.lit = LitBackground(lighting, maps.light, rgb, places[0], places[1], np.zeros((0, 5), np.int32))
     return background.lit
 

@@ -52,12 +52,6 @@ class SceneTopology:
         return self.faces[faces:] - np.uint32(vertices)
 
     @cached_property
-    def moving_starts(self) -> NDArray[np.int64]:
-        """First vertex of each of the other meshes, and the end of all vertices, (moving meshes + 1,)."""
-        counts = [len(mesh.vertices) for mesh in self.meshes if not mesh.still]
-        return np.cumsum([self.still[1], *counts])
-
-    @cached_property
     def mesh(self) -> NDArray[np.int16]:
         """Mesh index of every face, then -1 for face -1 (no face), (k + 1,)."""
         return np.append(self._per_face(self.order or range(len(self.meshes))), -1).astype(np.int16)

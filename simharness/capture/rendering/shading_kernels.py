@@ -1,6 +1,6 @@
 """Compiled shading of pixels, in the two light models of :class:`simharness.types.lighting.Lighting`.
 
-Pixels that are new are listed row by row, and shaded ``PIXELS`` at a time. First
+Pixels that are new are shaded ``PIXELS`` at a time. First
 :func:`~simharness.capture.rendering.surface_kernels.gather` writes what their surfaces are like (albedo, normal) to
 memory. Then the light on them is computed from it, by loops with the same rule for every pixel, which the compiler
 vectorises.
@@ -68,33 +68,28 @@ class DistantLight(NamedTuple):
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def shade(
+    pixels: tuple[np.ndarray, ...],
     drawn: DrawnPixels,
     faces: FaceArrays,
     view: PixelRays,
     light: DistantLight,
     maps: tuple[ShadowMap, ShadowMap],
-    places: tuple[np.ndarray, np.ndarray],
-    first_face: int,
     rgb: np.ndarray,
 ) -> None:
     """Colour pixels in place, by the rule of :class:`simharness.types.lighting.Lighting` in closed form.
 
     Args:
-        drawn: what the pixels show.
+        pixels: the pixels to colour, see :meth:`.surface_kernels.DrawnPixels.shown`.
+        drawn: what all pixels show.
         faces: all faces.
         view: rays of the pixels.
         light: the lighting.
         maps: shadow maps of still meshes, and of the others.
-        places: place in the shadow maps of what each pixel shows of still meshes, and its inverse depth from the light,
-            see :func:`.shadow_maps.shadow_places`.
-        first_face: first face of the meshes that are not still. Only pixels that show them are coloured, and those of
-            still meshes on which their shadows may fall.
         rgb: picture to change, (h, w, 3) uint8, sRGB.
     """
-    triangle, inverse_depth, corners = drawn
+    labels, columns, lines = pixels
     center, rays = view
-    light_P, gains, (shadow_place, shadow_depth) = light.projection, light.gains, places
-    height, width = triangle.shape
+    light_P, gains = light.projection, light.gains
     # Shadow map position of a pixel times its inverse depth: away * inverse depth + seen @ (x, y, 1), homogeneous.
     seen, away = np.zeros((3, 3)), np.zeros(3)
     for i in range(3):
@@ -102,7 +97,6 @@ def shade(
         for j in range(3):
             for k in range(3):
                 seen[i, j] += light_P[i, k] * rays[k, j]
-    shaded_from = np.append(maps[1].blocks.ravel(), np.float32(0.0))
     surfaces = memory()
     narrow = surfaces[0]
     # For every pixel: light with and without the key light; position in the shadow map and inverse depth there.
@@ -110,39 +104,25 @@ def shade(
     map_x, map_y, near = np.empty(PIXELS, np.float32), np.empty(PIXELS, np.float32), np.empty(PIXELS, np.float32)
     lit = key_light, other_light, map_x, map_y, near
     gain_red, gain_green, gain_blue = np.float32(gains[0]), np.float32(gains[1]), np.float32(gains[2])
-    most = PIXELS + width
-    labels, columns, lines = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.int32)
-    depths, count = np.empty(most, np.float32), 0
-    for y in range(height + 1):
-        if y < height:
-            begin = count
-            for x in range(width):
-                columns[np.uint32(count)] = x
-                count += (triangle[y, x] >= first_face) | (shaded_from[shadow_place[y, x]] > shadow_depth[y, x])
-            for n in range(begin, count):
-                labels[n], lines[n], depths[n] = triangle[y, columns[n]], y, inverse_depth[y, columns[n]]
-        done = 0
-        while done + PIXELS <= count or (y == height and done < count):
-            size = min(count - done, PIXELS)
-            chunk = slice(done, done + size)
-            pixels = labels[chunk], columns[chunk], lines[chunk]
-            gather(pixels, corners, faces, surfaces)
-            _light(pixels, depths[chunk], narrow, rays, light, (seen, away), lit)
-            darken(key_light[:size], map_x[:size], map_y[:size], near[:size], maps[0], maps[1])
-            for n in range(PIXELS):
-                bright = np.float32(math.sqrt(min(other_light[n] + key_light[n], np.float32(_BRIGHTEST))))
-                for k, gain in ((RED, gain_red), (GREEN, gain_green), (BLUE, gain_blue)):
-                    narrow[k + n] = min(bright * (gain * narrow[k + n]) + np.float32(0.5), np.float32(255.0))
-            for n in range(size):
-                y_n, x_n = lines[done + n], columns[done + n]
-                rgb[y_n, x_n, 0] = np.uint8(narrow[RED + n])
-                rgb[y_n, x_n, 1] = np.uint8(narrow[GREEN + n])
-                rgb[y_n, x_n, 2] = np.uint8(narrow[BLUE + n])
-            done += size
-        for n in range(count - done):
-            labels[n], columns[n], lines[n] = labels[done + n], columns[done + n], lines[done + n]
-            depths[n] = depths[done + n]
-        count -= done
+    depths = np.empty(PIXELS, np.float32)
+    for done in range(0, len(labels), PIXELS):
+        chunk = slice(done, min(done + PIXELS, len(labels)))
+        some = labels[chunk], columns[chunk], lines[chunk]
+        size = len(some[0])
+        for n in range(size):
+            depths[n] = drawn.inverse_depth[lines[done + n], columns[done + n]]
+        gather(some, drawn.corners, faces, surfaces)
+        _light(some, depths[:size], narrow, rays, light, (seen, away), lit)
+        darken(key_light[:size], map_x[:size], map_y[:size], near[:size], maps[0], maps[1])
+        for n in range(PIXELS):
+            bright = np.float32(math.sqrt(min(other_light[n] + key_light[n], np.float32(_BRIGHTEST))))
+            for k, gain in ((RED, gain_red), (GREEN, gain_green), (BLUE, gain_blue)):
+                narrow[k + n] = min(bright * (gain * narrow[k + n]) + np.float32(0.5), np.float32(255.0))
+        for n in range(size):
+            y_n, x_n = lines[done + n], columns[done + n]
+            rgb[y_n, x_n, 0] = np.uint8(narrow[RED + n])
+            rgb[y_n, x_n, 1] = np.uint8(narrow[GREEN + n])
+            rgb[y_n, x_n, 2] = np.uint8(narrow[BLUE + n])
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
@@ -216,8 +196,8 @@ class FaceLight(NamedTuple):
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def shade_lit(
-    spans: np.ndarray,
-    drawn: DrawnPixels,
+    pixels: tuple[np.ndarray, ...],
+    corners: np.ndarray,
     faces: FaceArrays,
     rays: np.ndarray,
     light: FaceLight,
@@ -229,8 +209,8 @@ def shade_lit(
     """Colour the pixels that show some faces, in place.
 
     Args:
-        spans: spans of pixels that may show them, see :func:`.vertex_kernels.covering_spans`.
-        drawn: what the pixels show.
+        pixels: the pixels that show them, see :meth:`.surface_kernels.DrawnPixels.shown`.
+        corners: homogeneous pixel coordinates of all vertices, (n, 3).
         faces: all faces.
         rays: matrix that turns pixels into rays, (3, 3).
         light: light of the faces to colour.
@@ -239,46 +219,31 @@ def shade_lit(
         curve: tone curve, see :func:`.tone.table`.
         rgb: picture to change, (h, w, 3) uint8, sRGB.
     """
-    triangle, first_face = drawn.triangle, first[0]
+    labels, columns, lines = pixels
     surfaces = memory()
     narrow = surfaces[0]
     received, index = np.zeros(_RECEIVED, np.float32), np.zeros(3 * PIXELS, np.uint32)
     work = np.zeros(FINISHING, np.float32)
-    most = PIXELS + triangle.shape[1]
-    labels, columns, lines = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.int32)
     top = np.float32(len(curve) - 1)
-    scale, count = np.float32(top * top / BRIGHTEST), 0
-    for span in range(len(spans)):
-        begin, y = count, spans[span, 0]
-        for x in range(spans[span, 1], spans[span, 2]):
-            columns[np.uint32(count)] = x
-            count += triangle[y, x] >= first_face
-        for n in range(begin, count):
-            labels[n], lines[n] = triangle[y, columns[n]], y
-        done = 0
-        while done + PIXELS <= count or (span == len(spans) - 1 and done < count):
-            size = min(count - done, PIXELS)
-            chunk = slice(done, done + size)
-            pixels = labels[chunk], columns[chunk], lines[chunk]
-            gather(pixels, drawn.corners, faces, surfaces)
-            _receive(labels[chunk], narrow, light, first_face, received)
-            if len(finishes.material):
-                finish(pixels, first, faces.faces, rays, narrow, finishes, work, received)
-            for row in range(0, 3 * PIXELS, PIXELS):
-                for n in range(PIXELS):
-                    dye = narrow[RED + row + n]
-                    value = received[row + n] * (dye * (dye * (dye * _CUBE + _SQUARE) + _PLAIN) + work[GLOSS + n])
-                    step = min(np.float32(math.sqrt(scale * max(value, _ZERO))), top)
-                    index[row + n] = np.uint32(np.int32(step + np.float32(0.5)))
-            for n in range(size):
-                row, column = lines[done + n], columns[done + n]
-                rgb[row, column, 0] = curve[index[RED + n]]
-                rgb[row, column, 1] = curve[index[GREEN + n]]
-                rgb[row, column, 2] = curve[index[BLUE + n]]
-            done += size
-        for n in range(count - done):
-            labels[n], columns[n], lines[n] = labels[done + n], columns[done + n], lines[done + n]
-        count -= done
+    scale = np.float32(top * top / BRIGHTEST)
+    for done in range(0, len(labels), PIXELS):
+        chunk = slice(done, min(done + PIXELS, len(labels)))
+        some = labels[chunk], columns[chunk], lines[chunk]
+        gather(some, corners, faces, surfaces)
+        _receive(labels[chunk], narrow, light, first[0], received)
+        if len(finishes.material):
+            finish(some, first, faces.faces, rays, narrow, finishes, work, received)
+        for row in range(0, 3 * PIXELS, PIXELS):
+            for n in range(PIXELS):
+                dye = narrow[RED + row + n]
+                value = received[row + n] * (dye * (dye * (dye * _CUBE + _SQUARE) + _PLAIN) + work[GLOSS + n])
+                step = min(np.float32(math.sqrt(scale * max(value, _ZERO))), top)
+                index[row + n] = np.uint32(np.int32(step + np.float32(0.5)))
+        for n in range(len(some[0])):
+            row, column = lines[done + n], columns[done + n]
+            rgb[row, column, 0] = curve[index[RED + n]]
+            rgb[row, column, 1] = curve[index[GREEN + n]]
+            rgb[row, column, 2] = curve[index[BLUE + n]]
 
 
 @njit(cache=True, borrows=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.raster_kernels import rasterise
+from simharness.capture.rendering.raster_kernels import pixels_of, rasterise
 from simharness.capture.rendering.surface_kernels import PixelRays
 from simharness.types.lighting import facing
 
@@ -94,7 +94,8 @@ def shadow_map(light: LightView, vertices: Floats, faces: NDArray[np.uint32]) ->
     if not len(faces):
         return NO_SHADOW
     unused = np.empty(nearest.shape, np.int32)  # which face it is
-    corners = rasterise(vertices, faces, light.projection, light.radius, nearest, unused)
+    corners = pixels_of(vertices, light.projection)
+    rasterise(faces, corners, light.radius, nearest, unused, 0)
     rows = corners[:, 1] / corners[:, 2]
     return ShadowMap(nearest, nearest_blocks(nearest, max(int(rows.min()) - 1, 0), int(rows.max()) + 2))
 

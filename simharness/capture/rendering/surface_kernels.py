@@ -81,6 +81,11 @@ class DrawnPixels(NamedTuple):
     corners: NDArray[np.float64]
     """Homogeneous pixel coordinates of the vertices, (n, 3)."""
 
+    def shown(self, chosen: NDArray[np.bool_]) -> tuple[NDArray[np.int32], ...]:
+        """Return visible face, column and row of chosen (h, w) pixels, (n,) int32 each, row by row."""
+        rows, columns = np.nonzero(chosen)
+        return self.triangle[rows, columns], columns.astype(np.int32), rows.astype(np.int32)
+
 
 class PixelRays(NamedTuple):
     """Rays of a camera: ``center + depth * to_rays @ (x, y, 1)`` is the point at a pixel."""
