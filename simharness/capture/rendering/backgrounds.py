@@ -36,9 +36,6 @@ class LitBackground:
     :func:`~simharness.capture.rendering.shadow_maps.shadow_places`; empty with sources."""
     shadow_depth: NDArray[np.float32]
     """Inverse depth of each pixel from the light, (h, w) float32; empty with sources."""
-    runs: NDArray[np.int32]
-    """Runs of pixels over the blocks of :class:`~simharness.capture.rendering.lit_scene.ShadowGrid`, (n, 5): see
-    :func:`~simharness.capture.rendering.shaded_pixels.runs_below`; empty without sources."""
 
 
 @dataclass
@@ -63,7 +60,7 @@ class Background:
         """Bytes of memory, with those of colours, whether they were requested or not."""
         count = self.inverse_depth.nbytes + self.triangle.nbytes + self.corners.nbytes
         if self.lit is not None:
-            count += self.lit.shadow_place.nbytes + self.lit.shadow_depth.nbytes + self.lit.runs.nbytes
+            count += self.lit.shadow_place.nbytes + self.lit.shadow_depth.nbytes
         return count + 3 * self.triangle.size
 
 

@@ -18,7 +18,7 @@ from simharness.capture.rendering.moving_light import MovingMeshes, capsules, mo
 from simharness.capture.rendering.moving_shadows import BLOCK, ShadowLayer, UpwardLight, cast, touched_blocks
 from simharness.capture.rendering.room_light import RoomLight, last_light, room_light
 from simharness.capture.rendering.scene_geometry import SceneGeometry
-from simharness.capture.rendering.shaded_pixels import BlockGrid, ShadowLayers, dim, runs_below
+from simharness.capture.rendering.shaded_pixels import ShadowLayers, dim
 from simharness.capture.rendering.shading_kernels import FaceLight, shade_lit
 from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
 from simharness.types.lighting import Lighting
@@ -113,12 +113,6 @@ class ShadowGrid:
         cell = max(_CELL, float(extent.max()) / _MOST_CELLS)
         columns, rows = (np.ceil(extent / (BLOCK * cell)).astype(int) * BLOCK).tolist()
         return cls(probes.origin[:2] - 0.06, cell, (rows, columns))
-
-    @property
-    def blocks(self) -> BlockGrid:
-        """Blocks of cells."""
-        rows, columns = self.shape
-        return BlockGrid(self.corner, BLOCK * self.cell, rows // BLOCK, columns // BLOCK)
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,10 +236,8 @@ class LitScene:
             emission = still.topology.emission
             light = FaceLight(emission, room.exposure, room.light, samples.corner_samples, samples.divisions)
             shade_lit(pixels, background.corners, still.faces, view.to_rays, light, (0, 0), MATTE, tone.table(), rgb)
-        blocks = ShadowGrid.around_probes(room).blocks
-        runs = runs_below(triangle, inverse_depth, view, blocks, float(_HEIGHTS[-1]))
         nothing = np.zeros((0, 0), np.uint16), np.zeros((0, 0), np.float32)
-        background.lit = LitBackground(self.lighting, self.room, rgb, *nothing, runs)
+        background.lit = LitBackground(self.lighting, self.room, rgb, *nothing)
         return background.lit
 
     def draw(self, lit: LitBackground, drawn: DrawnPixels, view: PixelRays) -> NDArray[np.uint8]:
@@ -261,7 +253,7 @@ class LitScene:
         if first[0] == len(topology.faces):
             return rgb
         if first[0]:
-            dim(drawn.inverse_depth, lit.runs, view, self.shadows, tone.dimming(), rgb)
+            dim(drawn, first[0], view, self.shadows, tone.dimming(), rgb)
         posed, emission = self._posed_finishes, topology.emission[first[0] :]
         finishes = MATTE if posed is None else posed.arrays(view)
         light = FaceLight(emission, self.room.exposure, self.moving_light, samples.corner_samples, samples.divisions)

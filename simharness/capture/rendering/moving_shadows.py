@@ -202,24 +202,14 @@ def _brought(
     return value * ahead ** areas[m, 10] if areas[m, 10] > 0 else value
 
 
-@njit(cache=True, error_model="numpy")
-def touched_blocks(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:
-    """Return which blocks of a map are dark anywhere, (blocks + 1,) bool; the last, for none, is False.
+def touched_blocks(fine: NDArray[np.float32], coarse: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Return which blocks of a map are dark anywhere, (rows, columns) bool.
 
     Args:
-        fine: map of the floor, (rows, columns).
-        coarse: maps at several heights, in cells twice as large, (heights, rows / 2, columns / 2).
+        fine: map of the floor, in cells of whole blocks.
+        coarse: maps at several heights, in cells twice as large, (heights, rows / 2, columns / 2), first the floor's.
     """
-    rows, columns = fine.shape
-    wide = columns // BLOCK
-    touched = np.zeros(rows // BLOCK * wide + 1, np.bool_)
-    for j in range(rows):
-        for i in range(columns):
-            if fine[j, i] < _SEEN:
-                touched[j // BLOCK * wide + i // BLOCK] = True
-    for layer in range(1, coarse.shape[0]):
-        for j in range(rows // 2):
-            for i in range(columns // 2):
-                if coarse[layer, j, i] < _SEEN:
-                    touched[2 * j // BLOCK * wide + 2 * i // BLOCK] = True
-    return touched
+    rows, columns = fine.shape[0] // BLOCK, fine.shape[1] // BLOCK
+    on_floor = fine.reshape(rows, BLOCK, columns, BLOCK).min(axis=(1, 3))
+    above = coarse[1:].reshape(-1, rows, BLOCK // 2, columns, BLOCK // 2).min(axis=(0, 2, 4))
+    return np.minimum(on_floor, above) < _SEEN

@@ -137,7 +137,7 @@ def _lit(background: Background, geometry: SceneGeometry, view: PixelRays, light
         if len(geometry.topology.faces):
             light = _distant(lighting, maps.light)
             shade(drawn.shown(drawn.triangle >= 0), drawn, geometry.faces, view, light, (maps.still, NO_SHADOW), rgb)
-        background.lit = LitBackground(lighting, maps.light, rgb, places[0], places[1], np.zeros((0, 5), np.int32))
+        background.lit = LitBackground(lighting, maps.light, rgb, *places)
     return background.lit
 
 

@@ -77,7 +77,6 @@ def test_a_failed_compilation_does_not_end_the_run():
 
 PICTURES = """
 from numba.core.dispatcher import Dispatcher
-from simharness.capture import raw
 from simharness.capture.rendering import finishes, light_kernels, moving_light, moving_shadows
 from simharness.capture.rendering import shaded_pixels, shading_kernels
 from simharness.scenario.load import load
@@ -85,13 +84,13 @@ from simharness.trial.kernel_compilation import compile_pictures
 from simharness.trial.run_trial import run_trial
 
 def of_pictures():
-    modules = raw, finishes, light_kernels, moving_light, moving_shadows, shaded_pixels, shading_kernels
+    modules = finishes, light_kernels, moving_light, moving_shadows, shaded_pixels, shading_kernels
     kernels = [each for module in modules for each in vars(module).values() if isinstance(each, Dispatcher)]
     return {each.py_func.__qualname__: list(each.signatures) for each in kernels}
 
 compile_pictures()
 compiled = of_pictures()
-for kernel in ("shade_lit", "cast", "dim", "runs_below", "moving_light", "probe_light", "expose"):
+for kernel in ("shade_lit", "cast", "dim", "moving_light", "probe_light"):
     assert compiled[kernel], kernel
 run_trial(load("quickstart", overrides=["duration=0.1"]), until="detect", previews=[0])
 assert compiled == of_pictures(), "pictures need other kernels, or for other arguments"
