@@ -11,19 +11,20 @@ from matplotlib.patches import Polygon
 
 from mvpose.arrays import Floats
 from mvpose.camera import Camera
-from mvpose.report.svg_plots import FAINT, INK, Color
+from mvpose.report.svg_plots import FAINT, INK, Color, text_width
 
 _LEVEL = 1e-6  # horizontal part of a viewing direction below which the camera looks straight down
 
 
 _POINTS = 72.0  # in an inch
-_LETTER, _LINE = 0.58, 1.15  # mean width of a letter and height of a line, as shares of the font size
+_LINE, _APART = 1.15, 2.0  # height of a line as a share of the font size, and points between two labels
 _DOT = 4.0  # points: half the side of the square around a place that labels keep free
-_GAPS = (3.0, 9.0, 16.0)  # points between a place and its label
+_GAPS = (3.0, 9.0, 16.0, 26.0, 38.0)  # points between a place and its label
 _TURNS = np.radians([0, 30, -30, 60, -60, 90, -90, 135, -135, 180])  # from the preferred direction
 _TURN_COST = 12.0  # of a label in the opposite direction; points squared, as all costs
 _GAP_COST = 1.5  # of a point between a place and its label
 _LINE_COST = 14.0  # of a point of a line behind a label
+_LABEL_COST = 50.0  # factor of an area that two labels share: worse than any line
 _OUTSIDE = 6.0  # factor of an area outside of the map
 
 
@@ -102,7 +103,7 @@ class MapLabel:
     def extent(self) -> Floats:
         """Width and height, points."""
         lines = self.text.split("\n")
-        return self.size * np.array([_LETTER * max(map(len, lines)), _LINE * len(lines)])
+        return self.size * np.array([max(map(text_width, lines)), _LINE * len(lines)])
 
 
 def write_labels(
@@ -135,10 +136,9 @@ def write_labels(
     for corners in areas:
         lower, upper = _points(axes, axes.transData.transform(np.array(corners)))
         taken.append((lower, upper))
-    placed = []
+    placed: list[tuple[Floats, Floats]] = []
     for label, dot in zip(labels, dots, strict=True):
-        box = _best_box(label, dot, taken, segments, (low, high))
-        taken.append(box)
+        box = _best_box(label, dot, taken, segments, (low, high), labels=placed)
         placed.append(box)
         axes.annotate(
             label.text, tuple(label.place), xytext=tuple((box[0] + box[1]) / 2 - dot), textcoords="offset points",
@@ -158,6 +158,8 @@ def _best_box(
     taken: Sequence[tuple[Floats, Floats]],
     segments: Sequence[Floats],
     inside: tuple[Floats, Floats],
+    *,
+    labels: Sequence[tuple[Floats, Floats]],
 ) -> tuple[Floats, Floats]:
     """Return the corners of the box of a label with the least cost, all in points."""
     half = label.extent / 2
@@ -170,6 +172,8 @@ def _best_box(
             box = (center - half, center + half)
             cost = _TURN_COST * abs(turn) / np.pi + _GAP_COST * gap
             cost += sum(shared_area(box, other) for other in taken)
+            wide = (box[0] - _APART, box[1] + _APART)
+            cost += _LABEL_COST * sum(shared_area(wide, other) for other in labels)
             cost += _LINE_COST * sum(length_within(segment, box) for segment in segments)
             cost += _OUTSIDE * (float(np.prod(box[1] - box[0])) - shared_area(box, inside))
             if cost < least:

@@ -89,7 +89,7 @@ def legend_above(axes: Axes, *, columns: int | None = None) -> None:
     if names:
         figure = axes.get_figure(root=True)
         assert figure is not None
-        fitting, size = _fitting_columns([_text_width(name) for name in names], 72 * figure.get_figwidth())
+        fitting, size = _fitting_columns([text_width(name) for name in names], 72 * figure.get_figwidth())
         figure.legend(
             handles,
             names,
@@ -105,7 +105,7 @@ def legend_above(axes: Axes, *, columns: int | None = None) -> None:
         )
 
 
-def _text_width(text: str) -> float:
+def text_width(text: str) -> float:
     """Return the width of a text in Matplotlib's own font, which is wider than those of most pages, in font sizes."""
     width, _, _ = text_to_path.get_text_width_height_descent(text, FontProperties(size=100), ismath=False)
     return float(width) / 100

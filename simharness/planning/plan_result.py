@@ -179,6 +179,9 @@ class RigPlan:
         }
 
 
+_NEARLY_ALL = 98.0  # PCP: more cameras add little
+
+
 def sentences(plan: RigPlan) -> list[str]:
     """Return what the plan says in plain sentences, the most important first."""
     room, figures, target = plan.room, plan.figures, plan.room.keys.target
@@ -201,6 +204,13 @@ def sentences(plan: RigPlan) -> list[str]:
         lines.append(f"{enough[0].cameras} cameras would be enough for this target everywhere in the volume.")
     elif enough and enough[0].cameras > now:
         lines.append(f"{enough[0].cameras} cameras would bring the whole volume within the target.")
+    fewest = next((p for p in plan.curve if p.figures.pcp.mean >= _NEARLY_ALL), None)
+    if fewest is not None and fewest.cameras < now:
+        got = fewest.figures
+        lines.append(
+            f"{fewest.cameras} cameras already give {got.pcp.mean:.1f} PCP and {got.error_mm.mean:.0f} mm by the fast "
+            f"layer, {now} give {plan.best.predicted.pcp.mean:.1f} and {plan.best.predicted.error_mm.mean:.0f}."
+        )
     more = next((p for p in plan.curve if p.cameras == now + 1), None)
     same = next((p for p in plan.curve if p.cameras == now), None)
     if more is not None and same is not None:

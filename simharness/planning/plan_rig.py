@@ -29,7 +29,7 @@ from simharness.planning.forecast_error import ForecastErrors
 from simharness.planning.plan_result import Alternative, CurvePoint, Figures, PlannedCamera, RigPlan
 from simharness.planning.planned_room import Room
 from simharness.planning.rig_comparison import VARIANT, corner_rig, fit_value, layer_of, rig_of, ring_rig, simulate_rigs
-from simharness.planning.rig_value import RigValue
+from simharness.planning.rig_value import ERROR, RigValue
 from simharness.planning.room_file import read_room
 from simharness.planning.search import CandidateSet, Ledger, Limits, exchange_search, refine
 from simharness.planning.simulated_scenes import interval_of
@@ -278,10 +278,11 @@ class _Work:
         return sorted(results, key=lambda pair: -self._objective(pair[1]))
 
     def _objective(self, figures: Figures) -> float:
-        """Return the objective of the room by figures; ties are broken by the mean PCP."""
+        """Return the objective of the room by figures; ties are broken by the mean PCP and the error."""
         kind = self.room.keys.objective.kind
         main = {"mean": 0.0, "share": figures.share, "worst": figures.worst}[kind]
-        return main + (1.0 if kind == "mean" else 1e-3) * figures.pcp.mean
+        off = ERROR * min(figures.error_mm.mean / self.room.keys.target.error, 1.0)
+        return main + (1.0 if kind == "mean" else 1e-3) * figures.pcp.mean - off
 
     def _usual(self, free: int) -> list[tuple[str, Rig, Figures]]:
         """Return the rigs that people hang without a plan, with their figures by the fast layer."""

@@ -58,7 +58,7 @@ class CameraWorth:
 
     @property
     def redundant(self) -> bool:
-        """Whether its failure costs less than :data:`LITTLE` points of PCP, by the whole interval."""
+        """Whether its failure alone costs less than :data:`LITTLE` points of PCP, by the whole interval."""
         return self.without is not None and self.worth.high < LITTLE
 
     @property
@@ -300,10 +300,12 @@ def _cameras(rehearsal: Rehearsal) -> str:
         )
     if redundant:
         names = [each.camera.name for each in redundant]
-        which = f"camera {names[0]}" if len(names) == 1 else f"any one of the cameras {_listed(names)}"
-        parts.append(f"{which} is redundant: its failure costs less than {LITTLE:g} points")
+        which = "any camera" if len(names) == len(worths) else "any of " + _listed(names)
+        which = f"camera {names[0]}" if len(names) == 1 else which
+        alone = " alone, not several at once" if len(names) > 1 else ""
+        parts.append(f"{which} could be spared{alone}: its failure costs less than {LITTLE:g} points of PCP")
     if len(needed) == len(worths):
-        parts.append("no camera is redundant")
+        parts.append("no camera can be spared")
     return _sentence("; ".join(parts))
 
 

@@ -64,7 +64,7 @@ def write_rig(rig: Rig, room: Room, path: Path, *, comments: Sequence[str] = ())
         path: the TOML file.
         comments: lines at its top.
     """
-    head = [f"# {each}" for each in (f"Planned rig of the room {room.name}.", *comments)]
+    head = [f"# {each}" for each in (f"Planned rig of {room.name}.", *comments)]
     first = rig[0]
     if all(_same_lens(first, each) for each in rig) and all(_upright(each) for each in rig):
         keys = {

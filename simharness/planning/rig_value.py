@@ -40,10 +40,16 @@ _HEAD_LENGTH = 0.3  # metres: from the chin to the top of the head
 _SHARPNESS = (1.5, 4.0)  # PCP and mm over which the share of places within the target falls, for the search
 _LOWEST = 0.1  # of the places: "worst" is their mean in the search
 _MEAN, _SEEN, _WHOLE = 0.05, 0.5, 0.05  # weights of what guides the search where the objective itself is flat
+_DIM, _SPARE = 0.8, 0.05  # share of its sightings that a doubtful camera makes, and weight of the value with such ones
+_EVERY = 3  # of so many people one is looked at for that value: it needs no more, and a search is twice as fast
 _FALSE = 0.1  # metres across the ray: farther keypoints are false, as are guesses at hidden joints
 _BINS = np.array([0.25, 0.5, 0.75, 0.95])  # of the share of a person's joints that the camera sees
 _PRIOR = 4.0  # sightings: weight of the odds over all bins, and over all joints, where there are few
 _LEAST = 0.5  # pixels: least standard deviation of a keypoint
+
+
+ERROR = 2.0
+"""Points off the objective for an error as large as the target, and in proportion for smaller ones."""
 
 
 @dataclass(frozen=True)
@@ -170,28 +176,32 @@ class RigValue:
 
     def maps(self, terms: Sequence[Floats]) -> Maps:
         """Return the figures of a set of cameras."""
-        return self._maps(self._sum(terms), None)
+        return self._maps(self._sum(terms), self._nothing)
 
     def value(self, terms: Sequence[Floats]) -> float:
         """Return the value of a set."""
         return float(self.values_with(terms, [self._nothing])[0])
 
     def values_with(self, terms: Sequence[Floats], others: Sequence[Floats]) -> Floats:
-        """Return the value of a set with each of other cameras added, (n,)."""
-        whole = self._sum(terms)
-        values = np.array([self._valued(self._maps(whole, other)) for other in others])
+        """Return the value of a set with each of other cameras added, (n,).
+
+        The value with doubtful cameras, each of which makes a part of its sightings, counts a little: of sets that all
+        reach the target, the one is better that has cameras to spare everywhere.
+        """
+        whole = self._states(terms)
+        values = np.array([self._with(whole, other) for other in others])
         failing = self.room.keys.objective.failing
         if not failing:
             return values
         count = len(terms)
         worst = np.full(len(others), np.inf)
         for lost in combinations(range(count), min(failing, count)):
-            rest = self._sum([terms[k] for k in range(count) if k not in lost])
+            rest = self._states([terms[k] for k in range(count) if k not in lost])
             for k, other in enumerate(others):
-                worst[k] = min(worst[k], self._valued(self._maps(rest, other)))
+                worst[k] = min(worst[k], self._with(rest, other))
         for lost in combinations(range(count), min(failing - 1, count)):
-            rest = self._sum([terms[k] for k in range(count) if k not in lost])
-            alone = self._valued(self._maps(rest, None))
+            rest = self._states([terms[k] for k in range(count) if k not in lost])
+            alone = self._with(rest, self._nothing)
             for k, other in enumerate(others):
                 if other is not self._nothing:
                     worst[k] = min(worst[k], alone)
@@ -201,17 +211,27 @@ class RigValue:
     def _nothing(self) -> Floats:
         return np.zeros((len(self._joints), len(_JOINTS), 6), np.float32)
 
-    def _sum(self, terms: Sequence[Floats]) -> Floats:
-        """Return the state of all joints with some cameras, (M, J, 10)."""
-        state = np.zeros((len(self._joints), len(_JOINTS), 10))
+    def _sum(self, terms: Sequence[Floats], *, every: int = 1) -> Floats:
+        """Return the state of all joints with some cameras, (m, J, 10), of everybody or of some people."""
+        state = np.zeros((len(self._place[::every]), len(_JOINTS), 10))
         state[..., 6] = 1.0
         for each in terms:
             _add(each, state)
         return state
 
-    def _maps(self, state: Floats, more: Floats | None) -> Maps:
+    def _states(self, terms: Sequence[Floats]) -> tuple[Floats, Floats]:
+        """Return the state of all joints with some cameras, and with the same cameras where they are doubtful."""
+        return self._sum(terms), self._sum([_dimmed(each) for each in terms], every=_EVERY)
+
+    def _with(self, states: tuple[Floats, Floats], more: Floats) -> float:
+        """Return the value of states with one more camera."""
+        whole, dim = self._maps(states[0], more), self._maps(states[1], _dimmed(more), every=_EVERY)
+        return self._valued(whole) + _SPARE * self._valued(dim)
+
+    def _maps(self, state: Floats, more: Floats, *, every: int = 1) -> Maps:
         sums = np.zeros((len(self.layer.places), 5))
-        _evaluate(state, self._nothing if more is None else more, self._place, self._lengths, _PARTS, sums)
+        place, lengths = (np.ascontiguousarray(each[::every]) for each in (self._place, self._lengths))
+        _evaluate(state, more, place, lengths, _PARTS, sums)
         people = np.maximum(sums[:, 4], 1.0)
         error = np.divide(1000.0 * sums[:, 1], sums[:, 2], out=np.full(len(sums), np.nan), where=sums[:, 2] > 0)
         known = sums[:, 4] > 0
@@ -222,17 +242,23 @@ class RigValue:
         """Return the objective, 0 to 100, and a little of what guides the search where it is flat."""
         kind, target = self.room.keys.objective.kind, self.room.keys.target
         mean = float(maps.pcp.mean())
+        error = np.where(np.isfinite(maps.error_mm), maps.error_mm, 1e3)
         if kind == "mean":
             main = mean
         elif kind == "worst":
             main = float(np.sort(maps.pcp)[: max(1, round(_LOWEST * len(maps.pcp)))].mean())
         else:
-            error = np.where(np.isfinite(maps.error_mm), maps.error_mm, 1e3)
             within = _sigmoid((maps.pcp - target.pcp) / _SHARPNESS[0]) * _sigmoid(
                 (target.error - error) / _SHARPNESS[1]
             )
             main = 100.0 * float(within.mean())
-        return main + _MEAN * mean + _SEEN * float(maps.seen.mean())
+        off = ERROR * float(np.minimum(error / target.error, 1.0).mean())
+        return main + _MEAN * mean + _SEEN * float(maps.seen.mean()) - off
+
+
+def _dimmed(terms: Floats) -> Floats:
+    """Return the contribution of a camera (M, J, 6) that makes a part of its sightings, for some people."""
+    return terms[::_EVERY] * np.array([1, 1, 1, 1, _DIM, _DIM], np.float32)
 
 
 def _bins(views: Views) -> np.ndarray:

@@ -12,9 +12,11 @@ from typing import NamedTuple, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
 
 from mvpose.arrays import Bools, Floats, Integers
 from simharness.detector.viewing_conditions import body_axes
+from simharness.planning.floor_coverage import grid_spacing
 from simharness.scenario.sections.people_section import ActivityName
 from simharness.types.floor import Floor, Volume
 from simharness.types.random_streams import stream
@@ -214,11 +216,21 @@ class StandingScenes:
         return self.landmarks[:, :, :17]
 
     def mean_by_place(self, values: Floats) -> Floats:
-        """Return the mean at each place, (P,), of values (S, Q), without NaN and absent people; NaN without values."""
+        """Return the mean at each place, (P,), of values (S, Q), without NaN and absent people; NaN without values.
+
+        Neighbours along and across count half as much as the place itself, diagonal ones a quarter: some people at one
+        place alone would draw their noise as if it were structure.
+        """
         known = self.present & np.isfinite(values)
-        count = np.bincount(self.place[known], minlength=len(self.places))
-        total = np.bincount(self.place[known], values[known], minlength=len(self.places))
-        return np.divide(total, count, out=np.full(len(self.places), np.nan), where=count > 0)
+        cell = tuple(np.rint((self.places - self.places.min(axis=0)) / grid_spacing(self.places)).astype(int).T)
+        sums = np.zeros((2, *(np.max(cell, axis=1) + 1)))
+        for grid, weights in zip(sums, (None, values[known]), strict=True):
+            grid[cell] = np.bincount(self.place[known], weights, minlength=len(self.places))
+        own = sums[0][cell]
+        for axis in (1, 2):
+            sums = convolve1d(sums, [1.0, 2.0, 1.0], axis=axis, mode="constant")
+        count, total = sums[0][cell], sums[1][cell]
+        return np.divide(total, count, out=np.full(len(self.places), np.nan), where=own > 0)
 
 
 def standing_scenes(

@@ -19,17 +19,10 @@ from simharness.planning.candidates import candidates_in, places_in
 from simharness.planning.plan_result import RigPlan, sentences
 from simharness.planning.planned_room import Room
 from simharness.planning.rig_file import write_rig
+from simharness.runtime.number_text import fixed, signed
 from simharness.runtime.version import code_version
 
 _SPACING, _LEVELS = 0.4, 0.5  # metres between the drawn places
-_KEY = (
-    "Green: where people will be. Grey: obstacles with their heights. Yellow: doors, where no camera hangs. "
-    "Orange: cameras with their horizontal fields of view and heights; violet: those that hang already."
-)
-_KEY_OF_PLACES = (
-    "Blue dots: where cameras may hang. Green: where people will be. Grey: obstacles with their heights. "
-    "Yellow: doors, where no camera hangs."
-)
 
 
 def write_plan(plan: RigPlan, folder: Path, *, command: str = "") -> Path:
@@ -72,7 +65,7 @@ def render_preview(room: Room) -> str:
         f"Places on {len(room.mounts)} walls, ceilings and areas for tripods give {len(candidates_in(room))} cameras "
         f"to choose from, with the lenses {lenses}."
     )
-    return _filled(room, room.fixed, plan=None, sentences=[says], key=_KEY_OF_PLACES, places=places)
+    return _filled(room, room.fixed, plan=None, sentences=[says], places=places)
 
 
 def render_plan(plan: RigPlan, *, command: str = "") -> str:
@@ -88,7 +81,8 @@ def render_plan(plan: RigPlan, *, command: str = "") -> str:
         list(plan.rig),
         plan=plan,
         sentences=sentences(plan),
-        key=_KEY,
+        fixed=fixed,
+        signed=signed,
         usual=max(usual, key=lambda each: (each.simulated or each.predicted).pcp.mean, default=None),
         looks=_direction,
         maps={
@@ -113,10 +107,24 @@ def _filled(room: Room, cameras: Sequence[Camera], *, places: Floats | None = No
         name=room.name,
         code=code_version(),
         room=room,
+        key=_key(room, hung=len(cameras) - len(room.fixed), places=places is not None),
         above=Markup(room_from_above(room, places=places, cameras=cameras)),
         sides=[Markup(each) for each in sides],
         **{"command": "", **values},
     )
+
+
+def _key(room: Room, *, hung: int, places: bool) -> str:
+    """Return what the colours of the drawings of a room mean, without those of things that it does not have."""
+    known = [
+        (places, "Blue dots: where cameras may hang."),
+        (True, "Green: where people will be."),
+        (room.obstacles, "Grey: obstacles with their heights."),
+        (len(room.doors), "Yellow: doors, where no camera hangs."),
+        (hung, "Orange: cameras with their horizontal fields of view and heights."),
+        (room.fixed, "Violet: cameras that hang already."),
+    ]
+    return " ".join(text for there, text in known if there)
 
 
 def _direction(camera: Camera) -> tuple[float, float]:

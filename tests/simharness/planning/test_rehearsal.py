@@ -85,12 +85,24 @@ def worths(rehearsal, *ends):
 def test_cameras_are_ranked_only_where_their_intervals_are(rehearsal):
     told = worths(rehearsal, (5.0, 9.0), (1.0, 3.0), (1.0, 4.0), (2.0, 4.0))
     assert sentences(told)[2] == (
-        "Camera cam0 matters most: its failure costs 7.0 (5.0 to 9.0) points of PCP; no camera is redundant."
+        "Camera cam0 matters most: its failure costs 7.0 (5.0 to 9.0) points of PCP; no camera can be spared."
     )
     untold = worths(rehearsal, (0.2, 12.0), (0.0, 5.0), (-1.0, 4.0), (-1.0, 1.5))
     assert sentences(untold)[2] == (
-        "Which camera matters most cannot be told: the failure of one costs 0.0 to 12.0 points of PCP; camera cam3 is "
-        "redundant: its failure costs less than 2 points."
+        "Which camera matters most cannot be told: the failure of one costs 0.0 to 12.0 points of PCP; camera cam3 "
+        "could be spared: its failure costs less than 2 points of PCP."
+    )
+
+
+def test_cameras_are_spared_one_at_a_time(rehearsal):
+    """No set of several cameras was tried, so that nothing is said of the failure of more than one."""
+    ends = [(-1.0, 1.5), (-0.5, 1.0), (0.0, 1.9), (-1.0, 0.5)]
+    assert sentences(worths(rehearsal, *ends))[2] == (
+        "Any camera could be spared alone, not several at once: its failure costs less than 2 points of PCP."
+    )
+    assert (
+        "any of cam0 and cam3 could be spared alone"
+        in sentences(worths(rehearsal, ends[0], (1, 3), (1, 4), ends[3]))[2]
     )
 
 

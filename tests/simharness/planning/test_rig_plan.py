@@ -12,7 +12,11 @@ import pytest
 from typer.testing import CliRunner
 
 from mvpose import Rig
+from mvpose.report.rig_plots import shared_area, write_labels
 from simharness.cli import app
+from simharness.outputs.planning import plan_plots
+from simharness.outputs.planning.plan_page import render_preview
+from simharness.outputs.planning.plan_plots import room_from_side
 from simharness.planning.candidates import candidates_in
 from simharness.planning.plan_rig import PlanEffort, plan_rig
 from simharness.planning.planned_room import Room
@@ -23,7 +27,7 @@ from simharness.planning.room_file import make_room, read_room
 from simharness.planning.room_keys import RoomKeys
 from simharness.planning.search import Ledger
 from simharness.scenario.load import load
-from simharness.world.rigs.layouts import build_rig
+from simharness.world.rigs.layouts import build_rig, look_at
 
 
 def small_room(**keys: Any) -> Room:
@@ -90,6 +94,21 @@ def test_error_is_that_of_the_information_of_both_rays(valued: RigValue) -> None
     inverse = np.linalg.inv(total)
     found = _error(np.array([*np.diag(total), total[0, 1], total[0, 2], total[1, 2]]))
     assert found == pytest.approx(np.sqrt(np.trace(inverse)), rel=1e-6)
+
+
+def test_a_camera_beside_another_is_worth_less_than_one_elsewhere() -> None:
+    """Where all sets reach the target everywhere, they differ in the error and in cameras to spare alone."""
+    room = small_room(target={"pcp": 1.0, "error": 100.0})
+    layer = layer_of(room, places=9, repeats=4)
+    corners = corner_rig(room, 4)
+    odds = SightingOdds.measure(layer, [each.camera(room, name=f"c{k}") for k, each in enumerate(corners)])
+    value = RigValue(room, layer, odds)
+    *three, last = [value.terms(each) for each in corners]
+    for k in range(3):
+        near = corners[k]
+        x, y, z = near.place
+        twin = type(near)(near.mount, near.lens, (x * 0.95, y * 0.95, z), near.bearing, near.tilt)
+        assert value.value([*three, value.terms(twin)]) < value.value([*three, last]) - 0.05
 
 
 def test_values_with_each_camera_are_those_of_the_sets(valued: RigValue) -> None:
@@ -173,6 +192,35 @@ def test_command_line_reports_mistakes(tmp_path: Path) -> None:
         result = runner.invoke(app, [*arguments, "--out", str(tmp_path)])
         assert result.exit_code == 2, result.output
         assert message in " ".join(result.stderr.split())
+
+
+def test_the_key_of_a_drawing_names_only_what_is_drawn() -> None:
+    empty, lab = render_preview(small_room()), render_preview(read_room("lab"))
+    for word in ("Blue", "Green", "Grey", "Yellow", "Orange", "Violet"):
+        assert (f"{word}:" in lab) == (word in ("Grey", "Yellow", "Green")) or word == "Blue"
+        assert (f"{word}:" in empty) == (word == "Green") or word == "Blue"
+    hangs = small_room(fixed=[{"position": (2.5, 2.0, 2.5), "aim": (0.0, 0.0, 1.0)}])
+    assert "Violet:" in render_preview(hangs)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_labels_of_cameras_in_one_corner_do_not_touch_from_the_side(axis: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cameras at one height behind each other, as rigs on walls have them: the names would lie on each other."""
+    boxes = []
+
+    def kept(*given: Any, **more: Any) -> list[tuple[np.ndarray, np.ndarray]]:
+        boxes.extend(write_labels(*given, **more))
+        return boxes
+
+    monkeypatch.setattr(plan_plots, "write_labels", kept)
+    lab = read_room("lab")
+    centers = [(7.8, 4.7), (6.4, 6.3), (1.4, 6.3), (0.2, 4.8), (0.15, 0.15), (7.0, 0.15), (7.6, 4.6), (7.7, 0.2)]
+    cameras = [look_at((x, y, 2.8), (4, 3, 1), K=lab.lenses[0].K, size=(1280, 960), name=f"cam{k}")
+               for k, (x, y) in enumerate(centers)]  # fmt: skip
+    room_from_side("side", lab, axis=axis, cameras=cameras)
+    assert len(boxes) == len(cameras)
+    for one, other in itertools.combinations(boxes, 2):
+        assert shared_area(one, other) == 0.0
 
 
 def test_preview_draws_the_room(tmp_path: Path) -> None:
