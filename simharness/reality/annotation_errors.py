@@ -33,6 +33,7 @@ from simharness.types.sequence import Sequence as PoseSequence
 _LIMBS = len(LIMB_JOINTS)  # limb joints of SHELF14 come first, then the head
 _AGREEING = 3  # views that have to agree on a joint that the truth is compared with
 _FEWEST = 10  # frames in which an actor's joint has to be compared to say something about it
+_TELLING = 100  # frames, a few times as long as errors last, from which its own usual distance tells most of a joint
 _SHIFT_ROUNDS = 2
 _OUTLYING = 4.0  # usual deviations from which an offset is a gross error of the track
 
@@ -95,9 +96,9 @@ class AnnotationModel:
             joints: true joints of the actors, COCO-17, (F, A, 17, 3) metres; NaN where an actor is not annotated.
             time: times of the frames, (F,) seconds, increasing.
             seed: seed of the random part.
-            base: true joints on SHELF14; None: those of ``joints``, with the head by the rule of VoxelPose.
+            base: true joints on SHELF14; None: those of :func:`annotated_joints`.
         """
-        base = coco17_to_shelf14(joints) if base is None else base
+        base = annotated_joints(joints) if base is None else base
         shift = np.einsum("ajk,fakc->fajc", self.shift, body_axes(joints))
         return base + shift + self._random(time, seed)
 
@@ -131,6 +132,20 @@ class AnnotationModel:
         result[np.ix_(SHELF14_OF_LIMBS, SHELF14_OF_LIMBS)] = self.near**apart
         np.fill_diagonal(result, 1.0)
         return np.asarray(np.linalg.cholesky(result), float)
+
+
+def annotated_joints(joints: Floats) -> Floats:
+    """Return the joints that annotators mark, SHELF14, (F, A, 14, 3), of true ones, COCO-17, (F, A, 17, 3) metres.
+
+    The head is that of the rule of VoxelPose at the actor's usual length: heads are rigid, but by the rule, which
+    computes the head from the face and the shoulders, its length changes by a tenth as people look up and down.
+    """
+    result = coco17_to_shelf14(joints)
+    ends = result[..., _LIMBS:, :]
+    center = ends.mean(axis=-2, keepdims=True)
+    length = np.linalg.norm(ends[..., :1, :] - ends[..., 1:, :], axis=-1, keepdims=True)
+    result[..., _LIMBS:, :] = center + (ends - center) * _median(length) / length
+    return result
 
 
 def annotate_simulation(scenario: Scenario, sequence: PoseSequence, rig: Rig) -> Floats:
@@ -292,7 +307,18 @@ def _rest(away: Floats) -> Floats:
     """Return offsets (F, A, 14, 3) without their means and without outliers, NaN there."""
     rest = away - _robust_mean(away)
     far = np.linalg.norm(rest, axis=-1)
-    return np.where((far < _OUTLYING * _median(far) / 1.54)[..., None], rest, np.nan)
+    return np.where((far < _outlying(far))[..., None], rest, np.nan)
+
+
+def _outlying(far: Floats) -> Floats:
+    """Return the distance from which offsets are gross errors, (A, 14), from all distances to the mean, (F, A, 14).
+
+    An error that lasts may take half of the few frames of a joint, so that these also take from the usual distances of
+    all joints.
+    """
+    usual, frames = np.nan_to_num(_median(far)), np.isfinite(far).sum(axis=0)
+    of_all = np.median(usual[frames > 0]) if frames.any() else 0.0
+    return np.asarray(_OUTLYING / 1.54 * (frames * usual + _TELLING * of_all) / (frames + _TELLING))
 
 
 def _variance(rest: Floats) -> Floats:
@@ -335,7 +361,7 @@ def _robust_mean(away: Floats) -> Floats:
     center = _median(away)
     for _ in range(_SHIFT_ROUNDS):
         far = np.linalg.norm(away - center, axis=-1)
-        kept = far < _OUTLYING * _median(far) / 1.54
+        kept = far < _outlying(far)
         center = _mean(np.where(kept[..., None], away, np.nan))
     return np.nan_to_num(center)
 

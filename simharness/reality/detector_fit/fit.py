@@ -19,10 +19,15 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.files.atomic_files import write_atomic
 from mvpose.recording import People
-from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.viewing_conditions import SIDE, body_axes
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.annotation_errors import AnnotationFit, annotation_offsets, common_bias, fit_annotation
+from simharness.reality.annotation_errors import (
+    AnnotationFit,
+    annotated_joints,
+    annotation_offsets,
+    common_bias,
+    fit_annotation,
+)
 from simharness.reality.detector_fit.detector_measurement import (
     RESAMPLES,
     MeasuredDetector,
@@ -106,7 +111,7 @@ def fit(
     of_tracks = []
     for number, each in enumerate(films[:_FILMS]):
         twin = filmed_twin(recording, each, profile, seed=1 + number)
-        exact = coco17_to_shelf14(each.shown(people, recording.truth, profile))
+        exact = annotated_joints(each.shown(people, recording.truth, profile))
         twin = replace(twin, truth=np.where(np.isfinite(recording.truth), exact, np.nan))
         tracks = track_people(twin)
         of_tracks.append(annotation_offsets(twin.truth, tracks, label_joints(sample_of(twin, tracks)).consensus))

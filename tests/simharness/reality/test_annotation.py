@@ -7,7 +7,12 @@ import pytest
 
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.viewing_conditions import SIDE, body_axes
-from simharness.reality.annotation_errors import AnnotationModel, annotation_offsets, fit_annotation
+from simharness.reality.annotation_errors import (
+    AnnotationModel,
+    annotated_joints,
+    annotation_offsets,
+    fit_annotation,
+)
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.sample import sample_of
@@ -34,7 +39,7 @@ def model(actors=3, *, shift=0.03, deviation=0.02, life=0.1, noise=0.2, seed=0):
 
 def errors(annotation, joints, time, *, seed=0):
     """Return the errors of an annotation of ``joints`` in the body's frame, (F, A, 14, 3)."""
-    away = annotation.annotate(joints, time, seed=seed) - coco17_to_shelf14(joints)
+    away = annotation.annotate(joints, time, seed=seed) - annotated_joints(joints)
     return np.einsum("fajc,fakc->fajk", away, body_axes(joints))
 
 
@@ -72,7 +77,19 @@ class TestDrawn:
     def test_without_errors_it_is_the_truth(self, filmed):
         joints, time = filmed.sequence.joints, filmed.sequence.time
         exact = model(shift=0.0, deviation=0.0).annotate(joints, time, seed=0)
-        np.testing.assert_array_equal(exact, coco17_to_shelf14(joints))
+        np.testing.assert_array_equal(exact, annotated_joints(joints))
+
+    def test_annotated_heads_are_rigid(self, filmed):
+        """Limbs, middles and directions of heads are those of the rule; the length of each actor is one, the usual."""
+        joints = filmed.sequence.joints
+        rule, marked = coco17_to_shelf14(joints), annotated_joints(joints)
+        np.testing.assert_array_equal(marked[..., LIMBS, :], rule[..., LIMBS, :])
+        np.testing.assert_allclose(marked[..., 12:, :].mean(axis=-2), rule[..., 12:, :].mean(axis=-2), atol=1e-12)
+        before, after = (each[..., 13, :] - each[..., 12, :] for each in (rule, marked))
+        np.testing.assert_allclose(np.cross(before, after), 0.0, atol=1e-12)
+        lengths = [np.linalg.norm(each, axis=-1) for each in (before, after)]
+        np.testing.assert_allclose(lengths[1], np.median(lengths[0], axis=0, keepdims=True) + 0 * lengths[0])
+        assert lengths[0].std(axis=0).max() > 0.04
 
     def test_shifts_turn_with_the_body(self, filmed):
         annotation = model(deviation=0.0)
@@ -122,7 +139,8 @@ class TestDrawn:
         partly = model().annotate(joints, time, seed=3)
         assert np.isnan(partly[:50, 1]).all()
         np.testing.assert_array_equal(np.delete(partly, 1, axis=1), np.delete(whole, 1, axis=1))
-        np.testing.assert_array_equal(partly[50:], whole[50:])
+        np.testing.assert_array_equal(partly[50:, :, LIMBS], whole[50:, :, LIMBS])
+        np.testing.assert_allclose(partly[50:], whole[50:], atol=0.001)  # the usual length of the head
 
     def test_the_section_of_a_scenario_has_drawn_shifts(self):
         config = AnnotationSection(shift=0.03, random=0.01, life=0.5, noise=0.1)
@@ -266,6 +284,18 @@ class TestRandomPart:
         found = self.fitted(deviation, 0.005).deviation
         np.testing.assert_allclose(found[:, 5], 0.04, rtol=0.15)
         np.testing.assert_allclose(np.delete(found, 5, axis=1), 0.01, rtol=0.25)
+
+    def test_an_error_that_lasts_is_gross_also_in_few_frames(self):
+        """An actor in 40 frames, in 16 of which two joints are 15 cm off."""
+        rng = np.random.default_rng(0)
+        away, exact = (deviation * rng.standard_normal((self.FRAMES, self.ACTORS, 14, 3)) for deviation in (0.02, 0.01))
+        away[40:, 0] = exact[40:, 0] = np.nan
+        away[20:36, 0, 6:8] += [0.1, -0.1, 0.05]
+        found = fit_annotation(away, [exact], STEP * np.arange(self.FRAMES)).annotation
+        np.testing.assert_allclose(found.gross[0, 6:8], 16 / 40, atol=0.12)
+        np.testing.assert_allclose(found.deviation[0, 6:8], 0.02, rtol=0.25)
+        assert np.abs(found.shift[0, 6:8]).max() < 0.02
+        assert found.gross[1:].max() < 0.01
 
     def test_errors_of_joints_together_are_told_from_those_of_tracks(self, filmed):
         """The joints of a track err together, too: 20 mm, all limbs alike."""

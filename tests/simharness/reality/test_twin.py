@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mvpose.skeleton import coco17_to_shelf14
-from simharness.reality.annotation_errors import AnnotationModel
+from simharness.reality.annotation_errors import AnnotationModel, annotated_joints
 from simharness.reality.detector_fit.detector_measurement import agreement
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS
@@ -58,7 +57,7 @@ class TestTwin:
         """The truth is that of the bodies that were filmed, whatever the order of the tracks."""
         exact = AnnotationModel(np.zeros((4, 14, 3)), np.zeros((4, 14)), 0.0, 0.0)
         truth = detected_twin(replace(model, annotation=exact), model.films[0], seed=0).truth
-        made = coco17_to_shelf14(model.films[0].joints)
+        made = annotated_joints(model.films[0].joints)
         for person, actor in enumerate(model.people.ids):
             known = np.isfinite(truth[:, actor])
             np.testing.assert_array_equal(truth[:, actor][known], made[:, person][known])
