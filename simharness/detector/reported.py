@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Rig
 from mvpose.kernels import njit
-from simharness.detector.draws import IN_TREE, ErrorDraws, with_parents
+from simharness.detector.draws import IN_TREE, ErrorDraws, logistic, with_parents
 from simharness.detector.viewing_conditions import (
     OCCLUDED,
     OUTSIDE,
@@ -27,9 +27,9 @@ from simharness.detector.viewing_conditions import (
     Conditions,
     at_edges,
     head_bearings,
+    trunk_depths,
 )
 from simharness.scenario.sections.detector_section import (
-    BEARINGS,
     KIND_OF_JOINT,
     KINDS,
     DropSection,
@@ -76,7 +76,8 @@ class ReportedJoints:
         self._target, self._conditions, self._border, self._errors = target, conditions, config.border, errors
         self._last = last_pixels(rig)
         head = head_bearings(joints, rig) if config.face != FaceSection() else None
-        self._drop = drop_shares(config.drop, config.face, conditions.occlusion, head)
+        depth = trunk_depths(joints, rig) if config.drop.depth else None
+        self._drop = drop_shares(config.drop, config.face, conditions.occlusion, head, depth)
         guess = config.guess
         by_occlusion = (guess.visible, guess.self_occluded, guess.occluded, guess.outside)
         self._guess = np.array([shares.by_joint() for shares in by_occlusion])
@@ -125,7 +126,16 @@ def last_pixels(rig: Rig) -> Floats:
     return np.array([camera.size for camera in rig], float)[:, None] - 1
 
 
-def drop_shares(drop: DropSection, face: FaceSection, occlusion: NDArray[np.int8], bearings: Floats | None) -> Floats:
+_BEHIND = 0.2  # metres behind the middle of the trunk at which the shares of drops hold
+
+
+def drop_shares(
+    drop: DropSection,
+    face: FaceSection,
+    occlusion: NDArray[np.int8],
+    bearings: Floats | None,
+    depth: Floats | None = None,
+) -> Floats:
     """Return the share of each joint that is not reported, (T, V, P, 17); for joints outside the image any value.
 
     Args:
@@ -134,6 +144,7 @@ def drop_shares(drop: DropSection, face: FaceSection, occlusion: NDArray[np.int8
         occlusion: occlusion classes of the joints, (T, V, P, 17).
         bearings: bearings of the cameras from the heads, (T, V, P), radians to the left of straight ahead; None if
             ``face`` has no shares.
+        depth: depth of the joints behind the middle of the trunk, (T, V, P, 17) metres; None if it changes nothing.
     """
     table = np.array([shares.by_joint() for shares in (drop.visible, drop.self_occluded, drop.occluded)])
     result = table[np.where(occlusion == OUTSIDE, VISIBLE, occlusion), np.arange(occlusion.shape[-1])]
@@ -141,6 +152,9 @@ def drop_shares(drop: DropSection, face: FaceSection, occlusion: NDArray[np.int8
         factors = np.ones(4)
         factors[[SELF_OCCLUDED, OCCLUDED]] = drop.edge.self_occluded, drop.edge.occluded
         result = np.where(at_edges(occlusion), factors[occlusion], 1.0) * result
+    if depth is not None:
+        deep = (occlusion == SELF_OCCLUDED) & IN_TREE
+        result[deep] = logistic(result[deep], drop.depth * (depth[deep] - _BEHIND))
     if bearings is None:
         return result
     for joint, kind in enumerate(KIND_OF_JOINT):
@@ -153,7 +167,7 @@ def drop_shares(drop: DropSection, face: FaceSection, occlusion: NDArray[np.int8
 
 def _by_bearing(shares: tuple[float, ...], bearings: Floats) -> Floats:
     """Return shares interpolated at bearings (...), radians."""
-    return np.interp(bearings, np.deg2rad(BEARINGS), shares, period=2 * np.pi)
+    return np.interp(bearings, np.linspace(0, 2 * np.pi, len(shares), endpoint=False), shares, period=2 * np.pi)
 
 
 DATA = Path(__file__).parent / "data" / "poses_in_pictures.npz"

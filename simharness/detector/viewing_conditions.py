@@ -188,6 +188,16 @@ def at_edges(occlusion: NDArray[np.int8]) -> Bools:
     return np.asarray((occlusion == VISIBLE).astype(np.float32) @ _BESIDE > 0)
 
 
+_TRUNK = (5, 6, 11, 12)
+
+
+def trunk_depths(joints: ArrayLike, rig: Rig) -> Floats:
+    """Return by how much joints (T, P, 17, 3) are behind the middle of their trunk, (T, V, P, 17) metres."""
+    joints = np.asarray(joints, float)
+    depth = np.stack([(joints - camera.center) @ camera.R[2] for camera in rig], axis=1)
+    return np.asarray(depth - depth[..., _TRUNK].mean(axis=-1, keepdims=True))
+
+
 _HIDDEN = (Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)
 
 

@@ -16,7 +16,15 @@ from simharness.detector.detect import Detected
 from simharness.detector.error_classes import classify
 from simharness.detector.false_positives import MIN_JOINTS
 from simharness.detector.reported import beyond_border, last_pixels
-from simharness.detector.viewing_conditions import OUTSIDE, VISIBLE, Conditions, image_axes, overlaps, pixel_offsets
+from simharness.detector.viewing_conditions import (
+    OUTSIDE,
+    VISIBLE,
+    Conditions,
+    image_axes,
+    overlaps,
+    pixel_offsets,
+    trunk_depths,
+)
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.association import Association
 from simharness.reality.detector_fit.consensus import Consensus
@@ -202,6 +210,7 @@ def _labels(
         target=target,
         occlusion=np.where(inside, conditions.occlusion, np.int8(VISIBLE)),
         bearing=bearing_bins(sequence.joints, rig),
+        depth=trunk_depths(sequence.joints, rig),
         inside=inside & known[:, None, :, None],
         beyond=beyond_border(views.pixels, conditions.unit, last_pixels(rig)[:, None]),
         expected=expected_people(known, inside),

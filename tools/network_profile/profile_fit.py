@@ -205,7 +205,8 @@ def _inversion_bearing(labels: LabelledJoints) -> dict[str, tuple[float, int]]:
     """Return by how much more frequent inversions of limbs are at each bearing than on average."""
     curve = error_curves(labels)["inversion by bearing"].counts
     side = np.minimum(np.arange(len(BEARINGS)), len(BEARINGS) - np.arange(len(BEARINGS)))
-    n, k = (np.bincount(side, each) for each in curve)
+    fine = np.array([np.bincount(side, each) for each in curve])
+    n, k = fine[:, ::2] + (np.pad(fine[:, 1::2], ((0, 0), (1, 0))) + np.pad(fine[:, 1::2], ((0, 0), (0, 1)))) / 2
     usual = k.sum() / max(n.sum(), 1.0)
     share = (k + _PRIOR * usual) / (n + _PRIOR)
     factor = share * n.sum() / max((share * n).sum(), 1e-9) if usual else np.ones(len(n))

@@ -24,6 +24,7 @@ count as fewer."""
 
 _COUNTED: Mapping[str, Callable[[FrameSums], Floats]] = {
     "keypoints.inversion_reach": lambda sums: sums.apart.k,
+    "keypoints.drop.depth": lambda sums: sums.depth.n.sum(axis=-1),
     "keypoints.drop.edge.self_occluded": lambda sums: sums.edge.n[:, 0],
     "keypoints.drop.edge.occluded": lambda sums: sums.edge.n[:, 1],
     "keypoints.stray": lambda sums: sums.miss.n,

@@ -127,8 +127,11 @@ class FrameSums(NamedTuple):
     edge: Trials
     """Limb joints that may be dropped, and those dropped, of the hidden joints beside a visible one: self-occluded and
     occluded, by kind, (..., 2, 9)."""
+    depth: Trials
+    """Self-occluded limb joints that may be dropped, and those dropped, by kind and depth behind the middle of the
+    trunk, (..., 9, B)."""
     face: Trials
-    """Joints of the face that nobody else hides, and those not reported, by kind and bearing, (..., 3, 12)."""
+    """Joints of the face that nobody else hides, and those not reported, by kind and bearing, (..., 3, 24)."""
     size: Trials
     """Limb joints that are reported, and those not good, by tercile of the person's size, (..., 3)."""
     size_drop: Trials

@@ -133,11 +133,11 @@ def _hidden(measurement: MeasuredDetector) -> Table:
 
 
 def _face(measurement: MeasuredDetector) -> Table:
-    degrees = list(map(str, BEARINGS))
+    degrees = list(map(str, BEARINGS[::2]))
     title = "Joints of the face not reported, %, by bearing of the camera to their side, degrees"
     table = _table(title, "joint", *degrees)
     for kind in KINDS[:3]:
-        values = [measurement[f"keypoints.face.{kind}.{index}"] for index in range(len(BEARINGS))]
+        values = [measurement[f"keypoints.face.{kind}.{index}"] for index in range(0, len(BEARINGS), 2)]
         table.add_row(kind, *(f"{100 * each.value:.0f}" if each.known else "–" for each in values))
     return table
 

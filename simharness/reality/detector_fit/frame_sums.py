@@ -41,6 +41,9 @@ BORDER = np.linspace(0.0, 6.0, 49)
 APART = np.linspace(0.0, 0.6, 31)
 """Edges of the histogram of distances of left-right counterparts in the picture, heights of the box."""
 
+DEPTHS = np.linspace(-0.2, 0.5, 15)
+"""Edges of the histogram of depths of self-occluded joints behind the middle of the trunk, metres."""
+
 _OUTLYING = 3.5  # deviations of a bone's length from which a joint is wrong
 _CELLS = 12  # in each direction, of the grid on a person's box
 
@@ -57,6 +60,7 @@ def frame_sums(labels: LabelledJoints) -> detector_sums.FrameSums:
     return detector_sums.FrameSums(
         classes=_shares(labels),
         edge=_at_edges(labels),
+        depth=_by_depth(labels),
         face=_face(labels),
         size=size,
         size_drop=size_drop,
@@ -106,8 +110,21 @@ def _at_edges(labels: LabelledJoints) -> detector_sums.Trials:
     return detector_sums.Trials(*both)
 
 
+def _by_depth(labels: LabelledJoints) -> detector_sums.Trials:
+    """Return self-occluded limb joints that may be dropped, and those dropped, by kind and depth, (T, 9, B)."""
+    hidden = (labels.occlusion == SELF_OCCLUDED) & (LIMB_OF_JOINT > 0)
+    place = np.clip(np.digitize(np.nan_to_num(labels.depth), DEPTHS) - 1, 0, len(DEPTHS) - 2)
+    in_bin = [hidden & (place == index) for index in range(len(DEPTHS) - 1)]
+    return detector_sums.Trials(
+        *(
+            np.stack([_by_kind(which["drop"] & each) for each in in_bin], axis=-1)
+            for which in (labels.risk, labels.taken)
+        )
+    )
+
+
 def _face(labels: LabelledJoints) -> detector_sums.Trials:
-    """Return joints of the face that nobody else hides, and those not reported, by kind and bearing, (T, 3, 12).
+    """Return joints of the face that nobody else hides, and those not reported, by kind and bearing, (T, 3, 24).
 
     Bearings count towards the side of the joint, so that left and right joints are alike.
     """

@@ -41,6 +41,7 @@ SCALES: Scales = {
     ),
     "log": (
         *("keypoints.scatter", "keypoints.self_occluded", "keypoints.occluded", "keypoints.inversion_reach"),
+        "keypoints.drop.depth",
         *("correlation.life", "correlation.scatter_life", "boxes.life", "phantoms.rate", "scores.deviation"),
     ),
     "fisher": (

@@ -24,6 +24,7 @@ from simharness.detector.viewing_conditions import (
     image_axes,
     oks_units,
     overlaps,
+    trunk_depths,
 )
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.association import Association, associate
@@ -68,6 +69,8 @@ class LabelledJoints:
     """Occlusion class estimated from skeletons, (T, V, P, 17): VISIBLE, SELF_OCCLUDED or OCCLUDED."""
     bearing: NDArray[np.int64]
     """Bin of the bearing of the camera from the head, to the left of straight ahead, (T, V, P)."""
+    depth: Floats
+    """Depth of the joints behind the middle of the trunk, (T, V, P, 17) metres."""
     inside: Bools
     """Joints inside of the image, as the sample places them, (T, V, P, 17)."""
     beyond: Floats
@@ -126,6 +129,7 @@ def label_joints(sample: Sample) -> LabelledJoints:
         target=target,
         occlusion=np.where(occlusion == OUTSIDE, np.int8(VISIBLE), occlusion),
         bearing=bearing_bins(staged, rig),
+        depth=trunk_depths(staged, rig),
         inside=inside,
         beyond=beyond_border(_project(staged, rig), unit, last_pixels(rig)[:, None]),
         expected=expected_people(sample.known, inside),

@@ -11,7 +11,7 @@ from mvpose.arrays import Floats
 from simharness.detector.viewing_conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.detector_sums import FrameSums, Trials
-from simharness.reality.detector_fit.frame_sums import APART, BORDER, LOGITS, SCORED, TERCILES, lags
+from simharness.reality.detector_fit.frame_sums import APART, BORDER, DEPTHS, LOGITS, SCORED, TERCILES, lags
 from simharness.reality.detector_fit.joint_labels import CLASSES
 from simharness.reality.detector_fit.tetrachoric import (
     fit_life,
@@ -36,6 +36,7 @@ _MIN_INVERTED = 20.0  # inversions needed to see how far left and right are apar
 _REACHES = np.geomspace(0.02, 3.0, 60)  # heights; beyond, inversions are as frequent at all distances
 _MIN_OUTSIDE = 50  # joints outside of the image needed to see how far the detector reports them
 _HIDDEN = ((SELF_OCCLUDED, "self_occluded"), (OCCLUDED, "occluded"))
+_STEEP = 5.0  # largest step towards the growth of drops with depth, a metre
 _SEPARATED = 1.0  # deviations between scores of good keypoints and misses from which mixtures can be separated
 
 
@@ -60,6 +61,7 @@ def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> 
         edge = _edge(n_drop[:, 1:], k_drop[:, 1:], sums.edge)
         for index, (_, name) in enumerate(_HIDDEN):
             result[f"keypoints.drop.edge.{name}"] = edge[:, index]
+        result["keypoints.drop.depth"] = _depth(sums.depth)
         n_drop[:, 1:] -= np.nan_to_num(1 - edge)[..., None] * sums.edge.n
         dropped = np.where(n_drop > 0, k_drop / n_drop, (k_drop.sum(axis=1) / n_drop.sum(axis=1))[:, None])
         for index, occlusion in enumerate(("visible", "self_occluded", "occluded")):
@@ -153,6 +155,27 @@ def _edge(n: Floats, k: Floats, edge: Trials) -> Floats:
     return np.where(k.sum(axis=-1) >= _MIN_HIDDEN, np.minimum(ratio, 1.0), np.nan)
 
 
+def _depth(drops: Trials) -> Floats:
+    """Return by how much the logit of drops of self-occluded limb joints grows with their depth, (R,) a metre.
+
+    By logistic regression in which each kind of joint has its own share. NaN with few drops.
+
+    Args:
+        drops: joints that may be dropped, and those dropped, by kind and depth, (R, 9, B).
+    """
+    n, k = drops
+    depth, slope = (DEPTHS[1:] + DEPTHS[:-1]) / 2, np.zeros((len(n), 1, 1))
+    level = logit((k.sum(axis=-1, keepdims=True) + 0.5) / (n.sum(axis=-1, keepdims=True) + 1))
+    for _ in range(2 * _ROUNDS):  # of Newton's method
+        share = expit(level + slope * depth)
+        weight, rest = n * share * (1 - share) + 1e-9, k - n * share
+        away = depth - (weight @ depth / weight.sum(axis=-1))[..., None]
+        step = (rest * away).sum(axis=(1, 2)) / (weight * away**2).sum(axis=(1, 2))
+        slope = slope + np.clip(step, -_STEEP, _STEEP)[:, None, None]
+        level = level + np.clip(rest.sum(axis=-1) / weight.sum(axis=-1), -1, 1)[..., None]
+    return np.where(k.sum(axis=(1, 2)) >= _MIN_HIDDEN, np.maximum(slope[:, 0, 0], 0.0), np.nan)
+
+
 def _guesses(n: dict[str, Floats], k: dict[str, Floats], sums: FrameSums) -> dict[str, Floats]:
     """Return the parameters of a detector that guesses: shares of visible joints, and shares that are guessed.
 
@@ -241,13 +264,13 @@ def _inversion_reach(sums: FrameSums) -> Floats:
 
 
 def _face(sums: FrameSums) -> dict[str, Floats]:
-    """Return the shares of joints of the face that are not reported, by kind and bearing (R, 12).
+    """Return the shares of joints of the face that are not reported, by kind and bearing (R, 24).
 
-    Bins with few joints take from their neighbours: each counts as _PRIOR joints more, at the rate of the bins beside.
+    Bins with few joints take from their neighbours: each counts as _PRIOR_ERRORS joints more, at the rate beside.
     """
     n, k = sums.face.n, sums.face.k
     around_n, around_k = (np.roll(each, 1, axis=-1) + np.roll(each, -1, axis=-1) + 1e-9 for each in (n, k))
-    rate = (k + _PRIOR * around_k / around_n) / (n + _PRIOR)
+    rate = (k + _PRIOR_ERRORS * around_k / around_n) / (n + _PRIOR_ERRORS)
     rate = np.where(n.sum(axis=-1, keepdims=True) > 0, rate, np.nan)
     return {
         f"keypoints.face.{KINDS[kind]}.{index}": rate[:, kind, index]

@@ -23,6 +23,7 @@ _OF_QUALITY = ("keypoints.jitter.", "keypoints.miss.", "keypoints.inversion.", "
 
 _ESTIMATES = {
     "keypoints.inversion_reach": 0.3,
+    "keypoints.drop.depth": 10.0,
     **dict.fromkeys(("keypoints.drop.edge.self_occluded", "keypoints.drop.edge.occluded"), 0.5),
     **{f"keypoints.stray.{kind}": 0.3 for kind in KINDS[3:]},
 }
@@ -38,6 +39,7 @@ _MOST = {
     "keypoints.truncated": 100.0,
     "keypoints.small": 10.0,
     "keypoints.inversion_reach": 3.0,
+    "keypoints.drop.depth": 100.0,
     "boxes.jitter": 0.5,
     "phantoms.rate": 20.0,
 }

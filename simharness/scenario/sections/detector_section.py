@@ -21,8 +21,8 @@ KINDS = ("nose", "eyes", "ears", "shoulders", "elbows", "wrists", "hips", "knees
 KIND_OF_JOINT = (0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8)
 """Kind of each COCO-17 joint, an index into :data:`KINDS`."""
 
-BEARINGS = tuple(range(0, 360, 30))
-"""Bearings at which the shares of :class:`FaceSection` are given, degrees."""
+BEARINGS = tuple(range(0, 360, 15))
+"""Bearings at which the shares of :class:`FaceSection` are measured, degrees: a network loses an ear within 30."""
 
 FACTOR_BEARINGS = tuple(range(0, 181, 30))
 """Bearings at which the factors of ``keypoints.inversion_bearing`` are given, degrees, to both sides."""
@@ -31,7 +31,7 @@ LARGEST_MULTIPLE = 1000.0
 """Largest factor of hidden joints: hidden hips of a real detector err a few hundred times as often as visible ones."""
 
 Multiple = Annotated[float, Field(ge=0.0, le=LARGEST_MULTIPLE)]
-ByBearing = Annotated[tuple[Share, ...], Field(min_length=len(BEARINGS), max_length=len(BEARINGS))]
+ByBearing = Annotated[tuple[Share, ...], Field(min_length=4, max_length=72)]
 FactorsByBearing = Annotated[
     tuple[Multiple, ...], Field(min_length=len(FACTOR_BEARINGS), max_length=len(FACTOR_BEARINGS))
 ]
@@ -146,13 +146,21 @@ class DropSection(Section):
     self_occluded: Shares = Shares()
     occluded: Shares = Shares()
     edge: EdgeSection = EdgeSection()
+    depth: float = key(
+        0.0,
+        "growth of the logit of the shares of self-occluded limb joints with their depth behind the middle of the "
+        "trunk, per metre; the shares are those of joints 0.2 m behind it",
+        ge=0.0,
+        le=100.0,
+    )
 
 
 class FaceSection(Section):
     """Shares of the face's joints that are not reported, by the bearing of the camera from the head.
 
-    Each list holds the shares at 0, 30, ..., 330 degrees from straight ahead towards the joint's side (nose: towards
-    the left), with linear interpolation. It replaces ``drop.visible`` and ``drop.self_occluded``.
+    Each list holds the shares in equal steps from straight ahead towards the joint's side (nose: towards the left) and
+    around, twelve at 0, 30, ..., 330 degrees, with linear interpolation. It replaces ``drop.visible`` and
+    ``drop.self_occluded``.
     """
 
     nose: ByBearing | None = None

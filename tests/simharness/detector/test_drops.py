@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.special import expit, logit
 from scipy.stats import multivariate_normal
 from worlds import find, standing, within, world
 
 from simharness.detector.draws import IN_TREE, PARENT, with_parents
-from simharness.detector.viewing_conditions import head_bearings
+from simharness.detector.viewing_conditions import head_bearings, trunk_depths
 from simharness.types.truth import KeypointError
 from simharness.types.views import Visibility
 
@@ -107,6 +108,31 @@ class TestEdges:
         assert np.flatnonzero((few != many).any(axis=(0, 1, 2))).tolist() == [13]
 
 
+class TestDepth:
+    """Joints deep behind the person's own trunk are dropped more often."""
+
+    def test_logits_grow_with_the_depth(self):
+        where = standing(3000, cameras=(0.7, 2.5), visibility=Visibility.SELF_OCCLUDED)
+        depth = trunk_depths(where.sequence.joints, where.rig)[0, :, 0]
+        gone = missing(where, drop={"self_occluded": 0.4, "depth": 14.0})
+        for view, joint in ((view, joint) for view in range(2) for joint in range(17)):
+            growth = 14.0 * (depth[view, joint] - 0.2) if joint > 4 else 0.0  # the face is told by its bearing
+            assert within(gone[:, view, 0, joint].sum(), 3000, expit(logit(0.4) + growth)), (view, joint)
+
+    def test_depth_is_along_the_view_from_the_middle_of_the_trunk(self):
+        where = standing(1, cameras=(0.0, np.pi), facing=0.0)
+        front, back = trunk_depths(where.sequence.joints, where.rig)[0, :, 0]
+        np.testing.assert_allclose(front, -back, atol=1e-6)
+        np.testing.assert_allclose([front[[5, 6, 11, 12]].mean(), back[[5, 6, 11, 12]].mean()], 0.0, atol=1e-9)
+        assert front[0] < -0.03  # the nose is before the trunk
+
+    @pytest.mark.parametrize("visibility", [Visibility.VISIBLE, Visibility.OCCLUDED_BY_PERSON])
+    def test_others_keep_their_shares(self, visibility):
+        where = standing(500, visibility=visibility)
+        drop = {"visible": 0.3, "occluded": 0.3}
+        np.testing.assert_array_equal(missing(where, drop=drop), missing(where, drop={**drop, "depth": 14.0}))
+
+
 RISING = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 0.5]
 
 
@@ -127,6 +153,14 @@ class TestFace:
         for view in range(12):
             for joint, share in ((0, middle[view]), (3, middle[view]), (4, middle[11 - view]), (1, 0.5)):
                 assert within(gone[:, view, 0, joint].sum(), 2500, share)
+
+    def test_finer_steps(self):
+        """Twenty-four shares at every 15 degrees."""
+        where = standing(2500, cameras=np.deg2rad(15.0 * np.arange(24)), distance=90.0)
+        given = 0.5 + 0.3 * np.sin(np.deg2rad(45.0 * np.arange(24)))
+        gone = missing(where, face={"nose": given.tolist()})
+        for view in range(24):
+            assert within(gone[:, view, 0, 0].sum(), 2500, given[view]), view
 
     def test_a_face_behind_others_keeps_the_share_of_hidden_joints(self):
         where = standing(2000, cameras=(0.0, 2.0), visibility=Visibility.OCCLUDED_BY_PERSON)

@@ -139,6 +139,12 @@ class TestDrops:
                 share = found[f"keypoints.drop.{name}.{kind}"]
                 assert share == pytest.approx(kinds[kind], abs=0.04), (name, kind)
 
+    @pytest.mark.parametrize(("growth", "within"), [(0.0, 1.0), (5.0, 1.5), (14.0, 2.0), (30.0, 6.0)])
+    def test_growth_of_drops_with_depth(self, filmed, growth, within):
+        drop = {"self_occluded": {**dict.fromkeys(KINDS, 0.2), "elbows": 0.4}, "depth": growth}
+        found = point_estimates(filmed.sample(staged=True, keypoints={"drop": drop}))["keypoints.drop.depth"]
+        assert found == pytest.approx(growth, abs=within)
+
     def test_few_drops_say_nothing_about_edges(self, filmed):
         measured = measure_detector(part(filmed.sample(keypoints={"drop": {"self_occluded": 0.01}}), 20), resamples=5)
         assert not measured["keypoints.drop.edge.self_occluded"].known
@@ -162,12 +168,12 @@ class TestDrops:
 
     @pytest.mark.parametrize(("kind", "given", "joint", "side"), [("ears", EARS, 3, 1), ("nose", NOSE, 0, 1)])
     def test_shares_of_the_face_by_bearing(self, filmed, dropping, kind, given, joint, side):
-        """Twelve shares: each is the mean of the given curve over the bearings of its bin."""
+        """Each is the mean of the given curve over the bearings of its bin."""
         bearing = side * np.degrees(head_bearings(filmed.sequence.joints, filmed.rig)) % 360
         curve = np.interp(bearing, np.arange(0, 361, 30), [*given, given[0]])
-        bins = np.round(bearing / 30).astype(int) % 12
-        expected = np.array([curve[bins == index].mean() for index in range(12)])
-        found = np.array([dropping[f"keypoints.face.{kind}.{index}"].value for index in range(12)])
+        bins = np.round(bearing / 15).astype(int) % 24
+        expected = np.array([curve[bins == index].mean() for index in range(24)])
+        found = np.array([dropping[f"keypoints.face.{kind}.{index}"].value for index in range(24)])
         assert np.abs(found - expected).mean() < 0.06
         assert np.abs(found - expected).max() < 0.2  # bearings of heads seen from behind are not exact
         assert np.corrcoef(found, expected)[0, 1] > 0.95
@@ -429,7 +435,7 @@ def test_the_profile_contains_the_measured_values(dropping):
     for kind in LIMB_KINDS:
         measured = dropping[f"keypoints.drop.occluded.{kind}"].value
         assert getattr(profile.keypoints.drop.occluded, kind) == pytest.approx(measured, abs=1e-4)
-    expected = [dropping[f"keypoints.face.ears.{index}"].value for index in range(12)]
+    expected = [dropping[f"keypoints.face.ears.{index}"].value for index in range(24)]
     assert profile.keypoints.face.ears == pytest.approx(expected, abs=1e-4)
     assert profile.keypoints.drop.visible.ears == 0.0  # face says it
     hidden = [dropping[f"boxes.missed_hidden.{index}"].value for index in range(5)]

@@ -93,8 +93,8 @@ def test_the_annotation_is_printed_by_actor_in_millimetres():
 
 
 def test_joints_of_the_face_are_printed_by_bearing(measured):
-    values = {f"keypoints.face.ears.{index}": MeasuredValue(index / 100, 0, 1, 10) for index in range(12)}
+    values = {f"keypoints.face.ears.{index}": MeasuredValue(index / 100, 0, 1, 10) for index in range(24)}
     text = printed(print_measurement, replace(measured, values={**measured.values, **values}))
     by_bearing = text[text.index("by bearing") :].splitlines()
     ears = next(line.split() for line in by_bearing if line.startswith("ears"))
-    assert ears == ["ears", *map(str, range(12))]
+    assert ears == ["ears", *map(str, range(0, 24, 2))]
