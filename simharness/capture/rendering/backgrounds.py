@@ -33,7 +33,8 @@ class LitBackground:
     """Picture without the shadows of anything that moves, (h, w, 3) uint8."""
     shadow_place: NDArray[np.uint16]
     """Place of each pixel in the shadow maps, (h, w) uint16: see
-    :func:`~simharness.capture.rendering.shadow_maps.shadow_places`; empty with sources."""
+    :func:`~simharness.capture.rendering.shadow_maps.shadow_places`; with sources, the block of the map of the floor:
+    see :func:`~simharness.capture.rendering.shaded_pixels.blocks_below`."""
     shadow_depth: NDArray[np.float32]
     """Inverse depth of each pixel from the light, (h, w) float32; empty with sources."""
 

@@ -18,7 +18,7 @@ from simharness.capture.rendering.moving_light import MovingMeshes, capsules, mo
 from simharness.capture.rendering.moving_shadows import BLOCK, ShadowLayer, UpwardLight, cast, touched_blocks
 from simharness.capture.rendering.room_light import RoomLight, last_light, room_light
 from simharness.capture.rendering.scene_geometry import SceneGeometry
-from simharness.capture.rendering.shaded_pixels import ShadowLayers, dim
+from simharness.capture.rendering.shaded_pixels import HEIGHTS, ShadowLayers, blocks_below, dim
 from simharness.capture.rendering.shading_kernels import FaceLight, shade_lit
 from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
 from simharness.types.lighting import Lighting
@@ -29,7 +29,6 @@ Floats = NDArray[np.float32]
 
 _LUMINANCE = np.array(LUMINANCE)
 _CELL, _MOST_CELLS = 0.06, 384  # metres; cells of the map along each side: beyond, they are larger
-_HEIGHTS = np.array([0.0, 0.5, 1.1, 1.9], np.float32)  # metres, of the maps above the floor
 
 
 @dataclass(frozen=True)
@@ -198,15 +197,15 @@ class LitScene:
         """What the moving meshes keep from the still ones."""
         grid, upward, bodies = ShadowGrid.around_probes(self.room), self._upward_light(), self._bodies
         fine = np.ones(grid.shape, np.float32)
-        coarse = np.ones((len(_HEIGHTS), grid.shape[0] // 2, grid.shape[1] // 2), np.float32)
+        coarse = np.ones((len(HEIGHTS), grid.shape[0] // 2, grid.shape[1] // 2), np.float32)
         layers = [ShadowLayer(fine, grid.corner, grid.cell, 0.0)]
-        for left, height in zip(coarse[1:], _HEIGHTS[1:].tolist(), strict=True):
+        for left, height in zip(coarse[1:], HEIGHTS[1:].tolist(), strict=True):
             layers.append(ShadowLayer(left, grid.corner, 2 * grid.cell, height))
         for around in (True, False):
             for layer in layers:
                 cast(layer, bodies, self.samples.ranges, upward, around)
         coarse[0] = fine.reshape(coarse.shape[1], 2, coarse.shape[2], 2).mean(axis=(1, 3))
-        return ShadowLayers(grid.corner, grid.cell, fine, coarse, _HEIGHTS, touched_blocks(fine, coarse))
+        return ShadowLayers(grid.corner, grid.cell, fine, coarse, HEIGHTS, touched_blocks(fine, coarse))
 
     def _upward_light(self) -> UpwardLight:
         """Return the light of the room on surfaces that face up."""
@@ -236,8 +235,10 @@ class LitScene:
             emission = still.topology.emission
             light = FaceLight(emission, room.exposure, room.light, samples.corner_samples, samples.divisions)
             shade_lit(pixels, background.corners, still.faces, view.to_rays, light, (0, 0), MATTE, tone.table(), rgb)
-        nothing = np.zeros((0, 0), np.uint16), np.zeros((0, 0), np.float32)
-        background.lit = LitBackground(self.lighting, self.room, rgb, *nothing)
+        grid = ShadowGrid.around_probes(room)
+        shape = grid.shape[0] // BLOCK, grid.shape[1] // BLOCK
+        blocks = blocks_below(background, view, grid.corner, BLOCK * grid.cell, shape)
+        background.lit = LitBackground(self.lighting, self.room, rgb, blocks, np.zeros((0, 0), np.float32))
         return background.lit
 
     def draw(self, lit: LitBackground, drawn: DrawnPixels, view: PixelRays) -> NDArray[np.uint8]:
@@ -253,7 +254,7 @@ class LitScene:
         if first[0] == len(topology.faces):
             return rgb
         if first[0]:
-            dim(drawn, first[0], view, self.shadows, tone.dimming(), rgb)
+            dim(drawn, lit.shadow_place, view, self.shadows, tone.dimming(), rgb)
         posed, emission = self._posed_finishes, topology.emission[first[0] :]
         finishes = MATTE if posed is None else posed.arrays(view)
         light = FaceLight(emission, self.room.exposure, self.moving_light, samples.corner_samples, samples.divisions)

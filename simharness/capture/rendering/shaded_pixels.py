@@ -3,17 +3,19 @@
 The map of the floor is divided into blocks; pixels over blocks in which nothing is dark are left as they are.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.moving_shadows import BLOCK
+from simharness.capture.rendering.backgrounds import Background
 from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
 
 _ZERO, _UNIT, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+HEIGHTS = np.array([0.0, 0.5, 1.1, 1.9], np.float32)
+"""Heights of the maps above the floor, metres; nothing is shaded above the last."""
+
 _FLOOR = np.float32(0.02)  # metres: what is lower is the floor
 
 
@@ -34,15 +36,50 @@ class ShadowLayers(NamedTuple):
     """Blocks of ``BLOCK`` x ``BLOCK`` cells of ``fine`` in which anything is dark, (rows, columns)."""
 
 
+def blocks_below(
+    background: Background, view: PixelRays, corner: NDArray[np.float64], side: float, shape: tuple[int, int]
+) -> NDArray[np.uint16]:
+    """Return over which block of a map of the floor each pixel of still meshes lies, (h, w); rows * columns for none.
+
+    Args:
+        background: picture of the still meshes.
+        view: rays of the pixels.
+        corner: x and y of the corner of the map, (2,).
+        side: side of a block, metres.
+        shape: rows and columns of blocks.
+    """
+    y, x = np.indices(background.triangle.shape, sparse=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = 1.0 / background.inverse_depth.astype(float)
+        at = [
+            origin + away * (ray[0] * x + ray[1] * y + ray[2])
+            for origin, ray in zip(view.center, view.to_rays, strict=True)
+        ]
+        place = np.zeros(away.shape, np.int64)
+        inside = (background.triangle >= 0) & (at[2] <= HEIGHTS[-1])
+        for axis, count in ((1, shape[0]), (0, shape[1])):
+            block = (at[axis] - corner[axis]) / side
+            # The walls lie on the border of the map.
+            block = np.floor(np.where(block > 0.5 * count, block - 1e-3, block + 1e-3))
+            inside &= (block >= 0) & (block < count)
+            place = place * count + np.where(inside, block, 0).astype(np.int64)
+    return np.where(inside, place, shape[0] * shape[1]).astype(np.uint16)
+
+
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def dim(
-    drawn: DrawnPixels, first_face: int, view: PixelRays, layers: ShadowLayers, dimming: np.ndarray, rgb: np.ndarray
+    drawn: DrawnPixels,
+    blocks: np.ndarray,
+    view: PixelRays,
+    layers: ShadowLayers,
+    dimming: np.ndarray,
+    rgb: np.ndarray,
 ) -> None:
     """Darken the pixels of still meshes that moving ones shade, in place.
 
     Args:
         drawn: what the pixels show.
-        first_face: first face of the moving meshes.
+        blocks: blocks of the map over which the pixels of still meshes lie, see :func:`blocks_below`.
         view: rays of the pixels.
         layers: the shadows.
         dimming: see :func:`.tone.dimming`.
@@ -50,9 +87,9 @@ def dim(
     """
     center, rays = view
     origin, cell, fine, coarse, heights, touched = layers
-    rows, columns = touched.shape
+    dark = np.append(touched.ravel(), False)
     steps = np.float32(len(dimming) - 1)
-    per_cell, levels, block = np.float32(1.0 / cell), len(heights), BLOCK * cell
+    per_cell, levels = np.float32(1.0 / cell), len(heights)
     rise_x, rise_y, rise_z = np.float32(rays[0, 0]), np.float32(rays[1, 0]), np.float32(rays[2, 0])
     from_x, from_y = np.float32(center[0] - origin[0]), np.float32(center[1] - origin[1])
     from_z = np.float32(center[2])
@@ -60,17 +97,7 @@ def dim(
         ray_x, ray_y = np.float32(rays[0, 1] * y + rays[0, 2]), np.float32(rays[1, 1] * y + rays[1, 2])
         ray_z = np.float32(rays[2, 1] * y + rays[2, 2])
         for x in range(rgb.shape[1]):
-            if not 0 <= drawn.triangle[y, x] < first_face:
-                continue
-            away = 1.0 / drawn.inverse_depth[y, x]
-            if center[2] + away * (rays[2, 0] * x + rays[2, 1] * y + rays[2, 2]) > heights[-1]:
-                continue
-            column = (center[0] + away * (rays[0, 0] * x + rays[0, 1] * y + rays[0, 2]) - origin[0]) / block
-            row = (center[1] + away * (rays[1, 0] * x + rays[1, 1] * y + rays[1, 2]) - origin[1]) / block
-            # The walls lie on the border of the map.
-            i = math.floor(column - 1e-3 if column > 0.5 * columns else column + 1e-3)
-            j = math.floor(row - 1e-3 if row > 0.5 * rows else row + 1e-3)
-            if not (0 <= i < columns and 0 <= j < rows and touched[int(j), int(i)]):
+            if not dark[blocks[y, x]]:
                 continue
             far, place = _UNIT / drawn.inverse_depth[y, x], np.float32(x)
             u = (from_x + far * (rise_x * place + ray_x)) * per_cell

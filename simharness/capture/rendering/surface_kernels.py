@@ -83,8 +83,9 @@ class DrawnPixels(NamedTuple):
 
     def shown(self, chosen: NDArray[np.bool_]) -> tuple[NDArray[np.int32], ...]:
         """Return visible face, column and row of chosen (h, w) pixels, (n,) int32 each, row by row."""
-        rows, columns = np.nonzero(chosen)
-        return self.triangle[rows, columns], columns.astype(np.int32), rows.astype(np.int32)
+        place = np.flatnonzero(chosen)
+        rows, columns = np.divmod(place.astype(np.int32), np.int32(chosen.shape[1]))
+        return self.triangle.ravel()[place], columns, rows
 
 
 class PixelRays(NamedTuple):

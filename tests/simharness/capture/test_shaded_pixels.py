@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simharness.capture.rendering.shaded_pixels import ShadowLayers, dim
+from simharness.capture.rendering.backgrounds import Background
+from simharness.capture.rendering.shaded_pixels import HEIGHTS, ShadowLayers, blocks_below, dim
 from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
 from simharness.capture.rendering.tone import dimming
 
@@ -24,11 +25,13 @@ def test_pixels_are_darkened_by_what_the_map_leaves_where_they_lie(height):
     coarse = np.broadcast_to(fine[::2, ::2], (4, 24, 24)).copy()
     touched = np.repeat([False, True], 3)[None].repeat(blocks, 0)
     triangle = np.zeros((HEIGHT, WIDTH), np.int32)
-    triangle[:2] = 1  # what moves is shaded otherwise
+    triangle[:2] = -1  # nothing is seen
     drawn, view = DrawnPixels(triangle, inverse_depth, np.zeros((0, 3))), PixelRays(center, rays)
+    below = blocks_below(
+        Background(rays, inverse_depth, triangle, drawn.corners), view, origin, 8 * cell, (blocks, blocks)
+    )
     rgb = np.full((HEIGHT, WIDTH, 3), 200, np.uint8)
-    heights = np.array([0.0, 0.5, 1.1, 1.9], np.float32)
-    dim(drawn, 1, view, ShadowLayers(origin, cell, fine, coarse, heights, touched), dimming(), rgb)
+    dim(drawn, below, view, ShadowLayers(origin, cell, fine, coarse, HEIGHTS, touched), dimming(), rgb)
     x = center[0] + (3.0 - height) * (np.arange(WIDTH) - 39.5) / 70.0
     dark, edge = dimming()[64, 200], 2 * cell
     assert (rgb[:, x < -edge] == 200).all()
