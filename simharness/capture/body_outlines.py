@@ -20,7 +20,6 @@ from simharness.world.humans.skinning import skin
 from simharness.world.rigs.projection import bend, fold_radius2, is_imaged
 
 _DIRECTIONS = 24  # in which the extreme vertices of a part are taken
-_FAR = 1e300  # pixels or metres
 _MIN_WEIGHT = 0.2  # least skinning weight of a vertex in a part: neighbouring parts overlap, which avoids gaps
 
 
@@ -142,15 +141,10 @@ def bounding_box(points, edges, cameras, first_row, last_row, out):
     n = len(points)
     local, pixel, state = np.empty((n, 3)), np.empty((n, 2)), np.empty(n, np.int8)
     box, image = np.empty(4), np.empty(4)
-    places = np.empty((3, n))
-    for i in range(n):
-        places[0, i], places[1, i], places[2, i] = points[i, 0], points[i, 1], points[i, 2]
     for view in range(len(cameras)):
         c = cameras[view]
         # One by one: an assignment of arrays or tuples takes seconds to compile, as it brings the text of an error.
         image[0], image[1], image[2], image[3] = -0.5, first_row * c[23] - 0.5, c[22] - 0.5, last_row * c[23] - 0.5
-        if c[25] == 0.0 and _frame_inside(places[0], places[1], places[2], c, image, out[view]):
-            continue
         box[0], box[1], box[2], box[3] = np.inf, np.inf, -np.inf, -np.inf
         all_in = True
         for i in range(n):
@@ -174,24 +168,6 @@ def bounding_box(points, edges, cameras, first_row, last_row, out):
                     _clip_edge(i, j, local, pixel, state, c, image, box)
         for k in range(4):
             out[view, k] = box[k]
-
-
-@njit(cache=True, fastmath={"nnan", "nsz"})  # vectorised by the compiler: least and greatest numbers, no sums
-def _frame_inside(xs, ys, zs, c, image, box):
-    """Write the box of points if a camera without distortion sees all of them; return whether it does."""
-    left, top, right, bottom, nearest = _FAR, _FAR, -_FAR, -_FAR, _FAR
-    for i in range(len(xs)):
-        x, y, z = xs[i], ys[i], zs[i]
-        a = c[5] * x + c[6] * y + c[7] * z + c[14]
-        b = c[8] * x + c[9] * y + c[10] * z + c[15]
-        d = c[11] * x + c[12] * y + c[13] * z + c[16]
-        x, y = a / d, b / d
-        u, v = c[0] * x + c[1] * y + c[2], c[3] * y + c[4]
-        left, right = min(left, u), max(right, u)
-        top, bottom = min(top, v), max(bottom, v)
-        nearest = min(nearest, d)
-    box[0], box[1], box[2], box[3] = left, top, right, bottom
-    return nearest >= NEAR and image[0] <= left and right <= image[2] and image[1] <= top and bottom <= image[3]
 
 
 _BEYOND, _BEHIND, IN_FRONT, _IN_IMAGE = -1, 0, 1, 2  # beyond the fold of the lens; depth below ``NEAR``

@@ -12,14 +12,13 @@ import numpy as np
 
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Camera
-from mvpose.kernels import njit
 from simharness.capture.body_outlines import Outline, boxes, packed
 from simharness.capture.filming import Observation
 from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import RayCaster
 from simharness.capture.sensor import joints_at_exposure
 from simharness.types.views import Visibility
-from simharness.world.rigs.projection import bend, is_imaged, projection_matrix
+from simharness.world.rigs.projection import project_to_image
 from simharness.world.scene.lookalikes import Lookalikes
 from simharness.world.scene.playback import Playback, PlaybackState
 
@@ -126,8 +125,6 @@ class CameraArrays:
     """Their centres in the world, (V, 3), metres."""
     axes: Floats
     """Directions of their optical axes, (V, 3)."""
-    projections: Floats
-    """``K [R | t]``, (V, 3, 4)."""
     table: Floats
     """All parameters, (V, 26), see :func:`~simharness.capture.body_outlines.packed`."""
 
@@ -141,7 +138,6 @@ class CameraArrays:
             tuple(cameras),
             np.array([camera.center for camera in cameras]).reshape(views, 3),
             np.array([camera.R[2] for camera in cameras]).reshape(views, 3),
-            np.array([projection_matrix(camera) for camera in cameras]).reshape(views, 3, 4),
             np.array([packed(camera) for camera in cameras]).reshape(views, 26),
         )
 
@@ -149,41 +145,8 @@ class CameraArrays:
         """Project points in the world, (V, ..., 3) or the same for all views, (1, ..., 3).
 
         Returns:
-            Pixels, (V, ..., 2), to the bit those of :func:`~simharness.world.rigs.projection.project_to_image`; and
-            whether they are inside the pictures, (V, ...).
+            Pixels, (V, ..., 2), and whether they are inside the pictures, (V, ...).
         """
-        views, shape = len(self.cameras), points.shape[1:-1]
-        count = int(np.prod(shape))
-        pixels, inside = np.empty((views, count, 2)), np.empty((views, count), bool)
-        flat = np.ascontiguousarray(points, float).reshape(len(points), count, 3)
-        _project(flat, self.projections, self.table, pixels, inside)
-        return pixels.reshape(views, *shape, 2), inside.reshape(views, *shape)
-
-
-@njit(cache=True)
-def _project(points, projections, table, pixels, inside):
-    """Write pixels (V, n, 2) of points (V, n, 3) or (1, n, 3), and whether they are inside the pictures, (V, n)."""
-    for view in range(len(pixels)):
-        at, c = points[min(view, len(points) - 1)], table[view]
-        bent, lens = c[25] != 0.0, c[17:22]
-        matrix = projections[view].copy()
-        if bent:
-            for i in range(3):
-                for j in range(3):
-                    matrix[i, j] = c[5 + 3 * i + j]
-                matrix[i, 3] = c[14 + i]
-        for i in range(pixels.shape[1]):
-            x, y, z = at[i, 0], at[i, 1], at[i, 2]
-            depth = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3]
-            u, v = np.nan, np.nan
-            if depth > 0.0:
-                u = (matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z + matrix[0, 3]) / depth
-                v = (matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z + matrix[1, 3]) / depth
-            if bent and depth > 0.0:
-                if is_imaged(u, v, lens, c[24]):
-                    u, v = bend(u, v, lens)
-                    u, v = c[0] * u + c[1] * v + c[2], c[3] * v + c[4]
-                else:
-                    u, v = np.nan, np.nan
-            pixels[view, i, 0], pixels[view, i, 1] = u, v
-            inside[view, i] = -0.5 <= u < c[22] - 0.5 and -0.5 <= v < c[23] - 0.5
+        points = np.broadcast_to(points, (len(self.cameras), *points.shape[1:]))
+        pixels = np.stack([project_to_image(*each) for each in zip(self.cameras, points, strict=True)])
+        return pixels, np.stack([camera.inside(at) for camera, at in zip(self.cameras, pixels, strict=True)])

@@ -192,37 +192,20 @@ def normals(vertices: np.ndarray, faces: np.ndarray, smooth: np.ndarray) -> tupl
     return of_face, of_vertex
 
 
-@njit(cache=True, error_model="numpy")
 def casters(
-    vertices: np.ndarray, faces: np.ndarray, face_normals: np.ndarray, light: np.ndarray, box: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    vertices: Floats, faces: NDArray[np.uint32], face_normals: Floats, light: NDArray[np.float64], box: NDArray
+) -> ShadowCasters:
     """Return the faces (m, 3) that may cast shadows, and the lowest and highest coordinates of their vertices, (3,).
 
     These are the faces turned to ``light`` (3,) behind which the bounding box of the scene, that of ``vertices`` and
     ``box`` (2, 3), reaches by more than ``_BOUND``. Without such a face the coordinates are those of ``vertices``.
     """
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for i in range(len(vertices)):
-        for k in range(3):
-            value = np.float64(vertices[i, k])
-            low[k], high[k] = min(low[k], value), max(high[k], value)
+    low, high = vertices.min(axis=0, initial=np.inf), vertices.max(axis=0, initial=-np.inf)
     around_low, around_high = np.minimum(low, box[0]), np.maximum(high, box[1])
-    kept, count = np.empty_like(faces), 0
-    least, most = np.full(3, np.inf), np.full(3, -np.inf)
-    for t in range(len(faces)):
-        nx, ny, nz = face_normals[t, 0], face_normals[t, 1], face_normals[t, 2]
-        if not nx * light[0] + ny * light[1] + nz * light[2] > 0:
-            continue
-        a = faces[t, 0]
-        behind = nx * ((around_low[0] if nx > 0 else around_high[0]) - vertices[a, 0])
-        behind += ny * ((around_low[1] if ny > 0 else around_high[1]) - vertices[a, 1])
-        behind += nz * ((around_low[2] if nz > 0 else around_high[2]) - vertices[a, 2])
-        if behind > -_BOUND:
-            continue
-        for j in range(3):
-            kept[count, j] = faces[t, j]
-            for k in range(3):
-                value = np.float64(vertices[faces[t, j], k])
-                least[k], most[k] = min(least[k], value), max(most[k], value)
-        count += 1
-    return kept[:count], least if count else low, most if count else high
+    way = np.where(face_normals > 0, around_low, around_high) - vertices[faces[:, 0]]
+    (nx, ny, nz), (x, y, z) = face_normals.T, way.T
+    lit = nx * light[0] + ny * light[1] + nz * light[2] > 0
+    kept = faces[lit & (nx * x + ny * y + nz * z <= -_BOUND)]
+    if len(kept):
+        low, high = vertices[kept].min(axis=(0, 1)), vertices[kept].max(axis=(0, 1))
+    return kept, low.astype(float), high.astype(float)

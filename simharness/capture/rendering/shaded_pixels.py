@@ -48,7 +48,7 @@ def blocks_below(
         side: side of a block, metres.
         shape: rows and columns of blocks.
     """
-    y, x = np.indices(background.triangle.shape, sparse=True)
+    y, x = np.ogrid[: len(background.triangle), : background.triangle.shape[1]]
     with np.errstate(divide="ignore", invalid="ignore"):
         away = 1.0 / background.inverse_depth.astype(float)
         at = [
