@@ -1,6 +1,7 @@
 """The commands of the program."""
 
 from mvpose.cli import (
+    batch_command,
     calibrate_command,
     detect_command,
     doctor_command,
@@ -12,7 +13,7 @@ from mvpose.cli import (
 from mvpose.cli.program import PROGRAM
 
 app = PROGRAM.app()
-for command in (estimate_command.estimate, detect_command.detect, detect_command.run):
+for command in (estimate_command.estimate, detect_command.detect, detect_command.run, batch_command.batch):
     app.command()(command)
 app.add_typer(networks_command.group, name="networks")
 for command in (calibrate_command.calibrate, doctor_command.doctor, repair_command.repair, view_command.view):

@@ -89,29 +89,42 @@ def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: N
     detect again.
     """
     with PROGRAM.exit_on_error(left=_LEFT):
-        from mvpose.cli.camera_pictures import assigned, check_lengths, check_sizes, common_rate, open_videos
-        from mvpose.formats.calibration.calibration_formats import read_calibration
-        from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
+        run_into(calibration, videos, choices, wanted, networks)
 
-        folder = wanted.out.absolute()
-        detections = folder.with_name(f"{folder.name}-detections")
-        wanted.check()
-        _check_folder(detections)
-        # What does not fit is found before hours of detection.
-        rig = read_calibration(calibration, size=UNKNOWN_SIZE, only=choices.only, key="--cameras", unit=choices.unit)
-        sources = assigned(rig.cameras, open_videos(videos))
-        check_sizes(rig.cameras, sources)
-        if (stated := picture_size(choices.size)) is not None and any(source.size != stated for source in sources):
-            raise ValueError(f"--size {choices.size}: the videos have pictures of another size; leave --size out")
-        if choices.frames is None:
-            check_lengths(sources)
-        skeleton = _detect(sources, detections, networks)
-        note(f"detections are kept in {detections}: another run does not detect again")
-        sizes = {source.size for source in sources}
-        size = choices.size or ("x".join(map(str, sizes.pop())) if len(sizes) == 1 else None)
-        choices = replace(choices, fps=choices.fps or common_rate(sources), size=size, skeleton=skeleton)
-        files = [detections / f"{source.name}.json" for source in sources]
-        estimate_into(calibration, files, choices, wanted, sources=sources)
+
+def run_into(calibration: Path, videos: Sequence[Path], choices: Choices, wanted: Wanted, networks: Networks) -> None:
+    """Detect the people of videos, and estimate as :func:`.estimate_into`, which tells the rest.
+
+    Args:
+        calibration: file or folder.
+        videos: videos, or folders of pictures or videos.
+        choices: options about the recording.
+        wanted: options about the results.
+        networks: what detects.
+    """
+    from mvpose.cli.camera_pictures import assigned, check_lengths, check_sizes, common_rate, open_videos
+    from mvpose.formats.calibration.calibration_formats import read_calibration
+    from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
+
+    folder = wanted.out.absolute()
+    detections = folder.with_name(f"{folder.name}-detections")
+    wanted.check()
+    _check_folder(detections)
+    # What does not fit is found before hours of detection.
+    rig = read_calibration(calibration, size=UNKNOWN_SIZE, only=choices.only, key="--cameras", unit=choices.unit)
+    sources = assigned(rig.cameras, open_videos(videos))
+    check_sizes(rig.cameras, sources)
+    if (stated := picture_size(choices.size)) is not None and any(source.size != stated for source in sources):
+        raise ValueError(f"--size {choices.size}: the videos have pictures of another size; leave --size out")
+    if choices.frames is None:
+        check_lengths(sources)
+    skeleton = _detect(sources, detections, networks)
+    note(f"detections are kept in {detections}: another run does not detect again", usual=True)
+    sizes = {source.size for source in sources}
+    size = choices.size or ("x".join(map(str, sizes.pop())) if len(sizes) == 1 else None)
+    choices = replace(choices, fps=choices.fps or common_rate(sources), size=size, skeleton=skeleton)
+    files = [detections / f"{source.name}.json" for source in sources]
+    estimate_into(calibration, files, choices, wanted, sources=sources)
 
 
 def _check_folder(folder: Path) -> None:

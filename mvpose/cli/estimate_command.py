@@ -158,7 +158,7 @@ def estimate_into(
         people = estimate_people(inputs, method, place, trust=wanted.trust)
         left_out = people.limit(wanted.limits)
         if sentences := left_out.sentences():
-            note(f"left out: {'; '.join(sentences)}")
+            note(f"left out: {'; '.join(sentences)}", usual=True)
         if wanted.filter and tracks:
             from mvpose.formats.people.filters import filter_of, filtered
 

@@ -53,7 +53,8 @@ def examine(inputs: Inputs) -> Diagnosis | None:
     except Exception as error:
         note(f"the calibration was not examined ({type(error).__name__}: {error}); `mvpose doctor` examines it alone")
         return None
-    note(f"calibration, by {len(rows)} of {len(inputs.frames)} frames: {_verdict(diagnosis)}")
+    verdict = f"calibration, by {len(rows)} of {len(inputs.frames)} frames: {_verdict(diagnosis)}"
+    note(verdict, usual=not diagnosis.alarms)
     return diagnosis
 
 
@@ -141,7 +142,7 @@ def estimate_people(inputs: Inputs, method: Estimator, folder: Path, *, trust: b
     if parts.frames and parts.frames < total and not _state_file(folder, parts.frames).is_file():
         parts = parts.emptied()
     if done := parts.frames:
-        note(f"goes on from frame {done} of {total}, where an earlier run was interrupted")
+        note(f"goes on from frame {done} of {total}, where an earlier run was interrupted", usual=True)
     with single_stage("estimate", total, done=done) as advance:
         batch: list[Estimate] = []
         for estimate, save_state in _estimates(inputs, method, folder, done):

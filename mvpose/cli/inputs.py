@@ -150,7 +150,7 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     if frames is None:
         frames, place = project.frames()
         if frames is not None:
-            note(f"frames {frames[0]} to {frames[1]}: {place}; --frames goes before it")
+            note(f"frames {frames[0]} to {frames[1]}: {place}; --frames goes before it", usual=True)
     rig = _read_rig(calibration, choices, size, examined=examined)
     unsized = any(camera.size == plausibility.UNKNOWN_SIZE for camera in rig)
     names = [camera.name for camera in rig]
@@ -164,8 +164,9 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
             frames=frames,
             progress=advance,
         )
-    for each in (recorded.assignment.text(names), *recorded.notes):
-        note(each)
+    note(recorded.assignment.text(names), usual=recorded.assignment.by_name)
+    for each in recorded.notes:
+        note(each, usual=True)
     extents = recorded.extents()
     rig, about_size = plausibility.with_sizes(rig, extents)
     if about_size:
@@ -275,7 +276,7 @@ def _times(
         return times, float(np.median(np.diff(np.nanmean(times, axis=1)))) if len(times) > 1 else 1.0 / _FPS
     rate, origin = (choices.fps, "") if choices.fps is not None else _project_rate(project)
     if origin:
-        note(f"{rate:g} frames per second: {origin}; --fps goes before it")
+        note(f"{rate:g} frames per second: {origin}; --fps goes before it", usual=True)
     elif rate is None:
         note(f"no --fps: {_FPS:g} frames per second are assumed, which sets how fast people can move")
     period = 1.0 / (rate or _FPS)

@@ -75,6 +75,14 @@ def given(name: str) -> bool:
     return name in _GIVEN.get()
 
 
+def flag(field: "dataclasses.Field[Any]") -> str:
+    """Return the option of a field of a dataclass of options: "--max-error"."""
+    about = field.metadata.get(_OPTION)
+    declared = () if about is None else (about.default, *(about.param_decls or ()))  # typer sorts them later
+    usual = f"--{field.name.replace('_', '-')}"
+    return next((each for each in declared if str(each).startswith("--")), usual).partition("/")[0]
+
+
 def _options(kind: type[Any]) -> list[inspect.Parameter]:
     """Return the fields of a dataclass as parameters."""
     hints = typing.get_type_hints(kind, include_extras=True)

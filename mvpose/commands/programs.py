@@ -10,6 +10,7 @@ import shlex
 import sys
 import traceback
 from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from dataclasses import dataclass
 
 import typer
@@ -118,6 +119,27 @@ class Program:
         raise typer.Exit(code) from None
 
 
-def note(text: str) -> None:
-    """Print a remark about the input, one line on stderr."""
+_WARNINGS: ContextVar[list[str] | None] = ContextVar("warnings", default=None)
+
+
+def note(text: str, *, usual: bool = False) -> None:
+    """Print a remark about the input, one line on stderr.
+
+    Args:
+        text: the remark.
+        usual: whether it says what was decided or done, and is no warning.
+    """
     typer.echo(f"note: {one_line(text)}", err=True)
+    if not usual and (warnings := _WARNINGS.get()) is not None:
+        warnings.append(one_line(text))
+
+
+@contextlib.contextmanager
+def warnings_of() -> Iterator[list[str]]:
+    """Give a list of the warnings of a block, which are printed as well."""
+    found: list[str] = []
+    token = _WARNINGS.set(found)
+    try:
+        yield found
+    finally:
+        _WARNINGS.reset(token)

@@ -135,6 +135,11 @@ def files_of_user(folder: Path) -> list[str]:
     return [name for name in _names(folder) if known.get(name) != _digest(folder / name)]
 
 
+def lost_files(folder: Path) -> list[str]:
+    """Return the files that a command wrote into a folder of results and that are not there any more."""
+    return [name for name in _read_manifest(folder)[1] if not (folder / name).exists()]
+
+
 _BYTES = 16  # of a digest
 
 

@@ -22,7 +22,7 @@ CUSTOM = "CUSTOM"
 
 _LEVELS = 4  # folders above the detections of a camera: pose, trial, participant, session
 _POSES = ("pose", "pose-2d", "pose_2d")
-_TABLES = {"project", *_POSES, "calibration", "triangulation"}
+_TABLES = {"project", *_POSES, "calibration", "triangulation", "filtering"}
 
 
 @dataclass(frozen=True)

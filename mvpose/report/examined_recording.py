@@ -84,12 +84,14 @@ class ExaminedRecording:
     def numbers(self) -> dict[str, Any]:
         """Return all numbers of the page as values that ``json.dumps`` writes."""
         people, pixels, metres = self.people, *self.residual
+        views = self.views[self.views >= 0]
         return {
             "frames": people.frames,
             "rate_hz": _json(people.rate),
             "frames_measured": len(self.seen.frames),
             "residual_px": _json(pixels),
             "residual_mm": _json(1000 * metres),
+            "mean_views": _json(float(np.mean(views)) if len(views) else math.nan),
             "joints_on_one_view": _json(measures.share_on_one_view(self.supports)),
             "expected_error_mm": _json(1000 * expected_error(people)),
             "people": [self._numbers_of_person(row) for row in range(len(people))],

@@ -116,6 +116,7 @@ MVPOSE = (  # run by tests/mvpose/cli
     "mvpose networks get movenet",
     "mvpose run CALIBRATION VIDEO... --out results",
     "mvpose run CALIBRATION VIDEO... --detector det.onnx --pose pose.onnx --out results",
+    "mvpose batch PROJECT",
     "mvpose view results",
 )
 SHELL = (". .venv/bin/activate",)

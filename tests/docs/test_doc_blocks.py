@@ -12,6 +12,7 @@ import pytest
 from doc_pages import FENCE, PAGES, ROOT, blocks
 
 import simharness
+from mvpose.cli.project_file import LabProject
 from mvpose.wholebody import read_skeleton
 from simharness.planning.candidates import candidates_in
 from simharness.planning.rehearsal_scene import RehearsalSetup
@@ -24,7 +25,7 @@ from simharness.scenario.sections.room_section import ClutterSection
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in FENCE.findall(page))
-    assert languages == {"python": 15, "toml": 15, "yaml": 3}
+    assert languages == {"python": 15, "toml": 16, "yaml": 3}
 
 
 def test_the_shares_of_the_face_are_valid():
@@ -51,6 +52,20 @@ def test_the_push_of_the_scenarios_is_valid():
     (block,) = {block for block in blocks("toml") if "[people.push]\n" in block}
     people = PeopleSection.model_validate_json(json.dumps(tomllib.loads(block)["people"]), strict=True)
     assert people.push.impulse / people.push.duration == 500.0
+
+
+def test_the_project_of_the_guide_is_read(tmp_path):
+    (file,) = [block for block in blocks("toml") if "[trials.dance]" in block]
+    for folder in ("day1/walk", "day1/jump", "day2/walk"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "project.toml").write_text(file, encoding="utf-8")
+    trials = {trial.name: trial for trial in LabProject.read(tmp_path).trials}
+    assert list(trials) == ["day1/jump", "day1/walk", "day2/walk", "dance"]
+    rates = [trial.options(tmp_path)[0].fps for trial in trials.values()]
+    assert rates == [120, 60, 60, 60]
+    assert trials["day2/walk"].paths("detections") == [tmp_path / "day2" / "walk" / "pose"]
+    assert trials["dance"].paths("videos") == [tmp_path / "films" / "dance"]
+    assert not trials["dance"].paths("detections")
 
 
 def test_the_search_of_the_guide_is_read(tmp_path):

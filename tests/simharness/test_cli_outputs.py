@@ -56,13 +56,13 @@ FOLDERS = {
 }
 """Options that name a folder, a call with each, and the folder in it that the command writes."""
 
-ELSEWHERE: set[str] = set()
+ELSEWHERE = {"mvpose batch --out"}
 """Options that other tests call."""
 
 READ = {
     "calibration", "detections", "videos", "folder", "recording", "fit_on", "rival", "scenario", "suite", "file",
     "study", "stores", "room", "scenes", "other_scenes", "poses", "pictures", "times", "detector", "pose", "skeleton",
-    "package", "source", "predictions", "benchmark", "intrinsics",
+    "package", "source", "predictions", "benchmark", "intrinsics", "project",
 }  # fmt: skip
 """Parameters whose files are read alone."""
 

@@ -67,13 +67,14 @@ def read_beside(path: Path, *, what: str) -> dict[str, Any]:
         ValueError: as :func:`read_storage`, for either file.
     """
     values = read_storage(path, what=what)
-    other = _other(path)
+    other = counterpart(path)
     if other is not None and other.exists():
         values = {**read_storage(other, what=what), **values}
     return values
 
 
-def _other(path: Path) -> Path | None:
+def counterpart(path: Path) -> Path | None:
+    """Return the file beside one of intrinsics or extrinsics that has the rest; None for one of another name."""
     for part, counterpart in (("intri", "extri"), ("extri", "intri")):
         if part in path.name:
             return path.with_name(path.name.replace(part, counterpart))
@@ -82,7 +83,7 @@ def _other(path: Path) -> Path | None:
 
 def missing_half(path: Path) -> str:
     """Return the name of the counterpart file for messages, or the names that both files should have."""
-    other = _other(path)
+    other = counterpart(path)
     return f"{other.name} beside it" if other else "a file beside it (the two must be called intri.yml and extri.yml)"
 
 

@@ -12,7 +12,9 @@ from mvpose.formats.detections.detection_file import LONG_LIST, DetectionFile
 from mvpose.formats.detections.detection_formats import FORMATS, suffixes
 from mvpose.formats.pose2sim_project import folder_names
 
-_INSIDE = ("pose-sync", "pose", "pose-2d", "predictions")  # folders of Pose2Sim and MMPose that hold detections
+POSES = ("pose-sync", "pose", "pose-2d", "predictions")
+"""Names of the folders of Pose2Sim and MMPose that hold detections."""
+
 _AFFIXES = re.compile(r"^(alphapose-results_|results_)|(_json|_keypoints|_predictions|_results|_detections)$")
 _SETTINGS = MIB  # bytes
 _KINDS = "OpenPose folders, COCO or AlphaPose results, MMPose predictions or RTMLib arrays (*.json, *.npz)"
@@ -68,7 +70,7 @@ def _below(path: Path) -> list[Source]:
             return [_source(path)]
         return [replace(_source(each), recognised=_is_detections(each)) for each in files]
     folders = sorted((each for each in path.iterdir() if each.is_dir()), key=natural_order)
-    for inside in folder_names(path, "pose_folder_name", _INSIDE):
+    for inside in folder_names(path, "pose_folder_name", POSES):
         if path / inside in folders:
             return _below(path / inside)
     found = [_source(each) for each in folders if _files(each)]

@@ -25,6 +25,7 @@ BASES = {
     "run": "{lab}/Small.toml {lab}/pictures --out {out} --detector {detector} --pose {pose} --method fast --no-page "
     "--no-doctor --trust",
     "view": "{lab}/seen --no-browser",
+    "batch": "{lab}/project.toml",
 }
 """Words that come first."""
 
@@ -101,6 +102,7 @@ ROWS = {
         "provider": Row("--provider cuda"),
     },
     "view": {"browser": Row("--browser")},
+    "batch": {"out": Row("--out {out}")},
 }
 ROWS["run"] = ROWS["detect"] | {key: READ[key] for key in ("cameras", "frames", "up")} | {"fps": Row("--fps 50")}
 ROWS["run"] |= {"page": RESULTS["page"], "films": RESULTS["films"], "formats": RESULTS["formats"]}
@@ -148,6 +150,8 @@ def walk(tmp_path_factory, networks):  # noqa: F811
     for camera in small:
         seen = [camera.project(np.array([0.1 * k, 0.0, 1.0])) for k in range(6)]
         write_folder(lab / "pictures" / camera.name, [picture(SIZE, (*each, 4.0, (220, 220, 220))) for each in seen])
+    project = 'calibration = "Calib.toml"\nmethod = "fast"\npage = false\ndoctor = false\nout = "first"\n'
+    (lab / "project.toml").write_text(project + '[trials.walk]\ndetections = "openpose"\n')
     (lab / "seen").mkdir()
     (lab / "seen" / "recording.html").write_text("<html></html>")
     detector, pose = networks
