@@ -10,6 +10,7 @@ from pathlib import Path
 from benchmarks.planted_bugs import report
 from benchmarks.planted_bugs.catalogue import Bug, read_catalogue, unplantable
 from benchmarks.planted_bugs.checkout import ROOT, digest_of_checkout
+from benchmarks.planted_bugs.hunting import HUNTED
 from benchmarks.planted_bugs.records import Records
 from benchmarks.planted_bugs.work import Bench
 
@@ -36,7 +37,8 @@ def _run(options: argparse.Namespace) -> int:
     catalogue = read_catalogue()
     if unknown := set(options.only or ()) - catalogue.keys():
         raise ValueError(f"--only: no bug {', '.join(sorted(unknown))}; --list names them")
-    bugs = [bug for bug in catalogue.values() if not options.only or bug.id in options.only]
+    chosen = options.only or (HUNTED if options.by == "hunt" else ())
+    bugs = [bug for bug in catalogue.values() if not chosen or bug.id in chosen]
     if messages := unplantable({bug.id: bug for bug in bugs}, ROOT):
         raise ValueError("\n".join(messages))
     if options.list:
@@ -50,8 +52,9 @@ def _run(options: argparse.Namespace) -> int:
         return _clean_runs(bench, options.clean_runs)
     gate = bench.gate(bugs) if options.by in ("both", "gate") else {}
     tests = bench.tests(bugs) if options.by in ("both", "tests") else {}
+    hunts = bench.hunts(bugs) if options.by == "hunt" else {}
     effects = bench.effects(_with_scores(bugs), seeds=options.seeds) if options.effects else {}
-    results = report.rows(bugs, gate, tests, effects)
+    results = report.rows(bugs, gate, tests, effects, hunts)
     print(f"{report.table(results)}\n\n{report.totals(results)}")
     missed = [row for row in results if row.bug.effect == "real" and not row.caught]
     return int(options.by != "none" and len(missed) > _MISSED)
@@ -73,7 +76,9 @@ def _with_scores(bugs: Sequence[Bug]) -> list[Bug]:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.planted_bugs", description=__doc__)
     parser.add_argument("folder", type=Path, nargs="?", help="folder for copies, kernels, simulations and results")
-    parser.add_argument("--by", choices=("both", "gate", "tests", "none"), default="both", help="what has to notice")
+    parser.add_argument(
+        "--by", choices=("both", "gate", "tests", "hunt", "none"), default="both", help="what has to notice"
+    )
     parser.add_argument("--only", nargs="+", metavar="ID", help="some bugs only")
     parser.add_argument("--list", action="store_true", help="check that the bugs apply to the code, and list them")
     parser.add_argument("--effects", action="store_true", help="measure effects on scores with fresh seeds")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from benchmarks.planted_bugs.catalogue import Bug
 from benchmarks.planted_bugs.records import Outcome
@@ -19,26 +20,34 @@ class Row:
     gate: Outcome | None
     tests: Outcome | None
     effect: str
+    hunt: Outcome | None = None
 
     @property
     def caught(self) -> bool:
-        """Whether the gate or the tests noticed the bug."""
-        return any(each is not None and each.caught for each in (self.gate, self.tests))
+        """Whether the gate, the tests or a hunt noticed the bug."""
+        return any(each is not None and each.caught for each in (self.gate, self.tests, self.hunt))
 
 
 def rows(
-    bugs: Iterable[Bug], gate: Mapping[str, Outcome], tests: Mapping[str, Outcome], effects: Mapping[str, str]
+    bugs: Iterable[Bug],
+    gate: Mapping[str, Outcome],
+    tests: Mapping[str, Outcome],
+    effects: Mapping[str, str],
+    hunts: Mapping[str, Outcome] = MappingProxyType({}),
 ) -> list[Row]:
     """Return a row for each bug from the results by name; an effect that was not measured is that of the catalogue."""
-    return [Row(bug, gate.get(bug.id), tests.get(bug.id), effects.get(bug.id, bug.measured)) for bug in bugs]
+    return [
+        Row(bug, gate.get(bug.id), tests.get(bug.id), effects.get(bug.id, bug.measured), hunts.get(bug.id))
+        for bug in bugs
+    ]
 
 
 def table(results: Iterable[Row]) -> str:
     """Return the results as a Markdown table."""
-    lines = ["| bug | breaks | effect | gate | tests |", "|---|---|---|---|---|"]
+    lines = ["| bug | breaks | effect | gate | tests | hunt |", "|---|---|---|---|---|---|"]
     for row in results:
         effect = " · ".join(filter(None, (row.bug.effect, row.effect or row.bug.why)))
-        cells = (row.bug.id, row.bug.breaks, effect, _cell(row.gate), _cell(row.tests))
+        cells = (row.bug.id, row.bug.breaks, effect, _cell(row.gate), _cell(row.tests), _cell(row.hunt))
         lines.append("| " + " | ".join(each.replace("|", "/") for each in cells) + " |")
     return "\n".join(lines)
 
@@ -49,15 +58,14 @@ def totals(results: Iterable[Row]) -> str:
     results = list(results)
     for effect in dict.fromkeys(row.bug.effect for row in results):
         of_effect = [row for row in results if row.bug.effect == effect]
-        gate, tests = (sum(bool(each and each.caught) for each in column) for column in _columns(of_effect))
+        by = [
+            f"by {name} {sum(bool(getattr(row, field)) and getattr(row, field).caught for row in of_effect)}"
+            for field, name in (("gate", "the gate"), ("tests", "tests"), ("hunt", "hunts"))
+        ]
         missed = [row.bug.id for row in of_effect if not row.caught]
-        line = f"{effect}: {len(of_effect)} bugs, caught by the gate {gate}, by tests {tests}, by neither {len(missed)}"
+        line = f"{effect}: {len(of_effect)} bugs, caught {', '.join(by)}, by none {len(missed)}"
         lines.append(f"{line}: {', '.join(missed)}" if missed else line)
     return "\n".join(lines)
-
-
-def _columns(results: list[Row]) -> tuple[list[Outcome | None], list[Outcome | None]]:
-    return [row.gate for row in results], [row.tests for row in results]
 
 
 def _cell(outcome: Outcome | None) -> str:

@@ -14,6 +14,7 @@ from benchmarks.planted_bugs.catalogue import Bug, read_catalogue
 from benchmarks.planted_bugs.checkout import Checkout
 from benchmarks.planted_bugs.effects import effect, fresh_seeds, read_scores
 from benchmarks.planted_bugs.gate import Gate, write_suite
+from benchmarks.planted_bugs.hunting import hunt_bug
 from benchmarks.planted_bugs.near_tests import run_tests
 from benchmarks.planted_bugs.records import Outcome, Records
 from benchmarks.planted_bugs.simulations import first_stage
@@ -84,6 +85,14 @@ class Bench:
         bugs = list(bugs)
         gates = {suite: self._gate(suite) for suite in _suites(bugs)}
         return self._outcomes("gate", bugs, lambda bug: gates[bug.suite].check_bug(self._clean, bug, limit=self._limit))
+
+    def hunts(self, bugs: Iterable[Bug]) -> dict[str, Outcome]:
+        """Hunt for each bug, with the bug planted."""
+
+        def run(bug: Bug) -> Outcome:
+            return hunt_bug(self._clean, bug, folder=self._folder / "hunts" / bug.id, limit=self._limit)
+
+        return self._outcomes("hunt", bugs, run)
 
     def effects(self, bugs: Iterable[Bug], *, seeds: int) -> dict[str, str]:
         """Measure the effect of each bug on the scores of its suite with fresh seeds, as text."""

@@ -11,6 +11,7 @@ found, so that the same command continues an interrupted hunt and ends with the 
 
 import json
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -20,7 +21,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.commands.output_files import write_text
 from mvpose.commands.progress import Reporter
 from mvpose.files.input_files import parse_json, read_bytes
@@ -38,6 +39,7 @@ BATCH = 16
 
 _ISO, _LINE = 0.1, 0.2  # spread of new points about an elite, and along the way to another one
 _UNIFORM = 4  # one in so many points is anywhere
+_SAME = 0.5  # share of the others that keep the scene of their elite
 T = TypeVar("T")
 
 
@@ -73,6 +75,10 @@ class HuntedPoint:
     """Why the trial could not be run; "" where it ran."""
 
 
+Search = Callable[[Floats, Floats, int, int, int], tuple[Floats, Integers]]
+"""Search of points, as :func:`next_points`."""
+
+
 def distinct(
     points: Iterable[HuntedPoint], kind: Callable[[HuntFinding], T], *, robust: bool = True
 ) -> dict[T, tuple[HuntedPoint, HuntFinding]]:
@@ -92,23 +98,29 @@ def distinct(
     return best
 
 
-def next_points(elites: Floats, dimensions: int, seed: int, batch: int) -> Floats:
-    """Return the next :data:`BATCH` points of the unit cube, (n, d): some anywhere, the others near the elites (m, d).
+def next_points(elites: Floats, weights: Floats, dimensions: int, seed: int, batch: int) -> tuple[Floats, Integers]:
+    """Return the next :data:`BATCH` points of the unit cube, (n, d), and the elite whose scene each keeps, (n,).
+
+    One point in four is anywhere, the others are near elites; half of these are in the scene of the elite, with the
+    same people and motion, because that too is what made it fail. -1: a new scene.
 
     Args:
-        elites: points that fail most reliably in their cells; all points are anywhere where there are none.
+        elites: points that fail most reliably in their cells (m, d); all points are anywhere where there are none.
+        weights: how often each is varied (m,), in relation to the others.
         dimensions: d.
         seed: seed of the search.
         batch: number of the batch.
     """
     rng = stream(seed, "hunt", "search", batch)
-    points = rng.random((BATCH, dimensions))
+    points, kept = rng.random((BATCH, dimensions)), np.full(BATCH, -1)
     if len(elites):
-        one, other = elites[rng.integers(len(elites), size=(2, BATCH))]
-        varied = one + rng.normal(scale=_ISO, size=one.shape) + rng.normal(scale=_LINE, size=(BATCH, 1)) * (other - one)
-        anywhere = np.arange(BATCH)[:, None] % _UNIFORM == 0
-        points = np.where(anywhere, points, np.clip(varied, 0.0, 1.0))
-    return points
+        one, other = rng.choice(len(elites), size=(2, BATCH), p=weights / weights.sum())
+        along = rng.normal(scale=_LINE, size=(BATCH, 1)) * (elites[other] - elites[one])
+        varied = elites[one] + rng.normal(scale=_ISO, size=points.shape) + along
+        near = np.arange(BATCH) % _UNIFORM != 0
+        points[near] = np.clip(varied, 0.0, 1.0)[near]
+        kept = np.where(near & (rng.random(BATCH) < _SAME), one, kept)
+    return points, kept
 
 
 def run_hunt(
@@ -120,6 +132,7 @@ def run_hunt(
     keep_most: int = 10,
     workers: int = 1,
     reporter: Reporter,
+    search: Search = next_points,
 ) -> tuple[list[HuntedPoint], list[KeptFailure]]:
     """Search, then shrink and keep a failure of each property and stage.
 
@@ -131,6 +144,7 @@ def run_hunt(
         keep_most: largest number of kept failures.
         workers: processes that share the trials; the results do not depend on it.
         reporter: receiver of progress.
+        search: search of points.
 
     Returns:
         The trials in the order of the search, and the kept failures.
@@ -147,16 +161,19 @@ def run_hunt(
     start, stored, points = time.monotonic(), _stored(hunt, folder / TRIALS), list[HuntedPoint]()
     with reporter.stage("trials", trials or 0) as advance:
         while (trials is None or len(points) < trials) and (seconds is None or time.monotonic() - start < seconds):
-            elites = [point.shares for point, _ in distinct(points, lambda each: each.cell, robust=False).values()]
-            asked = next_points(np.array(elites), len(axes), hunt.seed, len(points) // BATCH).tolist()
+            elites, weights = _elites(points)
+            shares = np.array([point.shares for point in elites])
+            asked, scenes = search(shares, weights, len(axes), hunt.seed, len(points) // BATCH)
+            new = hunt.plan.base.seed + len(points)
+            seeds = [new + n if elite < 0 else elites[elite].seed for n, elite in enumerate(scenes)]
             batch = [
                 HuntedPoint(
                     number,
-                    tuple(shares),
-                    dict(pair for axis, share in zip(axes, shares, strict=True) for pair in axis.at(share)),
-                    hunt.plan.base.seed + number,
+                    tuple(point),
+                    dict(pair for axis, share in zip(axes, point, strict=True) for pair in axis.at(share)),
+                    scene,
                 )
-                for number, shares in enumerate(asked, len(points))
+                for number, (point, scene) in enumerate(zip(asked.tolist(), seeds, strict=True), len(points))
                 if trials is None or number < trials
             ]
             for point in _measured(hunt, [each for each in batch if each.trial not in stored], workers):
@@ -175,6 +192,19 @@ def run_hunt(
                 write_failure(failure, folder / "failures")
             advance(1)
     return points, kept
+
+
+def _elites(points: Sequence[HuntedPoint]) -> tuple[list[HuntedPoint], Floats]:
+    """Return the most reliable trial of each cell, and how often each is varied in relation to the others.
+
+    The more reliably a trial fails the more often it is varied, and all kinds of failures, each with its stage, alike
+    often: otherwise the most frequent one, which has the most cells, would take most of the trials.
+    """
+    found = [each for each in distinct(points, lambda each: each.cell, robust=False).values() if each[1].failed]
+    of_kind = Counter[tuple[str, str]]()
+    for _, finding in found:
+        of_kind[finding.cell[:2]] += finding.failed
+    return [point for point, _ in found], np.array([each.failed / of_kind[each.cell[:2]] for _, each in found])
 
 
 def _stored(hunt: Hunt, path: Path) -> dict[int, HuntedPoint]:

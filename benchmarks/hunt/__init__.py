@@ -1,0 +1,1 @@
+"""Distinct failures that the search of a hunt, random points and Latin hypercubes find in the same number of trials."""
