@@ -1,18 +1,21 @@
-"""Hunts for planted bugs: a bug is found if a frame that was kept fails with the bug, and does not without it."""
+"""Hunts for planted bugs: a bug is found if a trial fails with most draws of noise with it, and not without it."""
 
 from __future__ import annotations
 
 import json
 import shutil
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.planted_bugs.catalogue import Bug
 from benchmarks.planted_bugs.checkout import Checkout
 from benchmarks.planted_bugs.records import Outcome
-from simharness.hunt.kept_failure import failures_in
+from simharness.hunt.hunt_run import TRIALS as TRIALS_FILE
+from simharness.hunt.hunted_trial import NOISES, hunt_in_trial
 from simharness.hunt.properties import USUAL
+from simharness.scenario.load import read_plan
 
 SCENARIO = Path(__file__).with_name("hunted.toml")
 TRIALS = 64
@@ -34,11 +37,12 @@ HUNTED = (
 )
 """Bugs of the method that are hunted by default. The last two change no result: finding one would be a false alarm."""
 
-_MOST, _FEWEST = 0.2, 0.8  # shares of noise seeds with which a frame that a bug breaks fails without and with it
+_PROPERTIES = (*USUAL, "displaced_joint")
+_FEWEST = NOISES - 1  # fresh draws of noise of which a failure takes so many with the bug, and none without it
 
 
 def hunt_bug(clean: Checkout, bug: Bug, *, folder: Path, limit: float) -> Outcome:
-    """Hunt in a copy with a bug, and replay the kept failures in the copy without it.
+    """Hunt in a copy with a bug, and run the trials that failed in the copy without it.
 
     Args:
         clean: the copy without the bug.
@@ -47,41 +51,37 @@ def hunt_bug(clean: Checkout, bug: Bug, *, folder: Path, limit: float) -> Outcom
         limit: time limit, seconds.
     """
     shutil.rmtree(folder, ignore_errors=True)
-    properties = [word for name in (*USUAL, "displaced_joint") for word in ("--property", name)]
+    properties = [word for name in _PROPERTIES for word in ("--property", name)]
     scenario = str(clean.root / "benchmarks" / "planted_bugs" / SCENARIO.name)
+    options = ["--trials", str(TRIALS), "--keep", "0", "--out", str(folder), *properties]
     with clean.planted(bug) as planted:
-        done = planted.run(
-            ["-m", "simharness.cli", "hunt", scenario, *properties, "--trials", str(TRIALS), "--out", str(folder)],
-            limit=limit,
-        )
+        done = planted.run(["-m", "simharness.cli", "hunt", scenario, *options], limit=limit)
     if done.code != 0:
         what = "no end" if done.code is None else (done.output.strip().splitlines() or ["no output"])[-1]
         return Outcome(True, f"the hunt stops: {what}", done.seconds)
-    kept = folder / "hunted" / "failures"
-    if not kept.is_dir():
-        return Outcome(False, "", done.seconds)
-    replayed = clean.run(["-m", "benchmarks.planted_bugs.hunting", str(kept)], limit=limit)
-    if replayed.code != 0:
-        raise RuntimeError(f"failures cannot be replayed:\n{replayed.output}")
-    rows = map(json.loads, replayed.output.strip().splitlines())
-    found = [
-        each for each in rows if each["before"] >= _FEWEST * each["seeds"] and each["now"] <= _MOST * each["seeds"]
-    ]
-    what = "; ".join(f"{each['name']}, {each['before']} of {each['seeds']}, without {each['now']}" for each in found)
-    return Outcome(bool(found), what, done.seconds)
+    again = clean.run(["-m", "benchmarks.planted_bugs.hunting", str(folder / "hunted" / TRIALS_FILE)], limit=limit)
+    if again.code != 0:
+        raise RuntimeError(f"trials cannot be run without the bug:\n{again.output}")
+    found = again.output.strip().splitlines()
+    return Outcome(bool(found), found[0] if found else "", done.seconds)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print with how many seeds of noise each kept failure of a folder failed when it was kept, and fails now."""
-    (folder,) = sys.argv[1:] if arguments is None else arguments
-    for each in failures_in(Path(folder)):
-        row = {
-            "name": each.name,
-            "seeds": each.noise_seeds,
-            "before": each.noise_failed,
-            "now": each.noise_failed_now(),
-        }
-        print(json.dumps(row))
+    """Print the failures of a file of trials that come back with (almost) all draws of noise there, and with none here.
+
+    A line for each property, with the number of its failures, the most frequent property first.
+    """
+    (path,) = sys.argv[1:] if arguments is None else arguments
+    plan, found = read_plan(SCENARIO), Counter[str]()
+    for row in map(json.loads, Path(path).read_text(encoding="utf-8").splitlines()[1:]):
+        failed = [each for each in row["findings"] if each["failed"] >= _FEWEST]
+        if not failed:
+            continue
+        now = hunt_in_trial(plan.at(row["values"], row["seed"]), ("full",), properties=_PROPERTIES)
+        known = {(each.violated, each.person) for each in now.findings}
+        found.update(each["violated"] for each in failed if (each["violated"], each["person"]) not in known)
+    for name, count in found.most_common():
+        print(f"{name}: {count} failures that are none without the bug")
 
 
 if __name__ == "__main__":

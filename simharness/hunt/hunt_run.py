@@ -161,7 +161,7 @@ def run_hunt(
     start, stored, points = time.monotonic(), _stored(hunt, folder / TRIALS), list[HuntedPoint]()
     with reporter.stage("trials", trials or 0) as advance:
         while (trials is None or len(points) < trials) and (seconds is None or time.monotonic() - start < seconds):
-            elites, weights = _elites(points)
+            elites, weights = elites_of(points)
             shares = np.array([point.shares for point in elites])
             asked, scenes = search(shares, weights, len(axes), hunt.seed, len(points) // BATCH)
             new = hunt.plan.base.seed + len(points)
@@ -194,7 +194,7 @@ def run_hunt(
     return points, kept
 
 
-def _elites(points: Sequence[HuntedPoint]) -> tuple[list[HuntedPoint], Floats]:
+def elites_of(points: Sequence[HuntedPoint]) -> tuple[list[HuntedPoint], Floats]:
     """Return the most reliable trial of each cell, and how often each is varied in relation to the others.
 
     The more reliably a trial fails the more often it is varied, and all kinds of failures, each with its stage, alike

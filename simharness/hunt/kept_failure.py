@@ -7,7 +7,6 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -69,16 +68,8 @@ class KeptFailure(FrozenFrame):
         """Return the joints (n, 17, 3) that the method finds in the frame now, and whether it still fails."""
         judge = judge_of(self.variant, self.rival, self.estimators)
         rig, detections, _ = self.detected()
-        return judge.variant.estimate(rig, detections).joints, judge.fails(self._violation, self)
-
-    def noise_failed_now(self) -> int:
-        """Return of how many of :data:`SEEDS` seeds of additional noise the frame fails with the present method."""
-        judge = judge_of(self.variant, self.rival, self.estimators)
-        return fresh_noise(self, partial(judge.fails, self._violation))
-
-    @property
-    def _violation(self) -> Violation:
-        return Violation(self.violated, self.person, "", tuple(map(COCO17.index, self.joints)))
+        target = Violation(self.violated, self.person, "", tuple(map(COCO17.index, self.joints)))
+        return judge.variant.estimate(rig, detections).joints, judge.fails(target, self)
 
 
 def judge_of(variant: str, rival: str = "", estimators: EstimatorsSection | None = None) -> Judge:

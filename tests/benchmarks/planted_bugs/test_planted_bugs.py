@@ -203,6 +203,9 @@ class TestReport:
         bugs = [dataclasses.replace(BUG, id=name) for name in ("a", "b", "c")]
         gate = {"a": Outcome(True, "worse PCP", 1.0), "b": Outcome(False, "", 1.0), "c": Outcome(False, "", 1.0)}
         tests = {"a": Outcome(False, "", 1.0), "b": Outcome(True, "t.py::f", 1.0), "c": Outcome(False, "", 1.0)}
+        hunts = {"c": Outcome(True, "ghost", 1.0)}
         rows = report.rows(bugs, gate, tests, {})
-        assert report.totals(rows) == "real: 3 bugs, caught by the gate 1, by tests 1, by neither 1: c"
-        assert "| a | sums are differences | real | worse PCP | passed |" in report.table(rows)
+        assert report.totals(rows) == "real: 3 bugs, caught by the gate 1, by tests 1, by hunts 0, by none 1: c"
+        assert "| a | sums are differences | real | worse PCP | passed | not run |" in report.table(rows)
+        rows = report.rows(bugs, gate, tests, {}, hunts)
+        assert report.totals(rows) == "real: 3 bugs, caught by the gate 1, by tests 1, by hunts 1, by none 0"

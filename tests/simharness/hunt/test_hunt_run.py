@@ -9,7 +9,7 @@ from crowded_frames import crowd
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.hunt.hunt_run import BATCH, TRIALS, HuntedPoint, distinct, next_points
+from simharness.hunt.hunt_run import BATCH, TRIALS, HuntedPoint, distinct, elites_of, next_points
 from simharness.hunt.hunted_trial import NOISES, HuntFinding, circumstances
 from simharness.hunt.kept_failure import read_failure
 
@@ -132,31 +132,65 @@ def test_circumstances():
 ELITE = np.array([0.9, 0.1, 0.2])
 
 
+NONE = np.zeros((0, 3))
+ELITES = np.array([[0.2, 0.5, 0.5], [0.8, 0.5, 0.5]])
+
+
+def points_of(elites, weights=None, *, batches=60, seed=5):
+    """Points of several batches (n, d), and the elites whose scenes they keep (n,)."""
+    weights = np.ones(len(elites)) if weights is None else np.array(weights)
+    found = [next_points(elites, weights, 3, seed, batch) for batch in range(batches)]
+    return np.concatenate([points for points, _ in found]), np.concatenate([kept for _, kept in found])
+
+
 def test_points_follow_from_the_seed_and_stay_in_the_cube():
-    none, elites = np.zeros((0, 3)), np.array([[0.0, 1.0, 0.5], [1.0, 1.0, 0.0]])
-    for known in (none, elites):
-        points = np.concatenate([next_points(known, 3, 5, batch) for batch in range(20)])
+    for known in (NONE, np.array([[0.0, 1.0, 0.5], [1.0, 1.0, 0.0]])):
+        points, kept = points_of(known, batches=20)
         assert points.shape == (20 * BATCH, 3)
         assert points.min() >= 0
         assert points.max() <= 1
-        np.testing.assert_array_equal(points[:BATCH], next_points(known, 3, 5, 0))
-        assert not np.array_equal(points[:BATCH], next_points(known, 3, 6, 0))
+        again = points_of(known, batches=20)
+        np.testing.assert_array_equal(points, again[0])
+        np.testing.assert_array_equal(kept, again[1])
+        assert not np.array_equal(points, points_of(known, batches=20, seed=6)[0])
 
 
-def test_three_in_four_points_are_near_the_elites():
-    points = np.concatenate([next_points(ELITE[None], 3, 5, batch) for batch in range(40)])
-    near = np.linalg.norm(points - ELITE, axis=1) < 0.35
+def test_three_in_four_points_are_near_the_elites_and_half_of_them_in_their_scenes():
+    points, kept = points_of(ELITES[1:])
+    near = np.linalg.norm(points - ELITES[1], axis=1) < 0.35
     assert 0.7 < near.mean() < 0.85
-    away = np.concatenate([next_points(np.zeros((0, 3)), 3, 5, batch) for batch in range(40)])
-    assert (np.linalg.norm(away - ELITE, axis=1) < 0.35).mean() < 0.1
+    away, new = points_of(NONE)
+    assert (np.linalg.norm(away - ELITES[1], axis=1) < 0.35).mean() < 0.15
     np.testing.assert_array_equal(points[::4], away[::4])
+    assert set(new) == {-1}
+    assert set(kept[::4]) == {-1}
+    assert 0.3 < (kept == 0).mean() < 0.45
+
+
+def test_elites_are_varied_as_often_as_their_weights():
+    points, kept = points_of(ELITES, [1.0, 3.0])
+    assert 0.66 < (kept[kept >= 0] == 1).mean() < 0.84
+    for elite in (0, 1):
+        of_it = points[kept == elite]
+        assert np.abs(of_it - ELITES[elite]).mean(axis=0)[1:].max() < 0.12
 
 
 def test_points_along_the_way_between_two_elites():
     """Between two elites the spread is larger along the way from one to the other than across."""
-    elites = np.array([[0.2, 0.5, 0.5], [0.8, 0.5, 0.5]])
-    points = np.concatenate([next_points(elites, 3, 1, batch) for batch in range(60)])
-    points = points[np.arange(len(points)) % 4 != 0]
-    off = points - elites[np.abs(points[:, None] - elites).sum(axis=2).argmin(axis=1)]
+    points, kept = points_of(ELITES)
+    points, kept = points[kept >= 0], kept[kept >= 0]
+    off = points - ELITES[kept]
     assert off[:, 1].std() == pytest.approx(0.1, abs=0.015)
-    assert points[:, 0].std() > 2.5 * off[:, 1].std()
+    assert 1.1 * off[:, 1].std() < off[:, 0].std() < 1.6 * off[:, 1].std()
+
+
+def test_all_kinds_of_failures_are_varied_alike_often_and_reliable_ones_more():
+    """Five kinds of circumstances of one failure have together the weight of the only one of another."""
+    found = [finding(overlap=overlap, distance=2.0 * far) for overlap in (0.0, 0.2, 0.9) for far in (0, 1)]
+    found = [*found[:5], finding(violated="ghost"), finding(violated="missed", failed=0)]
+    found[0] = replace(found[0], failed=1)
+    points = [HuntedPoint(number, (), {}, number, (each,)) for number, each in enumerate(found)]
+    parents, weights = elites_of(points)
+    assert [each.seed for each in parents] == list(range(6))
+    assert weights[:5].sum() == pytest.approx(weights[5])
+    assert weights[1] == pytest.approx(NOISES * weights[0])
