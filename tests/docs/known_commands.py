@@ -126,6 +126,7 @@ MODULES = tuple(
         "benchmarks.doctor",
         "benchmarks.doctor.breaks",
         "benchmarks.expected_error",
+        "benchmarks.hunt",
         "benchmarks.method",
         "benchmarks.pictures",
         "benchmarks.simulator",
