@@ -26,7 +26,8 @@ _DEPTHS = np.geomspace(0.3, 60.0, 160)  # metres along a ray, of the points that
 _MOST_LINES = len(VARIANT_COLORS)  # in a pair of pictures: more hide each other
 _INEXACT = 0.1  # OKS sigma of joints that are not drawn
 _NICE = (1.0, 2.0, 5.0)  # leading digits of factors
-_ARROW = 0.11  # of the width of the picture: length of a long arrow
+_ARROW = 0.16  # of the width of the picture: length of a long arrow
+_WIDE = 1280.0  # pixels: width of a picture in which arrows have the sizes below
 
 
 _MARGIN = 0.7  # metres
@@ -72,8 +73,8 @@ def draw_field(camera: Camera, field: Field, *, kind: str, factor: float) -> Ite
         kind: class of the arrows in the style sheet, "before" or "after".
         factor: by which the arrows are longer than the residuals.
     """
-    unit = camera.size[1] / USUAL_HEIGHT
-    head = 7.0 * unit
+    unit = camera.size[0] / _WIDE  # all pictures are shown with the same width
+    head = 16.0 * unit
     path = ""
     for (x, y), offset in zip(field.places.tolist(), factor * field.offsets, strict=True):
         length = float(np.hypot(*offset))
@@ -85,8 +86,8 @@ def draw_field(camera: Camera, field: Field, *, kind: str, factor: float) -> Ite
                 back_x = end_x - along[0] * math.cos(turn) + along[1] * math.sin(turn)
                 back_y = end_y - along[0] * math.sin(turn) - along[1] * math.cos(turn)
                 path += f"M{end_x:.1f} {end_y:.1f}L{back_x:.1f} {back_y:.1f}"
-    dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{2 * unit:.2g}"/>' for x, y in field.places.tolist())
-    yield f'<g class="field {kind}"><path d="{path}" stroke-width="{2.2 * unit:.3g}"/>{dots}</g>'
+    dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{4 * unit:.2g}"/>' for x, y in field.places.tolist())
+    yield f'<g class="field {kind}"><path d="{path}" stroke-width="{4.5 * unit:.3g}"/>{dots}</g>'
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from mvpose.arrays import Floats
 from mvpose.calibration.findings import ALARM, Diagnosis, camera_names
+from mvpose.calibration.normal_equations import joint_views, residuals_of_others
 from mvpose.calibration.repair import Repair
 from mvpose.calibration.sightings import Sightings, gather
 from mvpose.camera import Rig
@@ -118,30 +119,28 @@ class DoctorCase:
     """Residuals of the sightings with the rig."""
     after: Missing | None
     """Residuals with the repaired rig; None where nothing was changed."""
+    medians: dict[str, Floats]
+    """Median residual of each view, (V,), pixels, ``"before"`` and, where there is a repair, ``"after"``; NaN for a
+    view without any. Of files that need no mend, these before are the diagnosis's own."""
 
     @classmethod
     def of(cls, rig: Rig, sightings: Sightings, diagnosis: Diagnosis, repair: Repair | None) -> Self:
         """Compare the sightings with both rigs."""
-        after = None
+        joints, after = joint_views(sightings)[0], None
+        mended = any(each.severity == "alarm" and "--mend" in each.repair for each in diagnosis.findings)
+        own = diagnosis.usual is not None and not mended
+        before = diagnosis.residuals if own else residuals_of_others(rig.packed, joints, scale=1.0)[0]
+        medians = {"before": before}
         if repair is not None and repair.refused is None:
             after = leave_one_out(repair.rig, sightings, offsets=repair.offsets)
-        return cls(rig, camera_names(rig), sightings, diagnosis, repair, leave_one_out(rig, sightings), after)
+            moved = joints.pixels - joints.velocity * repair.offsets[joints.view, None]  # to the times of the clocks
+            medians["after"] = residuals_of_others(repair.rig.packed, replace(joints, pixels=moved), scale=1.0)[0]
+        return cls(rig, camera_names(rig), sightings, diagnosis, repair, leave_one_out(rig, sightings), after, medians)
 
     @property
     def accused(self) -> list[int]:
         """Views that an alarm names, worst first."""
         return list(dict.fromkeys(each.view for each in self.diagnosis.alarms if each.view is not None))
-
-    def residuals(self, missing: Missing) -> Floats:
-        """Return the median residual of each view, (V,), pixels; NaN for a view without any."""
-        lengths = np.hypot(*missing.offset.T)
-        known = np.isfinite(lengths)
-        return np.array(
-            [
-                np.median(lengths[here]) if (here := known & (self.sightings.view == view)).any() else np.nan
-                for view in range(len(self.rig))
-            ]
-        )
 
 
 def _plain_command(options: tuple[str, ...]) -> str:
@@ -162,8 +161,7 @@ def _above(case: DoctorCase) -> dict[str, Any]:
 
 def _cameras(case: DoctorCase) -> list[dict[str, Any]]:
     """Return the rows of the table of cameras."""
-    before = case.residuals(case.before)
-    after = None if case.after is None else case.residuals(case.after)
+    before, after = case.medians["before"], case.medians.get("after")
     rows = []
     for view, name in enumerate(case.names):
         usual = math.nan if case.diagnosis.usual is None else float(case.diagnosis.usual[view])
@@ -191,7 +189,7 @@ def _with_spread(vector: Floats, covariance: Floats, factor: float, unit: str, d
 
 def _fields(case: DoctorCase) -> dict[str, Any] | None:
     """Return the residual arrows of each camera; None where no camera has enough residuals."""
-    order = np.argsort(-np.nan_to_num(case.residuals(case.before), nan=-1.0), kind="stable")[:_MOST_VIEWS]
+    order = np.argsort(-np.nan_to_num(case.medians["before"], nan=-1.0), kind="stable")[:_MOST_VIEWS]
     kinds = {"before": case.before, **({} if case.after is None else {"after": case.after})}
     fields = {
         (view, kind): drawings.Field(*_mean_field(case, missing, view))
@@ -206,10 +204,10 @@ def _fields(case: DoctorCase) -> dict[str, Any] | None:
         camera = case.rig[view]
         parts: list[str] = []
         notes: list[str] = []
-        for kind, missing in kinds.items():
+        for kind in kinds:
             field = fields[view, kind]
             parts += drawings.draw_field(camera, field, kind=kind, factor=factor)
-            notes.append(number(case.residuals(missing)[view]))
+            notes.append(number(case.medians[kind][view]))
         label = f"residual arrows of camera {case.names[view]}"
         views.append(
             {
@@ -229,7 +227,7 @@ def _mean_field(case: DoctorCase, missing: Missing, view: int) -> tuple[Floats, 
 
 def _lines(case: DoctorCase, pictures: Pictures | None) -> dict[str, Any] | None:
     """Return the epipolar lines of some joints in a pair of views; None where no pair shares any."""
-    residuals = np.nan_to_num(case.residuals(case.before), nan=-1.0)
+    residuals = np.nan_to_num(case.medians["before"], nan=-1.0)
     second = case.accused[0] if case.accused else int(np.argmax(residuals))
     first = drawings.best_partner(case.sightings, second, case.rig)
     if first is None:

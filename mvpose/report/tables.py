@@ -76,7 +76,7 @@ def residual_table(
         by_column: of each camera over all joints, (V,).
         overall: of all.
     """
-    most = float(np.nanmax(cells)) if np.isfinite(cells).any() else 1.0
+    most = _full(cells)
     body = [
         (name, (*(_shaded(value, most) for value in row), Cell(number(total))))
         for name, row, total in zip(rows, cells.tolist(), by_row.tolist(), strict=True)
@@ -85,8 +85,14 @@ def residual_table(
     return Table((*(Cell(name) for name in names), Cell("all")), (*body, ("all", last)), total=True)
 
 
+def _full(values: Floats) -> float:
+    """Return the value of the full shade: the largest, or twice the median, so that one ghost does not bleach all."""
+    known = values[np.isfinite(values)]
+    return float(min(known.max(), 2.0 * np.median(known))) if len(known) else 1.0
+
+
 def _shaded(value: float, most: float, digits: int = 1) -> Cell:
-    return Cell(number(value, digits), share=value / most if math.isfinite(value) and most > 0 else 0.0)
+    return Cell(number(value, digits), share=min(value / most, 1.0) if math.isfinite(value) and most > 0 else 0.0)
 
 
 def error_table(errors: Floats, by_group: Floats, groups: Sequence[str], people: People, rows: Sequence[int]) -> Table:
@@ -100,7 +106,7 @@ def error_table(errors: Floats, by_group: Floats, groups: Sequence[str], people:
         rows: the people to show.
     """
     shown = 1000 * by_group[list(rows)]
-    most = float(np.nanmax(shown)) if np.isfinite(shown).any() else 1.0
+    most = _full(shown)
     body = [
         (name, tuple(_shaded(value, most, 0) for value in column))
         for name, column in zip(groups, shown.T.tolist(), strict=True)

@@ -15,9 +15,11 @@ from mvpose.calibration.findings import Diagnosis, Finding
 from mvpose.calibration.repair import Repair
 from mvpose.calibration.sightings import Sightings
 from mvpose.report.doctor_drawings import (
+    Field,
     MatchedJoint,
     best_partner,
     distance_from_line,
+    draw_field,
     epipolar_curve,
     exaggerated,
     matched_joints,
@@ -210,6 +212,29 @@ def page_of(folder, rig, sightings, findings, repair=None):
 
 
 class TestPage:
+    def test_residuals_are_those_of_the_diagnosis(self, tmp_path):
+        """One quantity has one value, in the words of the doctor and in the table and the pictures of its page."""
+        rig, own = ring(4), np.array([11.1, 22.2, 43.9, 14.4])
+        diagnosis = Diagnosis.of_findings(
+            [finding()], evidence=[], cameras=[c.name for c in rig], residuals=own, usual=np.full(4, 10.0)
+        )
+        given = dict(name="a rig", rig=rig, frames=[], sightings=sighted(rig, noise=1.0), diagnosis=diagnosis)
+        page = write_doctor_page(tmp_path, **given).read_text(encoding="utf-8")
+        for value in own:
+            assert f">{value:.1f}</td>" in page
+            assert f"median {value:.1f} px" in page
+        files = replace(diagnosis, findings=(finding(repair=("--mend", "inverted")),))  # other files were examined then
+        page = write_doctor_page(tmp_path, **{**given, "diagnosis": files}).read_text(encoding="utf-8")
+        assert ">43.9</td>" not in page
+
+    @pytest.mark.parametrize("size", [(640, 480), (1045, 773), (1920, 1080), (1080, 1920)])
+    def test_arrows_are_seen_on_a_wide_screen(self, size):
+        """Pictures are at least 336 px wide there, and a line of less than one pixel is hardly seen."""
+        camera = replace(ring(3)[0], size=size)
+        (drawn,) = draw_field(camera, Field(np.full((1, 2), 300.0), np.full((1, 2), 40.0)), kind="before", factor=1.0)
+        (width,) = re.findall(r'stroke-width="([\d.]+)"', drawn)
+        assert float(width) * 336 / size[0] >= 1.0
+
     def test_before_and_after(self, tmp_path):
         rig = ring(5)
         wrong = moved(rig, 2, degrees=2.0, metres=0.05)

@@ -39,6 +39,21 @@ def test_hands_and_faces_are_one_group_each():
     assert (index == names.index("hand")).sum() == 42
 
 
+def test_a_ghost_does_not_bleach_the_shades_of_all_others():
+    rng = np.random.default_rng(2)
+    cells = rng.uniform(2.0, 9.0, (9, 5))
+    cells[3, 2], plain = 20.0, cells.copy()
+    plain[3, 2] = 4000.0
+    shades = []
+    for each in (cells, plain):
+        totals = dict(by_row=each[:, 0], by_column=each[0], overall=5.0)
+        table = residual_table(list("abcde"), each, rows=list("abcdefghi"), **totals)
+        shades.append(np.array([[cell.share for cell in row[:5]] for _, row in table.rows[:9]]))
+    np.testing.assert_allclose(*shades)
+    assert shades[0][3, 2] == shades[0].max() == 1.0
+    assert np.median(shades[0]) > 0.4
+
+
 def test_what_does_not_exist_is_a_dash_without_shade():
     cells = np.array([[1.0, np.nan], [4.0, 2.0]])
     table = residual_table("ab", cells, rows=["x", "y"], by_row=cells[:, 0], by_column=cells[1], overall=np.nan)
