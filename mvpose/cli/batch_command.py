@@ -128,17 +128,17 @@ def _print_table(plan: "LabProject", rows: Sequence[Mapping[str, Any]]) -> None:
     from mvpose.commands.terminal import plain_table, say
 
     table = plain_table("", ["trial"], ["frames", "people", "mean views", "error px", "seconds", "warnings"])
-    table.add_column("where")
+    table.columns[0].overflow = "fold"
     below: dict[str, list[str]] = defaultdict(list)
     for trial, row in zip(plan.trials, rows, strict=True):
         numbers = [row.get(key) for key in ("frames", "people", "mean_views", "residual_px", "seconds")]
         cells = ["-" if each is None else f"{each:.1f}" if isinstance(each, float) else str(each) for each in numbers]
         warnings = row.get("warnings", [])
-        end = ["failed", "-"] if "failed" in row else [str(len(warnings) or ""), str(plan.out / trial.name)]
-        table.add_row(trial.name, *cells, *end)
+        table.add_row(trial.name, *cells, "failed" if "failed" in row else str(len(warnings) or ""))
         for text in [f"failed: {row['failed']}"] if "failed" in row else warnings:
             below[text].append(trial.name)
     console = Console()
     console.print(table)
     for text, names in below.items():
         say(f"{', '.join(names)}: {text}")
+    say(f"where: {plan.out}, a folder for each trial")

@@ -42,7 +42,7 @@ def project(lab, text):
 
 def rows_of(result):
     """The lines of the table by the name of the trial."""
-    lines = [line.split() for line in result.stdout.splitlines() if "/results/day" in line.replace("\\", "/")]
+    lines = [line.split() for line in result.stdout.splitlines() if line.startswith(" day/")]
     return {words[0]: words for words in lines if words[0].startswith("day/")}
 
 
