@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.planning.forecast_error import GENERAL, MEASURED, ForecastError, ForecastErrors
+from simharness.planning.forecast_error import GENERAL, MEASURED, ForecastError, ForecastErrors, forecast_text
 from simharness.scenario.presets import read_profile
 from simharness.statistics.intervals import Interval
 
@@ -62,3 +62,9 @@ def test_a_profile_of_the_network_makes_forecasts_more_exact():
         scenes = Interval(figure, figure, figure, 5)
         close, wide = getattr(MEASURED, name)(scenes), getattr(GENERAL, name)(scenes)
         assert wide.low < close.low < figure < close.high < wide.high
+
+
+def test_what_rounds_to_nothing_has_no_sign():
+    """Losses of a camera that nobody misses are a little below zero as often as above."""
+    assert forecast_text(Interval(-0.01, -0.04, 0.04, 2)) == "0.0 (0.0 to 0.0)"
+    assert forecast_text(Interval(-0.4, -1.4, 0.4, 2), digits=0) == "0 (-1 to 0)"

@@ -124,6 +124,7 @@ def test_the_page_has_every_sentence_and_marks_every_figure(rehearsal):
     page = render_rehearsal(rehearsal, provenance=provenance(command="", seeds=[0, 1], variants=["full"], seconds=1.0))
     for sentence in rehearsal.sentences:
         assert sentence in page.replace("&#39;", "'")
+    assert not re.search(r">[^<>]*(?<![\w.])-0(\.0+)?(?![.\w])[^<>]*<", page)
     titles = re.findall(r'<figure class="panel"><h3>(.*?)</h3>', page)
     assert len(titles) > 10
     unmarked = [title for title in titles if "source" not in title]
