@@ -13,11 +13,11 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -29,9 +29,12 @@ from simharness.hunt.frozen_frame import freeze
 from simharness.hunt.hunted_trial import HuntFinding, HuntOutput, hunt_in_trial
 from simharness.hunt.kept_failure import KeptFailure, judge_of, keep, write_failure
 from simharness.scenario.load import ScenarioPlan, Value, fingerprint
-from simharness.study.scheduler import TrialFailure, Unit, run_units
+from simharness.study.scheduler import TrialFailure, Unit, local_workers, run_units
 from simharness.trial.run_trial import run_trial
 from simharness.types.random_streams import stream
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 TRIALS = "trials.jsonl"
 BATCH = 16
@@ -159,7 +162,8 @@ def run_hunt(
             "people.count = { from = 2, to = 8, steps = 7 }"
         )
     start, stored, points = time.monotonic(), _stored(hunt, folder / TRIALS), list[HuntedPoint]()
-    with reporter.stage("trials", trials or 0) as advance:
+    shared = local_workers(workers) if workers > 1 else nullcontext()
+    with shared as client, reporter.stage("trials", trials or 0) as advance:
         while (trials is None or len(points) < trials) and (seconds is None or time.monotonic() - start < seconds):
             elites, weights = elites_of(points)
             shares = np.array([point.shares for point in elites])
@@ -176,7 +180,7 @@ def run_hunt(
                 for number, (point, scene) in enumerate(zip(asked.tolist(), seeds, strict=True), len(points))
                 if trials is None or number < trials
             ]
-            for point in _measured(hunt, [each for each in batch if each.trial not in stored], workers):
+            for point in _measured(hunt, [each for each in batch if each.trial not in stored], client):
                 stored[point.trial] = point
                 with (folder / TRIALS).open("a", encoding="utf-8") as file:
                     row = {**vars(point), "findings": [vars(each) for each in point.findings]}
@@ -232,7 +236,7 @@ def _stored(hunt: Hunt, path: Path) -> dict[int, HuntedPoint]:
     return {each.trial: each for each in points}
 
 
-def _measured(hunt: Hunt, points: Sequence[HuntedPoint], workers: int) -> Iterator[HuntedPoint]:
+def _measured(hunt: Hunt, points: Sequence[HuntedPoint], client: "Client | None") -> Iterator[HuntedPoint]:
     """Yield trials with what was found in them, as they end."""
     units, of = [], {str(each.trial): each for each in points}
     for name, point in of.items():
@@ -241,7 +245,7 @@ def _measured(hunt: Hunt, points: Sequence[HuntedPoint], workers: int) -> Iterat
         except ValueError as error:
             yield replace(point, error=str(error))
     measure = partial(hunt_in_trial, properties=hunt.properties)
-    with closing(run_units(units, measure, workers=workers)) as results:
+    with closing(run_units(units, measure, client=client)) as results:
         for each in results:
             if isinstance(each, TrialFailure):
                 yield replace(of[each.unit.trial], error=each.error)

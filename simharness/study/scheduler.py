@@ -93,7 +93,12 @@ class TrialFailure:
 
 
 def run_units(
-    units: Collection[Unit], measure: Measure, *, workers: int = 1, scheduler: str | None = None
+    units: Collection[Unit],
+    measure: Measure,
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    client: "Client | None" = None,
 ) -> Generator[TrialSuccess | TrialFailure, None, None]:
     """Measure units and yield their results in the order in which they finish.
 
@@ -108,6 +113,7 @@ def run_units(
         workers: number of processes. With 1 the work is done in this process, and a crash ends it. Each imports
             the main module, so a script that calls this needs ``if __name__ == "__main__"``.
         scheduler: address of a Dask scheduler whose workers are used instead.
+        client: client of :func:`local_workers` that many calls share; it stays open.
 
     Raises:
         ValueError: fewer than one worker; no scheduler at the address, or it has no workers, or they run other code.
@@ -115,11 +121,13 @@ def run_units(
     """
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
-    if scheduler is None and workers == 1:
+    if client is not None:
+        yield from _run_on_cluster(units, measure, client)
+    elif scheduler is None and workers == 1:
         yield from _run_in_process(units, measure)
     elif units:
-        with _client(min(workers, len(units)), scheduler) as client:
-            yield from _run_on_cluster(units, measure, client)
+        with _connected(scheduler) if scheduler is not None else local_workers(min(workers, len(units))) as cluster:
+            yield from _run_on_cluster(units, measure, cluster)
 
 
 def attempt(measure: Measure, unit: Unit) -> TrialSuccess | TrialFailure:
@@ -289,15 +297,11 @@ def _result(future: "Future[Any]", unit: Unit) -> TrialSuccess | TrialFailure:
 
 
 @contextlib.contextmanager
-def _client(workers: int, scheduler: str | None) -> "Iterator[Client]":
-    """Give a client of a new cluster of this machine, or of the cluster at an address."""
+def local_workers(workers: int) -> "Iterator[Client]":
+    """Give a client of a new cluster of this machine."""
     import dask
     from distributed import Client, LocalCluster
 
-    if scheduler is not None:
-        with _connected(scheduler) as client:
-            yield client
-        return
     # Report a dead worker at once: _run_on_cluster decides what follows, and reports it, so nothing is logged.
     quiet = {"distributed.scheduler.allowed-failures": 0, "logging": {"distributed": "critical"}}
     start = {
