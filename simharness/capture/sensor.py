@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.camera import Camera
-from simharness.capture.raw import BLACK, WHITE, is_ideal, raw_picture
+from simharness.capture.raw import BLACK, WHITE, is_ideal, look_up, raw_picture
 from simharness.scenario.sections.cameras_section import SensorSection
 from simharness.types.random_streams import stream
 from simharness.types.srgb import from_linear, linear_table, rounded, to_linear
@@ -86,7 +86,8 @@ def develop(
     if not is_ideal(sensor):
         random = stream(seed, "sensor", "raw", view, frame)
         raw = raw_picture(rgb, sensor, random, camera=camera, exposure=2.0**response.stops)
-        rgb = _table_of_raw(replace(response, stops=0.0), tone)[np.arange(3), raw]
+        rgb = np.empty_like(rgb)
+        look_up(raw, _table_of_raw(replace(response, stops=0.0), tone), rgb)
         response, tone = Response(), 0.0
     if sensor.noise:
         # Drawn at unit strength and then scaled: a larger parameter gives the same noise, only stronger.

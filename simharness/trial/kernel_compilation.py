@@ -68,6 +68,8 @@ def compile_pictures() -> None:
     from simharness.capture.rendering.lit_scene import LitScene
     from simharness.capture.rendering.scene_geometry import SceneGeometry
     from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
+    from simharness.capture.sensor import develop
+    from simharness.scenario.sections.cameras_section import SensorSection
 
     triangle = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]], np.float32)
     faces, colors, zeros = np.array([[0, 1, 2]], np.int32), np.ones((1, 3), np.float32), np.zeros(3, np.float32)
@@ -79,7 +81,8 @@ def compile_pictures() -> None:
     assert scene is not None  # it has sources and a floor
     shown, inverse_depth = np.full((2, 2), -1, np.int32), np.zeros((2, 2), np.float32)
     drawn, view = DrawnPixels(shown, inverse_depth, np.zeros((6, 3))), PixelRays(np.zeros(3), np.eye(3))
-    scene.draw(scene.background(Background(view.to_rays, inverse_depth, shown, drawn.corners), view), drawn, view)
+    rgb = scene.draw(scene.background(Background(view.to_rays, inverse_depth, shown, drawn.corners), view), drawn, view)
+    develop(rgb, SensorSection(shot_noise=0.01), seed=0, view=0, frame=0)
 
 
 def compile_kernels(variants: Iterable[str]) -> None:
