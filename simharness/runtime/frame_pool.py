@@ -140,7 +140,12 @@ def _map_in_pool(
             for job in jobs:
                 futures[pool.submit(_call, job)] = job[0]
             for future in as_completed(futures):
-                future.result()
+                try:
+                    future.result()
+                except (RunError, BrokenProcessPool):
+                    raise
+                except Exception as error:
+                    raise RunError(_failure(futures[future], error, unit)) from error
                 progress(len(futures[future]))
         except BrokenProcessPool as error:
             span = _span(range(min(job[0].start for job in jobs), max(job[0].stop for job in jobs)), unit)
@@ -148,10 +153,6 @@ def _map_in_pool(
                 f"a worker process died within {span}; it may have run out of memory: try fewer workers, "
                 "or --workers 1 to run in this process"
             ) from error
-        except RunError:
-            raise
-        except Exception as error:
-            raise RunError(_failure(futures[future], error, unit)) from error
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
     return [future.result() for future in futures]

@@ -93,6 +93,11 @@ def test_linear_algebra_uses_one_thread(workers):
         assert set(pools) == {1}
 
 
+def test_a_function_that_cannot_be_sent_to_workers_is_named():
+    with pytest.raises(Exception, match="pickle"):
+        map_frames(lambda frames: len(frames), range(4), workers=2)
+
+
 def test_fewer_than_one_worker_is_refused():
     with pytest.raises(ValueError, match="workers must be at least 1, got 0"):
         map_frames(square, range(3), workers=0)
