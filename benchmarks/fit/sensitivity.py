@@ -10,8 +10,8 @@ import numpy as np
 
 from benchmarks.fit.loop import RESAMPLES, kept_film
 from benchmarks.fit.recordings import DETECTOR, known_recording
-from simharness.reality.annotation_errors import annotation_offsets, common_bias
 from simharness.reality.detector_fit import inference
+from simharness.reality.detector_fit.annotation_fit import annotation_offsets, common_bias
 from simharness.reality.detector_fit.detector_measurement import MeasuredDetector, measure_detector, point_estimates
 from simharness.reality.detector_fit.fit import filmed_twin
 from simharness.reality.detector_fit.joint_labels import label_joints

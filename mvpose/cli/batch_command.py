@@ -2,6 +2,7 @@
 
 import json
 import time
+import traceback
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -66,7 +67,10 @@ def _row(plan: "LabProject", number: int) -> dict[str, Any]:
         typer.echo(f"{where}:", err=True)
         return _estimated(trial, place, digest)
     except Exception as error:  # the other trials have nothing to do with it
-        kind = "" if isinstance(error, ValueError | OSError | RunError) else f"{type(error).__name__}: "
+        usual = isinstance(error, ValueError | OSError | RunError)
+        kind = "" if usual else f"{type(error).__name__}: "
+        if not usual:
+            traceback.print_exc()
         message = one_line(f"{kind}{error}")
         typer.echo(f"error: {trial.name}: {message}", err=True)
         return {"failed": message}

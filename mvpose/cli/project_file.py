@@ -203,7 +203,7 @@ def _checked(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     for key, value in table.items():
         if key not in kinds:
             near = difflib.get_close_matches(key, [*kinds, "trials", "folders", "out"], n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+            hint = f"; did you mean {near[0]!r}?" if near else "."
             raise ValueError(
                 f"unknown key {key!r} in {where}{hint} Keys are the options of `mvpose estimate` and `run`"
             )

@@ -21,9 +21,9 @@ from mvpose.files.atomic_files import write_atomic
 from mvpose.recording import People
 from simharness.detector.viewing_conditions import SIDE, body_axes
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.annotation_errors import (
+from simharness.reality.annotation_errors import annotated_joints
+from simharness.reality.detector_fit.annotation_fit import (
     AnnotationFit,
-    annotated_joints,
     annotation_offsets,
     common_bias,
     fit_annotation,

@@ -20,7 +20,7 @@ from rich.text import Text
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import parse_toml
 from mvpose.report.svg_plots import STYLE
-from simharness.reality.annotation_errors import AnnotationFit
+from simharness.reality.detector_fit.annotation_fit import AnnotationFit
 from simharness.reality.detector_fit.detector_measurement import MeasuredDetector, MeasuredValue, agreement
 from simharness.reality.detector_fit.frame_sums import TERCILES
 from simharness.scenario.sections.detector_section import BEARINGS, KINDS

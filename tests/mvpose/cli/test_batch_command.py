@@ -150,6 +150,7 @@ def test_keys_are_the_options_of_estimate(lab):
     ("text", "said"),
     [
         ("fbs = 60\n[trials.a]\n", "unknown key 'fbs' in the project; did you mean 'fps'?"),
+        ("zzz = 60\n[trials.a]\n", "unknown key 'zzz' in the project. Keys are the options"),
         ('[trials.a]\nfps = "fast"\n', r"[trials.a]: fps must be a number, got \"fast\""),
         ("[trials.a]\npage = 1\n", "[trials.a]: page must be true or false, got 1"),
         ("trials = 3\n", "trials must be tables"),

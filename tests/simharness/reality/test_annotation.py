@@ -7,12 +7,8 @@ import pytest
 
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.detector.viewing_conditions import SIDE, body_axes
-from simharness.reality.annotation_errors import (
-    AnnotationModel,
-    annotated_joints,
-    annotation_offsets,
-    fit_annotation,
-)
+from simharness.reality.annotation_errors import AnnotationModel, annotated_joints
+from simharness.reality.detector_fit.annotation_fit import annotation_offsets, fit_annotation
 from simharness.reality.detector_fit.fit import fit
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.sample import sample_of

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simharness.detector.draws import PARENT
-from simharness.reality.annotation_errors import annotation_offsets, fit_annotation
+from simharness.reality.detector_fit.annotation_fit import annotation_offsets, fit_annotation
 from simharness.reality.detector_fit.detector_measurement import point_estimates
 from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.sample import sample_of

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from simharness.reality.annotation_errors import AnnotationFit, AnnotationModel
+from simharness.reality.annotation_errors import AnnotationModel
+from simharness.reality.detector_fit.annotation_fit import AnnotationFit
 from simharness.reality.detector_fit.detector_measurement import MeasuredValue, measure_detector
 from simharness.reality.detector_fit.fit_table import (
     plot_comparison,
