@@ -114,6 +114,24 @@ def test_an_error_of_one_trial_leaves_the_others_and_is_in_the_exit_code(lab):
     assert "broken or truncated JSON" in result.stdout
 
 
+@pytest.mark.parametrize(("error", "traced"), [(TypeError("of the code"), True), (ValueError("of the input"), False)])
+def test_an_internal_error_has_its_traceback_and_leaves_the_others(lab, monkeypatch, error, traced):
+    real = estimate_command.estimate_into
+
+    def fail(calibration, detections, *words):
+        if "one" in str(detections):
+            raise error
+        real(calibration, detections, *words)
+
+    monkeypatch.setattr(estimate_command, "estimate_into", fail)
+    project(lab, FOLDERS)
+    result = batch(lab)
+    assert result.exit_code == 3
+    assert str(error) in result.stderr
+    assert ("Traceback" in result.stderr) == traced
+    assert (lab / "results" / "day" / "two" / TRIAL).is_file()
+
+
 def test_warnings_of_a_trial_are_below_the_table_also_when_it_is_finished(lab):
     project(lab, FOLDERS.replace("fps = 25\n", ""))
     for result in (batch(lab), batch(lab)):
