@@ -232,8 +232,6 @@ class Body:
         thumbs: direction at rest from the little-finger side to the thumb side of the left and right palm, (2, 3).
         stature: height from soles to crown, metres.
         mass: kilograms.
-        skinned_count: number of vertices moved by skinning alone; they come first, those of long hair,
-            skirt and accessories follow.
         skirt: motion of the vertices of a skirt, dress or coat, if one is worn.
     """
 
@@ -252,7 +250,6 @@ class Body:
     thumbs: Floats
     stature: float
     mass: float
-    skinned_count: int
     skirt: Skirt | None = None
     _index: Mapping[str, int] = field(init=False, repr=False, compare=False)
 
@@ -359,7 +356,6 @@ def make_body(shape: Shape) -> Body:
         thumbs=thumbs / np.linalg.norm(thumbs, axis=1, keepdims=True),
         stature=model.stature(vertices),
         mass=model.mass(vertices),
-        skinned_count=model.shown,
     )
 
 

@@ -142,7 +142,6 @@ def dress(body: Body, look: Look) -> Body:
         faces=faces,
         weight_bones=body.weight_bones[source],
         weights=body.weights[source],
-        skinned_count=len(vertices),
     )
     if (hair := _hair(dressed, look)) is not None:
         dressed = add_mesh(dressed, hair)

@@ -168,7 +168,7 @@ def _recorded(scenario: Scenario) -> Activity:
     clip = load_clip(scenario.people.motion)
 
     def perform(mover: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
-        return clip.perform(mover, time, place=spot.place, bearing=spot.bearing, rng=rng)
+        return clip.perform(mover, time, place=spot.place, bearing=spot.bearing)
 
     return Activity("mocap", 1, Spot, 0.0, solo(perform))
 

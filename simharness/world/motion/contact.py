@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import mujoco
 import numpy as np
@@ -68,16 +67,6 @@ class ContactModel:
         if (one, other) not in self._pairs:
             self._pairs[one, other] = _Pair(self._cast[one], self._cast[other])
         return self._pairs[one, other]
-
-
-def penetration(cast: Sequence[Kinematics], motions: Sequence[Motion], time: ArrayLike) -> Floats:
-    """Return the penetration depth of every pair at times (N,), (N, P, P) metres; see :class:`ContactModel`."""
-    crowd = ContactModel(cast)
-    people = [crowd.sample(person, motion, time) for person, motion in enumerate(motions)]
-    depth = np.zeros((np.size(time), len(people), len(people)))
-    for one, other in combinations(people, 2):
-        depth[:, one.person, other.person] = depth[:, other.person, one.person] = crowd.penetration(one, other)
-    return depth
 
 
 class _Pair:

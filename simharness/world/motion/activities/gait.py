@@ -10,6 +10,7 @@ that the curves are met on a straight path and approximated on a bend.
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,46 +18,86 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
 from mvpose.arrays import Floats
+from mvpose.files.input_files import parse_toml
 from simharness.world.motion.poses.foot_placement import leftward
 from simharness.world.motion.poses.inverse_kinematics import Pelvis
 from simharness.world.motion.poses.kinematics import FootRoll, Kinematics
 from simharness.world.motion.poses.timing import Curves, smoothstep
 
-Knots = tuple[tuple[float, float], ...]  # (fraction of the stride, degrees)
-
-FOOT_OFF = 0.62  # fraction of the stride at toe-off; 0 is heel strike
-# Degrees at fractions of the stride from heel strike to heel strike.
-_HIP: Knots = ((0.0, 21), (0.1, 17), (0.2, 9), (0.3, -1), (0.4, -10), (0.5, -17.5), (0.55, -19), (0.62, -13), (0.7, 3))
-_HIP += ((0.8, 17), (0.88, 23), (0.95, 22.5))
-_KNEE: Knots = ((0.0, 5), (0.06, 11), (0.14, 17), (0.22, 14), (0.31, 8), (0.4, 5), (0.46, 6), (0.52, 13), (0.58, 30))
-_KNEE += ((0.65, 53), (0.72, 62), (0.8, 50), (0.88, 24), (0.95, 7))
-_ANKLE: Knots = ((0.0, 0), (0.06, -5), (0.12, -2), (0.2, 4), (0.3, 7), (0.4, 10), (0.47, 11), (0.53, 5), (0.58, -7))
-_ANKLE += ((0.63, -16), (0.7, -9), (0.78, -1), (0.86, 2), (0.94, 1.5))
 _WALK_RATIO = 0.0065  # step length over steps per minute, m min: Sekiya et al., J. Hum. Mov. Stud. 30, 1996
 _LEG = 0.835  # metres from hip to ankle of an adult of 1.7 m: Winter
 _VIGOUR = (0.3, 1.6)  # range of amplitudes, relative to the curves, in which a stride is sought
 # Amplitudes of the pelvis at full vigour, after Perry and Burnfield.
 _PELVIS_TURN, _PELVIS_LIST, _PELVIS_SWAY = np.radians(5.0), np.radians(3.5), 0.018
 
-FOOT_FLAT, _HEEL_RISE = 0.1, 0.45  # fractions of the stride at foot flat and at heel rise
-# Toes do not bend in this model: a heel that rose fully over their tips would lift the leg.
-_STIFF_TOES = np.radians(250.0)
 _EARLY = 0.03  # fraction of the stride by which feet land nearer; otherwise the leg would be too short at heel strike
 _HASTE = 1.02  # the foot is above its next footprint a little before it lands
 _CLEARANCE = 0.02  # metres between the swinging foot and the floor
-_SAMPLES = 240
+PHASES = np.linspace(0.0, 1.0, 241)
+"""Fractions of the stride, from foot strike to foot strike, at which curves are applied to a body."""
 
 
-def normative_angles(phase: ArrayLike) -> Floats:
-    """Return hip flexion, knee flexion and ankle dorsiflexion, (..., 3) radians, at fractions (...) of the stride."""
-    phase = np.mod(phase, 1.0)
-    return np.radians(np.stack([periodic(knots)(phase) for knots in (_HIP, _KNEE, _ANKLE)], axis=-1))
+@dataclass(frozen=True)
+class StrideCurves:
+    """Sagittal angles of a leg over a stride: periodic splines through knots, (fraction of the stride, degrees)."""
+
+    hip: list[list[float]]
+    """Knots of hip flexion."""
+    knee: list[list[float]]
+    """Knots of knee flexion."""
+    ankle: list[list[float]]
+    """Knots of ankle dorsiflexion."""
+    foot_off: float
+    """Fraction of the stride at toe-off; 0 is foot strike."""
+    flat: float
+    """Fraction at foot flat."""
+    heel_rise: float
+    """Fraction at heel rise."""
+    stiff_toes: float
+    """Least rise of a heel over the toes, degrees. They do not bend in this model: a heel that rose fully over their
+    tips would lift the leg."""
+
+    def angles(self, phase: ArrayLike) -> Floats:
+        """Return hip flexion, knee flexion and ankle dorsiflexion, (..., 3) radians, at fractions (...) of a stride."""
+        closed = (np.array([*knots, (1.0, knots[0][1])]).T for knots in (self.hip, self.knee, self.ankle))
+        curves = [CubicSpline(x, y, bc_type="periodic")(np.mod(phase, 1.0)) for x, y in closed]
+        return np.radians(np.stack(curves, axis=-1))
+
+    def play(self, kinematics: Kinematics, vigour: float) -> tuple[Floats, Floats]:
+        """Apply the curves to a body with an amplitude.
+
+        Returns:
+            At ``PHASES``, pitch of the foot, (n,) radians, and its footprint ahead of the pelvis, (n,) metres.
+        """
+        curves, order = vigour * self.angles(PHASES), kinematics.leg_order
+        angles = np.zeros((len(PHASES), len(order)))
+        angles[:, [order.index(name) for name in ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")]] = curves
+        _, place = kinematics.legs["left"].forward(angles)
+        hip, knee, ankle = curves.T
+        pitch = hip - knee + ankle
+        pitch = np.where(pitch < 0, pitch / (1 - pitch / np.radians(self.stiff_toes)), pitch)
+        flattened = flatten_stance(pitch, PHASES, down=self.flat, up=self.heel_rise)
+        pitch = np.where(self.foot_off > PHASES, flattened, pitch)
+        return pitch, place[:, 0] - kinematics.rolling.at(pitch)[0]
+
+    def progress(self, print_x: Floats, *, stride: float, lead: float) -> Floats:
+        """Return the fraction of a stride that the swinging foot has covered at ``PHASES``, (n,), 0 in stance.
+
+        Args:
+            print_x: footprint ahead of the pelvis, (n,) metres.
+            stride: stride length, metres.
+            lead: distance from the pelvis forward to a landing foot, metres.
+        """
+        swing, ahead = self.foot_off <= PHASES, (print_x + stride * PHASES - lead) / stride
+        progress = np.zeros(len(PHASES))
+        progress[swing] = pin_ends(PHASES[swing], ahead[swing])
+        return progress
 
 
-def periodic(knots: Knots) -> CubicSpline:
-    """Return the periodic cubic spline in degrees through the knots."""
-    x, y = np.array([*knots, (1.0, knots[0][1])]).T
-    return CubicSpline(x, y, bc_type="periodic")
+WALK, RUN = (
+    StrideCurves(**curves)
+    for curves in parse_toml((Path(__file__).parents[1] / "data" / "strides.toml").read_text(encoding="utf-8")).values()
+)
 
 
 @dataclass(frozen=True)
@@ -73,10 +114,8 @@ class Gait:
     """Amplitude of the vertical motion of the pelvis, metres."""
     lead: float
     """Distance from the pelvis forward to a landing foot, metres (to its ankle, as if the foot lay flat)."""
-    phase: Floats
-    """Fractions of the stride, (n,), from 0 to 1."""
     pitch: Floats
-    """Pitch of the foot, toes up positive, (n,) radians."""
+    """Pitch of the foot at ``PHASES``, toes up positive, (n,) radians."""
     lift: Floats
     """Clearance of the swinging foot beyond the necessary one, (n,) metres, 0 in stance."""
     progress: Floats
@@ -85,11 +124,6 @@ class Gait:
     """Fraction of the stride at toe-off; 0 is foot strike."""
     rolling: FootRoll
     """Roll of the foot on the floor."""
-
-    @property
-    def speed(self) -> float:
-        """Walking speed in metres per second."""
-        return self.stride * self.frequency
 
     def foot(self, phase: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the state of a foot at fractions (...) of its stride.
@@ -108,8 +142,8 @@ class Gait:
 
     @cached_property
     def _tables(self) -> tuple[CubicSpline, PchipInterpolator, PchipInterpolator]:
-        pitch = CubicSpline(self.phase, np.append(self.pitch[:-1], self.pitch[0]), bc_type="periodic")
-        return pitch, PchipInterpolator(self.phase, self.lift), PchipInterpolator(self.phase, self.progress)
+        pitch = CubicSpline(PHASES, np.append(self.pitch[:-1], self.pitch[0]), bc_type="periodic")
+        return pitch, PchipInterpolator(PHASES, self.lift), PchipInterpolator(PHASES, self.progress)
 
     def pelvis(self, place: Floats, heading: Floats, phase: Floats, *, amplitude: Floats | float = 1.0) -> Pelvis:
         """Return the motion of the pelvis of a walking person.
@@ -133,10 +167,6 @@ class Gait:
     def pelvis_turn(self, phase: Floats, *, amplitude: Floats | float = 1.0) -> Floats:
         """Return the turn of the pelvis to the left, (T,) radians: the swinging side moves forward."""
         return -_PELVIS_TURN * self.vigour * amplitude * np.cos(2 * np.pi * phase)
-
-    def leg(self, phase: Floats) -> Floats:
-        """Return hip flexion, knee flexion and ankle dorsiflexion on a straight path, (..., 3) radians."""
-        return self.vigour * normative_angles(phase)
 
 
 def similar_walk_ratio(leg_length: float) -> float:
@@ -162,72 +192,35 @@ def make_gait(kinematics: Kinematics, *, speed: float, pace: float = 1.0, walk_r
     Raises:
         ValueError: this body does not walk at this speed.
     """
-    rolling = kinematics.rolling
     stride = float(np.sqrt(240.0 * walk_ratio * speed / pace))
-    least, most = (_play(kinematics, rolling, vigour).stride for vigour in _VIGOUR)
+    least, most = (_stride(WALK.play(kinematics, vigour)[1]) for vigour in _VIGOUR)
     if not least < stride < most:
         low, high = (length**2 * pace / (240.0 * walk_ratio) for length in (least, most))
         raise ValueError(
             f"a person {kinematics.body.stature:.2f} m tall walks at {low:.2f} to {high:.2f} m/s, not at {speed:g} m/s"
         )
-    vigour = brentq(lambda v: _play(kinematics, rolling, v).stride - stride, *_VIGOUR, xtol=1e-5)
-    played = _play(kinematics, rolling, vigour)
-
-    phase, swing = played.phase, played.phase >= FOOT_OFF
-    ahead = played.print_x + stride * phase - played.lead
-    progress = np.zeros(len(phase))
-    progress[swing] = pin_ends(phase[swing], ahead[swing] / stride)
-    hasted = np.minimum(FOOT_OFF + _HASTE * (phase - FOOT_OFF), 1.0)
-    progress[swing] = PchipInterpolator(phase[swing], progress[swing])(hasted[swing])
-    along = np.maximum(phase - FOOT_OFF, 0.0) / (1 - FOOT_OFF)
+    vigour = brentq(lambda v: _stride(WALK.play(kinematics, v)[1]) - stride, *_VIGOUR, xtol=1e-5)
+    pitch, print_x = WALK.play(kinematics, vigour)
+    played, step = _stride(print_x), PHASES <= 0.5
+    lead = float(np.mean(print_x[step] + played * PHASES[step])) - _EARLY * played
+    progress, swing = WALK.progress(print_x, stride=stride, lead=lead), WALK.foot_off <= PHASES
+    hasted = np.minimum(WALK.foot_off + _HASTE * (PHASES - WALK.foot_off), 1.0)
+    progress[swing] = PchipInterpolator(PHASES[swing], progress[swing])(hasted[swing])
+    along = np.maximum(PHASES - WALK.foot_off, 0.0) / (1 - WALK.foot_off)
     bump = along**1.5 * (1 - along) ** 2 / (0.3**1.5 * 0.4**2 / 0.7**3.5)  # 0 to 1 to 0, with a soft landing
     # On stiff legs the pelvis would move on arcs; real legs halve their height.
     bob = stride**2 / (128.0 * kinematics.leg_length)
-    return Gait(
-        stride=stride,
-        frequency=speed / stride,
-        vigour=vigour,
-        bob=bob,
-        lead=played.lead,
-        phase=played.phase,
-        pitch=played.pitch,
-        lift=bump * _CLEARANCE,
-        progress=progress,
-        foot_off=FOOT_OFF,
-        rolling=rolling,
-    )
+    lift = bump * _CLEARANCE
+    return Gait(stride, speed / stride, vigour, bob, lead, pitch, lift, progress, WALK.foot_off, kinematics.rolling)
 
 
-@dataclass(frozen=True)
-class _Played:
-    """Curves applied to a body: pitch of the foot, and its footprint in the pelvis frame, metres forward."""
+def _stride(print_x: Floats) -> float:
+    """Return the stride of a walk with a footprint ahead of the pelvis at ``PHASES``, (n,) metres.
 
-    phase: Floats
-    pitch: Floats
-    print_x: Floats
-    stride: float
-    lead: float
-
-
-def _play(kinematics: Kinematics, rolling: FootRoll, vigour: float) -> _Played:
-    phase = np.linspace(0.0, 1.0, _SAMPLES + 1)
-    curves = vigour * normative_angles(phase)
-    order = kinematics.leg_order
-    angles = np.zeros((len(phase), len(order)))
-    angles[:, [order.index(name) for name in ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")]] = curves
-    _, place = kinematics.legs["left"].forward(angles)
-
-    hip, knee, ankle = curves.T
-    pitch = hip - knee + ankle
-    pitch = np.where(pitch < 0, pitch / (1 - pitch / _STIFF_TOES), pitch)
-    pitch = np.where(phase < FOOT_OFF, flatten_stance(pitch, phase, down=FOOT_FLAT, up=_HEEL_RISE), pitch)
-    print_x = place[:, 0] - rolling.at(pitch)[0]
-    # From the strike of a foot to that of the other the pelvis moves by half a stride over it. By the curves its speed
-    # would vary a little; the mean gives the constant speed that the pelvis has here.
-    step = phase <= 0.5
-    stride = 2 * float(print_x[0] - print_x[step][-1])
-    lead = float(np.mean(print_x[step] + stride * phase[step])) - _EARLY * stride
-    return _Played(phase, pitch, print_x, stride, lead)
+    From the strike of a foot to that of the other the pelvis moves by half a stride over it. By the curves its speed
+    would vary a little; the mean gives the constant speed that the pelvis has here.
+    """
+    return 2 * float(print_x[0] - print_x[PHASES <= 0.5][-1])
 
 
 def flatten_stance(pitch: Floats, phase: Floats, *, down: float, up: float) -> Floats:

@@ -21,7 +21,7 @@ from mvpose.arrays import Floats
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.activities.gait import Gait, make_gait, similar_walk_ratio, walking_posture
+from simharness.world.motion.activities.gait import PHASES, Gait, make_gait, similar_walk_ratio, walking_posture
 from simharness.world.motion.activity_registry import Activity, activity
 from simharness.world.motion.motion import Motion, Performance, Prop, Trajectory
 from simharness.world.motion.paths import Spot
@@ -192,7 +192,7 @@ class RouteSteps:
         rounded = smoothstep(along / 0.25) * raised * gait.rolling.spare(pitch)
         # A foot that does not roll off its toes is raised sooner and higher.
         flat = _FLAT_LIFT * (1.0 - briskness(self.route, time)) * smoothstep(along / 0.3) * raised
-        lift = rounded + smoothstep(step / _FULL_STEP) * (np.interp(part, gait.phase, gait.lift) + flat)
+        lift = rounded + smoothstep(step / _FULL_STEP) * (np.interp(part, PHASES, gait.lift) + flat)
         return np.where(part > gait.foot_off, lift, 0.0)
 
 

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.activities.gait import Gait, Knots, flatten_stance, periodic, pin_ends
+from simharness.world.motion.activities.gait import PHASES, RUN, Gait
 from simharness.world.motion.activities.walking import footsteps, laps
 from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
@@ -22,25 +22,15 @@ from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, solve
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease
 
-FOOT_OFF = 0.39  # fraction of the stride at toe-off; 0 is foot strike
-# Degrees at fractions of the stride.
-_HIP: Knots = ((0.0, 30), (0.1, 26), (0.2, 14), (0.3, 2), (0.4, -7), (0.46, -5), (0.55, 9), (0.65, 29), (0.75, 42))
-_HIP += ((0.84, 45), (0.93, 38))
-_KNEE: Knots = ((0.0, 15), (0.08, 30), (0.16, 40), (0.24, 36), (0.32, 25), (0.39, 19), (0.46, 34), (0.55, 68))
-_KNEE += ((0.64, 89), (0.72, 85), (0.82, 56), (0.9, 26), (0.96, 13))
-_ANKLE: Knots = ((0.0, -3), (0.06, 2), (0.13, 9), (0.19, 10), (0.26, 4), (0.33, -6), (0.39, -16), (0.45, -20))
-_ANKLE += ((0.55, -8), (0.7, 0), (0.85, 3))
 _CADENCE = 1.2  # strides per second at pace 1 with legs 0.85 m long; scales with leg length as a pendulum does
 _LEG = 0.85
 _VIGOUR = (0.15, 1.5)  # range of amplitudes, relative to the curves, in which a stride is sought
-_FLAT, _HEEL_RISE = 0.06, 0.17  # fractions of the stride at foot flat and at heel rise
 _EARLY = 0.07  # fraction of the stride by which feet land nearer; otherwise the leg would be too short at foot strike
 _CLEARANCE = 0.12  # clearance of the swinging foot, in leg lengths
 _MIDSTANCE = 0.19  # fraction of the stride at which the pelvis is lowest
 _GRAVITY, _FLATTENED = 9.81, 0.6
 _STRAIGHTEST = np.radians(8.0)
 _WIDTH = 0.25  # lateral distance of the footprints relative to the neutral stance
-_SAMPLES = 240
 
 
 @solo_activity("run", track=Loop, froude=(0.6, 0.95))
@@ -100,12 +90,6 @@ def _bank(loop: Loop, time: Floats) -> Floats:
     return np.clip(np.arctan(loop.speed**2 * loop.curvature(time) / _GRAVITY), -0.3, 0.3)
 
 
-def normative_angles(phase: ArrayLike) -> Floats:
-    """Return hip flexion, knee flexion and ankle dorsiflexion, (..., 3) radians, at fractions (...) of the stride."""
-    phase = np.mod(phase, 1.0)
-    return np.radians(np.stack([periodic(knots)(phase) for knots in (_HIP, _KNEE, _ANKLE)], axis=-1))
-
-
 def make_stride(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> Gait:
     """Return the running stride of a body at a speed: cadence by leg length, amplitude of the curves by stride length.
 
@@ -120,52 +104,25 @@ def make_stride(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> G
     frequency = _CADENCE * pace * float(np.sqrt(_LEG / kinematics.leg_length))
     stride = speed / frequency
     least, most = (_swept(kinematics, vigour) for vigour in _VIGOUR)
-    if not least < FOOT_OFF * stride < most:
-        low, high = (swept / FOOT_OFF * frequency for swept in (least, most))
+    if not least < RUN.foot_off * stride < most:
+        low, high = (swept / RUN.foot_off * frequency for swept in (least, most))
         raise ValueError(
             f"a person {kinematics.body.stature:.2f} m tall runs at {low:.2f} to {high:.2f} m/s, not at {speed:g} m/s"
         )
-    vigour = float(brentq(lambda v: _swept(kinematics, v) - FOOT_OFF * stride, *_VIGOUR, xtol=1e-5))
-    phase, pitch, print_x = _play(kinematics, vigour)
-    stance, swing = phase <= FOOT_OFF, phase >= FOOT_OFF
-    lead = float(np.mean(print_x[stance] + stride * phase[stance])) - _EARLY * stride
-    progress = np.zeros(len(phase))
-    ahead = (print_x + stride * phase - lead) / stride
-    progress[swing] = pin_ends(phase[swing], ahead[swing])
+    vigour = float(brentq(lambda v: _swept(kinematics, v) - RUN.foot_off * stride, *_VIGOUR, xtol=1e-5))
+    pitch, print_x = RUN.play(kinematics, vigour)
+    stance = RUN.foot_off >= PHASES
+    lead = float(np.mean(print_x[stance] + stride * PHASES[stance])) - _EARLY * stride
     # A sine wave with two periods per stride, highest in flight. With the acceleration g at its top its amplitude would
     # be g / (4 pi frequency)²; the flight is short, so the amplitude is reduced.
     bob = _FLATTENED * _GRAVITY / (4 * np.pi * frequency) ** 2
-    along = np.maximum(phase - FOOT_OFF, 0.0) / (1 - FOOT_OFF)
-    return Gait(
-        stride=stride,
-        frequency=frequency,
-        vigour=vigour,
-        bob=bob,
-        lead=lead,
-        phase=phase,
-        pitch=pitch,
-        lift=_CLEARANCE * vigour * kinematics.leg_length * ease(along / 0.38) * ease((1 - along) / 0.36),
-        progress=progress,
-        foot_off=FOOT_OFF,
-        rolling=kinematics.rolling,
-    )
+    along = np.maximum(PHASES - RUN.foot_off, 0.0) / (1 - RUN.foot_off)
+    lift = _CLEARANCE * vigour * kinematics.leg_length * ease(along / 0.38) * ease((1 - along) / 0.36)
+    progress = RUN.progress(print_x, stride=stride, lead=lead)
+    return Gait(stride, frequency, vigour, bob, lead, pitch, lift, progress, RUN.foot_off, kinematics.rolling)
 
 
 def _swept(kinematics: Kinematics, vigour: float) -> float:
     """Return the distance that the pelvis moves over a planted foot, metres."""
-    phase, _, print_x = _play(kinematics, vigour)
-    return float(print_x[0] - np.interp(FOOT_OFF, phase, print_x))
-
-
-def _play(kinematics: Kinematics, vigour: float) -> tuple[Floats, Floats, Floats]:
-    """Apply the curves to a body; return phase, pitch of the foot, and its footprint ahead of the pelvis, (n,) each."""
-    phase = np.linspace(0.0, 1.0, _SAMPLES + 1)
-    hip, knee, ankle = (vigour * normative_angles(phase)).T
-    order = kinematics.leg_order
-    angles = np.zeros((len(phase), len(order)))
-    for name, curve in (("hip_flexion", hip), ("knee_flexion", knee), ("ankle_dorsiflexion", ankle)):
-        angles[:, order.index(name)] = curve
-    _, place = kinematics.legs["left"].forward(angles)
-    pitch = hip - knee + ankle
-    pitch = np.where(phase < FOOT_OFF, flatten_stance(pitch, phase, down=_FLAT, up=_HEEL_RISE), pitch)
-    return phase, pitch, place[:, 0] - kinematics.rolling.at(pitch)[0]
+    _, print_x = RUN.play(kinematics, vigour)
+    return float(print_x[0] - np.interp(RUN.foot_off, PHASES, print_x))

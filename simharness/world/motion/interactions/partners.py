@@ -33,10 +33,6 @@ class Meeting:
     lean: tuple[float, float]
     """Lean of each trunk that this takes, degrees."""
 
-    def spot(self, person: int) -> Spot:
-        """Return the meeting point on the floor as a spot with the bearing of one person."""
-        return Spot(self.point[:2], self.spots[person].bearing)
-
 
 def face_to_face(middle: Spot, distance: float, *, share: float = 0.5, aside: float = 0.0) -> tuple[Spot, Spot]:
     """Return two spots ``distance`` metres apart that face each other along the bearing of ``middle``.

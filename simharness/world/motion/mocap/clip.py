@@ -17,7 +17,7 @@ from mvpose.arrays import Floats
 from simharness.scenario.sections.people_section import MocapSection
 from simharness.world.motion.mocap.asf import read_amc, read_asf
 from simharness.world.motion.mocap.bvh import read_bvh
-from simharness.world.motion.mocap.retarget import SourceMotion, pelvis_path, retarget, source_motion
+from simharness.world.motion.mocap.retarget import SourceMotion, retarget, source_motion
 from simharness.world.motion.mocap.skeleton import RecordedMotion
 from simharness.world.motion.motion import RATE, Motion, interpolate_poses
 from simharness.world.motion.poses.kinematics import Kinematics
@@ -65,13 +65,6 @@ class Clip:
         """Return the time in the recording, (...) seconds, at times (...): back and forth, ``start`` at time 0."""
         return back_and_forth(np.asarray(time, float), start=self.start, end=float(self.time[-1]))
 
-    def path(self, kinematics: Kinematics) -> Floats:
-        """Return the path of the pelvis over ``time``, (N, 2) metres; at ``start`` it is at the origin, facing +x."""
-        turns = Rotation.from_matrix(self._source.turns["pelvis"]).as_quat(scalar_first=True)
-        pelvis = pelvis_path(self._source, kinematics)
-        place, bearing = self._start_pose(np.concatenate([pelvis, turns], axis=1))
-        return Rotation.from_euler("Z", -bearing).apply(pelvis - place)[:, :2]
-
     def perform(
         self,
         kinematics: Kinematics,
@@ -79,7 +72,6 @@ class Clip:
         *,
         place: ArrayLike,
         bearing: float,
-        rng: np.random.Generator | None = None,
     ) -> Motion:
         """Return the motion of the clip, performed by a body.
 
@@ -88,21 +80,15 @@ class Clip:
             time: times in seconds, (T,), ascending.
             place: position of the pelvis at time 0, (2,) metres.
             bearing: facing direction at time 0, radians from the x axis.
-            rng: not used, because a recording has nothing to draw.
         """
         whole = retarget(self._source, kinematics)
-        origin, facing = self._start_pose(whole.root)
-        shift = Rotation.from_euler("Z", bearing - facing)
+        start = interpolate_poses(self.time, whole.root, self.start)
+        forward = Rotation.from_quat(start[3:], scalar_first=True).apply([1.0, 0.0, 0.0])
+        shift = Rotation.from_euler("Z", bearing - float(np.arctan2(forward[1], forward[0])))
         root, angles = whole.read(self.moment(time))
-        position = shift.apply(root[:, :3] - origin) + [*np.asarray(place, float), 0.0]
+        position = shift.apply(root[:, :3] - [start[0], start[1], 0.0]) + [*np.asarray(place, float), 0.0]
         turn = (shift * Rotation.from_quat(root[:, 3:], scalar_first=True)).as_quat(scalar_first=True)
         return Motion(np.asarray(time, float), np.concatenate([position, turn], axis=1), angles)
-
-    def _start_pose(self, root: Floats) -> tuple[Floats, float]:
-        """Return floor position (x, y, 0) and facing direction of a pelvis (N, 7) at the start."""
-        pose = interpolate_poses(self.time, root, self.start)
-        forward = Rotation.from_quat(pose[3:], scalar_first=True).apply([1.0, 0.0, 0.0])
-        return np.array([pose[0], pose[1], 0.0]), float(np.arctan2(forward[1], forward[0]))
 
 
 def back_and_forth(time: Floats, *, start: float, end: float) -> Floats:

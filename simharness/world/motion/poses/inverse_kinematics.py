@@ -98,8 +98,6 @@ def solve_legs(
     height: ArrayLike,
     feet: Mapping[str, Foot],
     posture: Mapping[str, ArrayLike],
-    *,
-    guess: Mapping[str, Floats] | None = None,
 ) -> Motion:
     """Solve the legs so that the feet reach their targets under a given pelvis.
 
@@ -110,8 +108,6 @@ def solve_legs(
         height: height of the pelvis above the floor, (T,) or constant, metres.
         feet: target motion of the feet by side.
         posture: curves (T,) or constants of the upper body by degree of freedom, degrees; all others are 0.
-        guess: by side, start values of hip flexion, knee flexion and ankle dorsiflexion, (T, 3) or (3,), radians; None:
-            the solution for a leg in the sagittal plane.
     """
     turn = pelvis.turn.as_matrix()
     position = np.column_stack([pelvis.ground, np.asarray(height, float) + pelvis.bob])
@@ -124,9 +120,7 @@ def solve_legs(
     for side in SIDES:
         place = (inward @ (feet[side].ankle - position)[..., None])[..., 0]
         start = np.zeros((len(position), len(order)))
-        start[:, sagittal] = (
-            _bent(kinematics, side, place, feet[side].pitch + pelvis.lean) if guess is None else guess[side]
-        )
+        start[:, sagittal] = _bent(kinematics, side, place, feet[side].pitch + pelvis.lean)
         solved = kinematics.legs[side].solve(inward @ feet[side].turn, place, start=start)
         angles[:, [DOFS.index(f"{side}_{name}") for name in order]] = solved
     quaternion = Rotation.from_matrix(turn).as_quat(scalar_first=True)
@@ -178,18 +172,6 @@ def shoulder_girdle(kinematics: Kinematics, motion: Motion, side: str) -> tuple[
     return pelvis @ turn, (pelvis @ place[..., None])[..., 0] + motion.root[:, :3]
 
 
-def palm_pose(kinematics: Kinematics, motion: Motion, side: str) -> tuple[Floats, Floats]:
-    """Return orientation (T, 3, 3) and position (T, 3) in metres of the centre of a palm; see ``Kinematics.arms``."""
-    base, origin = shoulder_girdle(kinematics, motion, side)
-    turn, place = kinematics.arms[side].forward(motion.angles[:, arm_columns(kinematics, side)])
-    return base @ turn, (base @ place[..., None])[..., 0] + origin
-
-
-def arm_columns(kinematics: Kinematics, side: str) -> list[int]:
-    """Return the columns of the angles of an arm, in the order of the chain."""
-    return [DOFS.index(f"{side}_{name}") for name in kinematics.arm_order]
-
-
 def arm_angles(kinematics: Kinematics, **degrees: float) -> Floats:
     """Return arm angles in chain order, (6,) radians, from degrees by name without the side; all others are 0."""
     unknown = degrees.keys() - set(kinematics.arm_order)
@@ -230,7 +212,7 @@ def reach_with(
         follow: as for ``Chain.solve``; recommended with ``turn``.
     """
     weight = np.broadcast_to(np.asarray(weight, float), len(motion))
-    columns, on = arm_columns(kinematics, side), weight > 0
+    columns, on = [DOFS.index(f"{side}_{name}") for name in kinematics.arm_order], weight > 0
     current = motion.angles[:, columns]
     start = current if guess is None else np.broadcast_to(np.asarray(guess, float), current.shape)
     base, origin = shoulder_girdle(kinematics, motion, side)

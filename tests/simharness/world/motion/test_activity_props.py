@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from casting import palm_pose
 
 from mvpose.skeleton import COCO17
 from simharness.types.random_streams import stream
@@ -10,7 +11,6 @@ from simharness.world.humans.population import draw_shape
 from simharness.world.motion.activity_registry import activities
 from simharness.world.motion.motion import motion_clock
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.inverse_kinematics import palm_pose
 from simharness.world.motion.poses.kinematics import Kinematics
 
 TIME = motion_clock(12.0)

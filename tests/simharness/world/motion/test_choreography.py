@@ -1,13 +1,12 @@
 import numpy as np
 import pytest
-from casting import performer
+from casting import penetration, performer
 from scipy.spatial.transform import Rotation
 
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.motion.activity_registry import Activity, activities, solo
 from simharness.world.motion.choreography import assign_activities, choreograph, move_to, obstructs
-from simharness.world.motion.contact import penetration
 from simharness.world.motion.motion import Performance, Prop, Trajectory, motion_clock
 from simharness.world.motion.paths import Spot
 

@@ -1,13 +1,13 @@
 import mujoco
 import numpy as np
 import pytest
-from casting import performer
+from casting import penetration, performer
 
 from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.mujoco_model import person_spec
 from simharness.world.motion.activities.gestures import gesture
-from simharness.world.motion.contact import ContactModel, penetration
+from simharness.world.motion.contact import ContactModel
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.kinematics import Addresses

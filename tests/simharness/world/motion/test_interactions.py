@@ -4,14 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from casting import foot_vertices, performer
+from casting import foot_vertices, palm_pose, penetration, performer
 
 from simharness.types.random_streams import stream
 from simharness.world.motion.activity_registry import activities
-from simharness.world.motion.contact import penetration
 from simharness.world.motion.motion import RATE, Performance
 from simharness.world.motion.paths import SWAY, Spot
-from simharness.world.motion.poses.inverse_kinematics import palm_pose
 from simharness.world.motion.poses.kinematics import Kinematics
 
 PAIRED = {name: each for name, each in activities().items() if each.performers == 2}

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from casting import palm_pose
 from scipy.spatial.transform import Rotation
 
 from simharness.types.random_streams import stream
@@ -19,7 +20,6 @@ from simharness.world.motion.poses.foot_placement import (
 from simharness.world.motion.poses.inverse_kinematics import (
     arm_angles,
     arm_columns,
-    palm_pose,
     reach_with,
     solve_legs,
 )

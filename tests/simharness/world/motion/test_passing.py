@@ -6,13 +6,12 @@ import itertools
 
 import numpy as np
 import pytest
-from casting import performer
+from casting import penetration, performer
 
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.activity_registry import configured_activities
 from simharness.world.motion.choreography import assign_activities
-from simharness.world.motion.contact import penetration
 from simharness.world.motion.paths import SWAY, Spot
 
 TIME = np.arange(-1.0, 21.0, 1 / 60)

@@ -5,7 +5,8 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
-from simharness.world.motion.activities.running import FOOT_OFF, make_stride, normative_angles, run
+from simharness.world.motion.activities.gait import RUN
+from simharness.world.motion.activities.running import make_stride, run
 from simharness.world.motion.paths import make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
 
@@ -29,15 +30,15 @@ def running(kinematics):
 def test_the_curves_pass_the_published_landmarks():
     """Novacheck 1998: foot off at 39 %, the knee 40 to 45 degrees in stance and about 90 in swing."""
     phase = np.linspace(0, 1, 1001)
-    hip, knee, ankle = np.degrees(normative_angles(phase)).T
-    stance = phase < FOOT_OFF
+    hip, knee, ankle = np.degrees(RUN.angles(phase)).T
+    stance = phase < RUN.foot_off
     assert 36 <= knee[stance].max() <= 46
     assert 85 <= knee.max() <= 95
     assert 0.6 <= phase[knee.argmax()] <= 0.7
     assert 40 <= hip.max() <= 50
     assert phase[hip.argmin()] == pytest.approx(0.42, abs=0.05)
     assert -25 <= ankle.min() <= -15
-    np.testing.assert_allclose(normative_angles(0.0), normative_angles(1.0))
+    np.testing.assert_allclose(RUN.angles(0.0), RUN.angles(1.0))
 
 
 def test_there_is_a_flight_in_every_step(kinematics, running):
@@ -68,7 +69,7 @@ def test_the_pelvis_bobs_twice_per_stride(kinematics, running):
     assert 0.02 < np.ptp(height) < 0.1  # metres
     waves = np.count_nonzero(np.diff(np.sign(height - height.mean())) > 0)
     assert waves == pytest.approx(2 * stride.frequency * TIME[-1], abs=1.01)
-    assert stride.speed == pytest.approx(loop.speed)
+    assert stride.stride * stride.frequency == pytest.approx(loop.speed)
 
 
 def test_a_sprint_is_refused(kinematics):
