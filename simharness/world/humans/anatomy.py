@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.files.input_files import parse_toml
 
 SIDES: tuple[str, str] = ("left", "right")
+OTHER = {"left": "right", "right": "left"}
 
 ANATOMY: Mapping[str, Any] = MappingProxyType(
     parse_toml((Path(__file__).parent / "data" / "anatomy.toml").read_text(encoding="utf-8"))

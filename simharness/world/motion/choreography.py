@@ -7,13 +7,13 @@ from functools import partial
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mvpose.arrays import Bools, Floats
+from mvpose.arrays import Floats
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.motion import track_planning
 from simharness.world.motion.activity_registry import Activity, configured_activities, solo
 from simharness.world.motion.contact import ContactModel, SampledBody
-from simharness.world.motion.motion import ALWAYS, Motion, Performance, Presence, Prop, Trajectory
+from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Loop, RecordedPath, Spot, Track, rotation_2d
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.routes import Route
@@ -28,15 +28,6 @@ _CHECKS = 3  # every third time of a motion planned at ``RATE`` is checked for c
 _STAYING = ("mocap", "hide")  # activities of one person who never becomes a visitor
 _NO_CAMERAS = np.zeros((0, 3))
 _ORIGIN = Spot(place=np.zeros(2), bearing=0.0)
-
-
-@dataclass(frozen=True)
-class Choreography:
-    """Motions of all people, in their order, the props that they use, and the times at which they are in the scene."""
-
-    motions: tuple[Motion, ...]
-    props: tuple[Prop, ...]
-    presence: tuple[Presence, ...]
 
 
 @dataclass(frozen=True)
@@ -56,8 +47,8 @@ def choreograph(
     *,
     widest: float | None = None,
     cameras: Floats = _NO_CAMERAS,
-) -> Choreography:
-    """Plan the motions and props of all people.
+) -> Performance:
+    """Plan the motions and props of all people, and the times at which they are in the scene.
 
     People who re-enact joint tracks are at their recorded places: they have no tracks to plan, and may touch.
 
@@ -77,7 +68,7 @@ def choreograph(
     """
     people = scenario.people
     if people.motion.tracks:
-        return Choreography(_reenacted(scenario, cast, time), props=(), presence=(ALWAYS,) * len(cast))
+        return Performance(_reenacted(scenario, cast, time))
     known = configured_activities(people)
     if "mocap" in people.activities:
         known["mocap"] = _recorded(scenario)
@@ -102,13 +93,14 @@ def choreograph(
         widest=widest,
         admit=stage.admit,
     )
-    return Choreography(
-        motions=tuple(motion for performance in stage.performances for motion in performance.motions),
+    placed = stage.performances
+    return Performance(
+        motions=tuple(motion for performance in placed for motion in performance.motions),
         props=(
-            *(prop for performance in stage.performances for prop in performance.props),
+            *(prop for performance in placed for prop in performance.props),
             *(door.prop for door in doors if scenario.room.walls),
         ),
-        presence=tuple(each for performance in stage.performances for each in performance.presence),
+        presence=tuple(each for performance in placed for each in performance.presence),
     )
 
 
@@ -222,7 +214,7 @@ class _Stage:
         self._checks = time[::_CHECKS]
         self._performing: list[partial[Performance]] = []
         self._at_origin: dict[int, Performance] = {}
-        self._placed: dict[int, tuple[Performance, list[_Present]]] = {}  # of the groups that have a track
+        self._placed: dict[int, tuple[Performance, list[SampledBody]]] = {}  # of the groups that have a track
         self.requests: list[track_planning.TrackRequest] = []
         for index, group in enumerate(groups):
             manner = stream(seed, "people", group.people[0], "gait")
@@ -245,10 +237,7 @@ class _Stage:
             spot = track.spot if isinstance(track, RecordedPath) else track
             performance = move_to(self._origin(index), spot)
         movers = zip(self._groups[index].people, performance.motions, performance.presence, strict=True)
-        bodies = [
-            _Present(self._contacts.sample(person, motion, self._checks), presence.at(self._checks))
-            for person, motion, presence in movers
-        ]
+        bodies = [self._contacts.sample(person, motion, self._checks, presence) for person, motion, presence in movers]
         if self._collides(performance, bodies):
             return False
         self._placed[index] = (performance, bodies)
@@ -271,8 +260,7 @@ class _Stage:
         if activity.track is Route:
             return track_planning.VisitRequest(activity.name, self._visitor(index, mover, froude))
         if activity.track is not Loop:
-            people = len(self._groups[index].people)
-            return track_planning.SpotRequest(activity.name, activity.clearance, people > 1, people)
+            return track_planning.SpotRequest(activity.name, activity.clearance, len(self._groups[index].people))
         unit = np.sqrt(_GRAVITY * mover.leg_length)
         slowest, fastest = (unit * limit for limit in activity.froude)
         running = activity.froude[1] > _RUNNING
@@ -295,16 +283,16 @@ class _Stage:
             duration=self._scenario.duration,
         )
 
-    def _collides(self, performance: Performance, bodies: "Sequence[_Present]") -> bool:
+    def _collides(self, performance: Performance, bodies: Sequence[SampledBody]) -> bool:
         """Return whether a performance comes too near to those of other groups."""
-        others = [presence for _, others in self._placed.values() for presence in others]
+        others = [body for _, bodies in self._placed.values() for body in bodies]
         for one in bodies:
             for other in others:
-                both = one.here & other.here
+                both = one.present & other.present
                 apart = np.linalg.norm(one.motion.root[:, :2] - other.motion.root[:, :2], axis=1)[both]
                 if apart.min(initial=np.inf) < self._spacing:
                     return True
-                if both.any() and self._contacts.penetration(one.body, other.body)[both].max() > _DEEPEST:
+                if both.any() and self._contacts.penetration(one, other)[both].max() > _DEEPEST:
                     return True
         before = [prop for earlier, _ in self._placed.values() for prop in earlier.props]
         return any(obstructs(prop, one.motion) for prop in before for one in bodies) or any(
@@ -312,25 +300,11 @@ class _Stage:
         )
 
 
-@dataclass(frozen=True)
-class _Present:
-    """Sampled body of a person, and whether the person is in the scene at these times, (N,)."""
-
-    body: SampledBody
-    here: Bools
-
-    @property
-    def motion(self) -> Motion:
-        return self.body.motion
-
-
 def move_to(performance: Performance, spot: Spot) -> Performance:
     """Return a performance, made at the origin and facing along x, moved to a spot."""
-    motions = tuple(
-        Motion(motion.time, _moved_poses(motion.root, spot), motion.angles) for motion in performance.motions
-    )
+    motions = tuple(replace(motion, root=_moved_poses(motion.root, spot)) for motion in performance.motions)
     props = tuple(
-        Prop(prop.kind, prop.size, Trajectory(prop.trajectory.time, _moved_poses(prop.trajectory.pose, spot)))
+        replace(prop, trajectory=replace(prop.trajectory, pose=_moved_poses(prop.trajectory.pose, spot)))
         for prop in performance.props
     )
     return Performance(motions, props, performance.presence)

@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mvpose.arrays import Floats
-from simharness.world.motion.motion import Motion
+from mvpose.arrays import Bools, Floats
+from simharness.world.motion.motion import ALWAYS, Motion, Presence
 from simharness.world.motion.poses.kinematics import Addresses, Kinematics
 
 _FLESH = 0.15  # metres: largest extent of a body beyond the heads of its bones
@@ -26,6 +26,8 @@ class SampledBody:
     """Lowest x and y of the body, (N, 2) metres."""
     high: Floats
     """Highest x and y of the body, (N, 2) metres."""
+    present: Bools
+    """Whether the person is in the scene at these times, (N,)."""
 
     def near(self, other: "SampledBody") -> NDArray[np.intp]:
         """Return the indices of the times at which the bounding rectangles of two people overlap."""
@@ -44,12 +46,13 @@ class ContactModel:
         self._cast = tuple(cast)
         self._pairs: dict[tuple[int, int], _Pair] = {}
 
-    def sample(self, person: int, motion: Motion, time: ArrayLike) -> SampledBody:
+    def sample(self, person: int, motion: Motion, time: ArrayLike, presence: Presence = ALWAYS) -> SampledBody:
         """Return the body of a person at times (N,) in seconds."""
         mover, sampled = self._cast[person], motion.at(time)
         bones = mover.transforms(sampled)[:, :, :2]
         heads = np.matmul(bones[..., :3], mover.body.heads[:, :, None])[..., 0] + bones[..., 3]
-        return SampledBody(person, sampled, heads.min(axis=1) - _FLESH, heads.max(axis=1) + _FLESH)
+        low, high = heads.min(axis=1) - _FLESH, heads.max(axis=1) + _FLESH
+        return SampledBody(person, sampled, low, high, presence.at(time))
 
     def penetration(self, one: SampledBody, other: SampledBody) -> Floats:
         """Return the penetration depth of two people, (N,) metres, 0 where they do not touch.

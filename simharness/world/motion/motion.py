@@ -87,6 +87,13 @@ def interpolate_poses(time: Floats, pose: Floats, when: ArrayLike) -> Floats:
     return result
 
 
+def upright_poses(place: Floats, bearing: ArrayLike) -> Floats:
+    """Return poses (..., 7) on the floor, at places (..., 2) in metres and turned to bearings (...) in radians."""
+    half = np.asarray(bearing, float)[..., None] / 2
+    flat = np.zeros_like(half)
+    return np.concatenate([place, flat, np.cos(half), flat, flat, np.sin(half)], axis=-1)
+
+
 def transform_points(points: NDArray[np.floating], pose: Floats) -> Floats:
     """Transform points (n, 3) from an object's frame, given by its pose (7,), to the world."""
     turn = Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()
@@ -218,6 +225,11 @@ class Prop:
     a table the height of the top."""
     trajectory: Trajectory
     """Pose over time. The origin is the centre of the underside; a chair faces +x."""
+
+    @classmethod
+    def at_rest(cls, kind: PropKind, size: tuple[float, float, float], place: Floats, bearing: float) -> "Prop":
+        """Return the prop that stands at a place (2,) on the floor, turned to a bearing."""
+        return cls(kind, size, Trajectory(np.zeros(1), upright_poses(place, bearing)[None]))
 
 
 @dataclass(frozen=True)

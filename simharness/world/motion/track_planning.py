@@ -50,10 +50,8 @@ class SpotRequest:
     """Name of the activity."""
     clearance: float = 0.0
     """Radius around the spot that the performers use, metres."""
-    together: bool = False
-    """Whether the spot is the midpoint between people."""
-    people: int = 0
-    """Number of people who use it; 0: two if ``together``, else one."""
+    people: int = 1
+    """Number of people who use it; the spot is the midpoint between them."""
 
 
 @dataclass(frozen=True)
@@ -279,9 +277,7 @@ def _urgency(request: TrackRequest, *, movers_first: bool) -> tuple[bool, float]
 
 
 def _people(request: TrackRequest) -> int:
-    if not isinstance(request, SpotRequest):
-        return 1
-    return request.people or (2 if request.together else 1)
+    return request.people if isinstance(request, SpotRequest) else 1
 
 
 def _limits(request: LoopRequest, half: float) -> paths.LoopLimits:
@@ -295,7 +291,7 @@ def _draw(
 ) -> Sequence[paths.Track]:
     """Draw candidate tracks, possibly none; candidates on one loop differ in their start positions."""
     if isinstance(request, SpotRequest):
-        return [paths.draw_spot(rng, half=half - request.clearance, apart=request.together)]
+        return [paths.draw_spot(rng, half=half - request.clearance, apart=request.people > 1)]
     if isinstance(request, RecordedRequest):
         recorded = paths.draw_recorded(rng, half=half, time=request.time, offset=request.offset)
         return [] if recorded is None else [recorded]

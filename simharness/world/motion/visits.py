@@ -10,7 +10,7 @@ from mvpose.arrays import Bools, Floats
 from simharness.scenario.sections.people_section import TrafficSection
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
-from simharness.world.motion.motion import Presence, Prop, Trajectory
+from simharness.world.motion.motion import Presence, Prop
 from simharness.world.motion.routes import Itinerary, Route, turning_time, walking_time
 
 DOOR = (0.06, 1.1, 2.15)
@@ -69,10 +69,7 @@ class Door:
     @property
     def prop(self) -> Prop:
         """The door as an object on the wall."""
-        yaw = np.arctan2(self.inward[1], self.inward[0]) / 2
-        place = self.place + self.inward * DOOR[0] / 2
-        pose = np.array([[*place, 0.0, np.cos(yaw), 0.0, 0.0, np.sin(yaw)]])
-        return Prop("door", DOOR, Trajectory(np.zeros(1), pose))
+        return Prop.at_rest("door", DOOR, self.place + self.inward * DOOR[0] / 2, _bearing(self.inward))
 
 
 @dataclass(frozen=True)

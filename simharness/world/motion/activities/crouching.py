@@ -3,7 +3,7 @@
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.world.humans.anatomy import SIDES
+from simharness.world.humans.anatomy import OTHER, SIDES
 from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
@@ -15,7 +15,6 @@ from simharness.world.motion.poses.kinematics import Kinematics
 # Pitch of the rear foot when kneeling: preferred and most negative.
 _ON_TOES, _TIPPED = np.radians([-88.0, -94.5]).tolist()
 _ANKLE = float(np.radians(20.0))  # largest dorsiflexion of the rear ankle
-_OTHER = {"left": "right", "right": "left"}
 
 
 @solo_activity("squat", clearance=0.2)
@@ -52,7 +51,7 @@ def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     """Step forward, go down on the other knee, stay, come up and step back."""
     handed, bow, look = rng.uniform(size=3)
     back = "right" if handed < 0.6 else "left"
-    front = _OTHER[back]
+    front = OTHER[back]
     u, marks = timing.cycle_time(time, (0.8, 0.9, 0.9, 0.9, 0.8, 0.5), rng=rng, pace=pace)
     stepped, down, stayed, up, home, _ = marks[1:]
 
@@ -94,7 +93,7 @@ def crouch(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.G
     """Stay low with one foot ahead and the heel of the other raised, shift the weight and look around."""
     handed, deep = rng.uniform(size=2)
     back = "right" if handed < 0.6 else "left"
-    front = _OTHER[back]
+    front = OTHER[back]
     rate = 0.3 * pace
     fidget = timing.smooth_noise(time, rng, rate)
     pitch, shank = np.radians(-42.0), np.radians(58.0)
@@ -136,7 +135,7 @@ def _rest_on_knee(curves: timing.Curves, on: Floats, front: str) -> None:
         **timing.limb(
             front, shoulder_flexion=32.0, shoulder_abduction=10.0, shoulder_rotation=20.0, elbow_flexion=72.0
         ),
-        **timing.limb(_OTHER[front], shoulder_flexion=14.0, shoulder_abduction=14.0, elbow_flexion=30.0),
+        **timing.limb(OTHER[front], shoulder_flexion=14.0, shoulder_abduction=14.0, elbow_flexion=30.0),
     )
 
 

@@ -156,11 +156,11 @@ class Gait:
         """
         cycle = 2 * np.pi * phase
         aside = _PELVIS_SWAY * amplitude * np.sin(cycle - 0.05 * np.pi)  # towards the standing foot
-        return Pelvis(
-            ground=place + aside[:, None] * leftward(heading),
+        return Pelvis.along(
+            place + aside[:, None] * leftward(heading),
+            heading + self.pelvis_turn(phase, amplitude=amplitude),
             bob=-self.bob * amplitude * np.cos(2 * cycle),  # lowest when a heel strikes
-            bearing=heading + self.pelvis_turn(phase, amplitude=amplitude),
-            lean=np.full(len(phase), np.radians(1.0)),
+            lean=np.radians(1.0),
             list=_PELVIS_LIST * self.vigour * amplitude * np.cos(cycle - 0.30 * np.pi),  # the swinging side is lower
         )
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.world.humans.anatomy import SIDES
+from simharness.world.humans.anatomy import OTHER, SIDES
 from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
@@ -64,7 +64,7 @@ def reach(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
         curves,
         low,
         **timing.limb(side, shoulder_flexion=80.0, shoulder_abduction=5.0, elbow_flexion=14.0),
-        **timing.limb("left" if side == "right" else "right", shoulder_flexion=14.0, elbow_flexion=35.0),
+        **timing.limb(OTHER[side], shoulder_flexion=14.0, elbow_flexion=35.0),
         lumbar_flexion=24.0,
         thorax_flexion=14.0,
         thorax_rotation=-sign * 14.0,
@@ -142,13 +142,9 @@ def gesture(name: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng:
 
 def _shifted(spot: Spot, forward: Floats, aside: Floats, *, turned: Floats, lean: Floats) -> Pelvis:
     """Return the pelvis of a standing person: shifts in metres (T,), ``turned`` and ``lean`` in degrees (T,)."""
-    return Pelvis(
-        ground=spot_to_world(spot, np.stack([forward, aside], axis=-1)),
-        bob=np.zeros(len(forward)),
-        bearing=spot.bearing + np.radians(turned),
-        lean=np.radians(lean),
-        list=1.2 * aside,  # radians per metre: the hip over the standing foot is higher
-    )
+    ground, bearing = spot_to_world(spot, np.stack([forward, aside], axis=-1)), spot.bearing + np.radians(turned)
+    listed = 1.2 * aside  # radians per metre: the hip over the standing foot is higher
+    return Pelvis.along(ground, bearing, lean=np.radians(lean), list=listed)
 
 
 @_gesture("stand")

@@ -18,7 +18,7 @@ from simharness.world.motion.poses.foot_placement import (
     spot_to_world,
     stance,
 )
-from simharness.world.motion.poses.inverse_kinematics import arm_angles, reach_with, solve_legs
+from simharness.world.motion.poses.inverse_kinematics import PALM_DOWN, arm_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 
 _SITTING = 0.68  # distance from ankles to hips when sitting on the floor with bent knees, in leg lengths
@@ -31,11 +31,6 @@ _LYING |= {"LeftShoulder", "RightShoulder", "LeftUpLeg", "RightUpLeg"}
 _SAMPLES, _SPARE = 14, 0.002  # metres: extra height of the trunk, which moves a little with the legs
 # In statures: distance of the hands from the midline; heights of the palm on its thumb and on its edge.
 _HANDS, _THUMB, _EDGE = 0.2, 0.042, 0.05
-# Hand on the floor, fingers ahead: the columns are the directions of its x (thumb), y and z (wrist) axes.
-_FLAT = {
-    "left": np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
-    "right": np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
-}
 _OUT = np.radians(2.0)  # outward rotation of the toes: limited by the ankle of a lying leg
 _ROLL = (0.0, 0.5, 1.0)  # sitting, halfway, lying
 _TRUNK = {  # degrees at the values of _ROLL
@@ -104,7 +99,7 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
         place = np.stack([ahead, left, over], axis=-1)
         fingers = spot.bearing + sign * np.radians(130.0 - 120.0 * roll)  # outward and backward, then along the body
         edge = sign * np.radians(75.0) * roll  # from the palm onto the edge of the hand, the thumb up
-        turn = _about_z(fingers) @ _FLAT[side] @ _about_z(edge)
+        turn = _about_z(fingers) @ PALM_DOWN[side] @ _about_z(edge)
         back = arm_angles(
             kinematics, shoulder_flexion=-30.0, shoulder_rotation=-30.0, elbow_flexion=60.0, wrist_flexion=-50.0
         )

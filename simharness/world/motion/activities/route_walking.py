@@ -23,7 +23,7 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activities.gait import PHASES, Gait, make_gait, similar_walk_ratio, walking_posture
 from simharness.world.motion.activity_registry import Activity, activity
-from simharness.world.motion.motion import Motion, Performance, Prop, Trajectory
+from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import Footprints, spot_to_world
 from simharness.world.motion.poses.inverse_kinematics import (
@@ -285,7 +285,5 @@ def _perform(
         walker.walk(2 * _ENDS, slow=inside).turn(spot.bearing + legs * np.pi, sense=sense)
         walker.stand(rests.uniform(*_REST))
     motion = walk_route(mover, walker.route(), time, rng=rng, pace=pace)
-    half = spot.bearing / 2
-    pose = np.array([[*spot.place, 0.0, np.cos(half), 0.0, 0.0, np.sin(half)]])
     size = (_DEPTH, _WIDTH, round(mover.body.stature + _OVER_HEAD, 2))
-    return Performance((motion,), (Prop("booth", size, Trajectory(np.zeros(1), pose)),))
+    return Performance((motion,), (Prop.at_rest("booth", size, spot.place, spot.bearing),))

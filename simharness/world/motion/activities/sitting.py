@@ -8,7 +8,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activity_registry import activity
-from simharness.world.motion.motion import Performance, Prop, Trajectory
+from simharness.world.motion.motion import Performance, Prop
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.poses import foot_placement
 from simharness.world.motion.poses.inverse_kinematics import reach_with, solve_legs
@@ -39,6 +39,10 @@ class Seat:
     """Leans of the pelvis, ascending, (n,) radians."""
     hip: Floats
     """Hip positions at these leans, (n, 2) metres ahead of the ankles and up."""
+
+    def chair(self, place: Floats, bearing: float) -> Prop:
+        """Return the chair with this seat, its middle at a place (2,)."""
+        return Prop.at_rest("chair", (self.front - self.back, _WIDTH, self.height), place, bearing)
 
     def hip_at(self, lean: Floats) -> Floats:
         """Return the hip positions, (T, 2) metres, of a seated pelvis with leans (T,) in radians."""
@@ -82,9 +86,7 @@ def sit(
         rested = ease((seated - 0.6) / 0.4)
         motion = reach_with(kinematics, motion, side, np.tile(place, (len(time), 1)), weight=rested)
     middle = foot_placement.spot_to_world(track, [(seat.front + seat.back) / 2 + ankle, 0.0])
-    pose = [[*middle, 0.0, np.cos(track.bearing / 2), 0.0, 0.0, np.sin(track.bearing / 2)]]
-    chair = Prop("chair", (seat.front - seat.back, _WIDTH, seat.height), Trajectory(time[:1], np.array(pose)))
-    return Performance((motion,), (chair,))
+    return Performance((motion,), (seat.chair(middle, track.bearing),))
 
 
 def _sitting_down(kinematics: Kinematics, seat: Seat, d: Floats, lean: Floats) -> Floats:

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.world.humans.anatomy import SIDES
+from simharness.world.humans.anatomy import OTHER, SIDES
 from simharness.world.motion.activity_registry import activity, solo_activity
-from simharness.world.motion.motion import Motion, Performance, Prop, Trajectory
+from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.poses.foot_placement import (
     Footprint,
@@ -27,7 +27,6 @@ _STRAIGHTEST = np.radians(10.0)  # smallest knee flexion
 _STEP_TIME = 0.5  # seconds
 _LARGEST_TURN = np.radians(32.0)  # rotation of one foot in one step; the hip rotates further
 _FITTED = 240  # samples per cycle to which the height of the pelvis is fitted
-_OTHER = {"left": "right", "right": "left"}
 
 
 @solo_activity("turn")
@@ -49,7 +48,7 @@ def turn(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gen
         lasts = (end - start) / count
         inner = "left" if by > 0 else "right"  # steps first
         for n in range(count):
-            side = inner if n % 2 == 0 else _OTHER[inner]
+            side = inner if n % 2 == 0 else OTHER[inner]
             to = _turned(prints[side], rotated + by * (n // 2 + 1) / (count // 2))
             start_time = start + n * lasts
             steps[side].append((start_time, start_time + 0.9 * lasts, to))
@@ -65,13 +64,8 @@ def turn(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gen
     def stances(u: Floats) -> tuple[Pelvis, dict[str, Foot]]:
         bearing = facing(u)
         aside = _over_standing_foot(u, steps, by=0.022)
-        pelvis = Pelvis(
-            ground=spot_to_world(spot, aside[:, None] * leftward(bearing)),
-            bob=np.zeros(len(u)),
-            bearing=spot.bearing + bearing,
-            lean=np.full(len(u), np.radians(1.0)),
-            list=0.8 * aside,
-        )
+        ground = spot_to_world(spot, aside[:, None] * leftward(bearing))
+        pelvis = Pelvis.along(ground, spot.bearing + bearing, lean=np.radians(1.0), list=0.8 * aside)
         return pelvis, {side: foot_path(kinematics, spot, u, prints[side], steps[side], lift=0.035) for side in SIDES}
 
     pelvis, feet = stances(u)
@@ -92,7 +86,7 @@ def step(
     assert isinstance(track, Spot)
     handed, tall, swing = rng.uniform(size=3)
     lead = "right" if handed < 0.6 else "left"
-    trail = _OTHER[lead]
+    trail = OTHER[lead]
     length = kinematics.leg_length
     height, forward = (0.13 + 0.09 * tall) * length, 0.57 * length
     u, marks = cycle_time(time, (0.7, 0.75, 0.7, 0.7, 0.75, 0.6), rng=rng, pace=pace)
@@ -127,13 +121,8 @@ def step(
     )
     aside = _over_standing_foot(u, steps, by=0.03)
     lean = np.radians(2.0) + np.radians(9.0) * (bump(u, 0.2, up) + 0.6 * bump(u, stood, down))
-    pelvis = Pelvis(
-        ground=spot_to_world(track, np.stack([ahead - forward / 2, aside], axis=-1)),
-        bob=np.zeros(len(time)),
-        bearing=np.full(len(time), track.bearing),
-        lean=lean,
-        list=0.8 * aside,
-    )
+    ground = spot_to_world(track, np.stack([ahead - forward / 2, aside], axis=-1))
+    pelvis = Pelvis.along(ground, track.bearing, lean=lean, list=0.8 * aside)
     # The trailing foot rises onto its toes, and lands on them when it steps down first.
     rolled = {
         lead: 0.0 * u,
@@ -153,8 +142,7 @@ def step(
     front, back = above["left"].place[0] + foot[:, 0].max(), above["left"].place[0] + foot[:, 0].min()
     depth = float(front - back) + 0.08
     middle = spot_to_world(track, [(front + back) / 2, 0.0])
-    pose = np.array([[*middle, 0.0, np.cos(track.bearing / 2), 0.0, 0.0, np.sin(track.bearing / 2)]])
-    return Performance((motion,), (Prop("step", (depth, 0.6, float(height)), Trajectory(time[:1], pose)),))
+    return Performance((motion,), (Prop.at_rest("step", (depth, 0.6, float(height)), middle, track.bearing),))
 
 
 def _over_standing_foot(u: Floats, steps: Steps, *, by: float) -> Floats:

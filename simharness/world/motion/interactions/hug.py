@@ -226,14 +226,8 @@ def _steps(
         )
         over = _SHIFT if side == "right" else -_SHIFT
         aside += over * (bump(u, *forth) + bump(u, *back))
-    pelvis = inverse_kinematics.Pelvis(
-        ground=spot_to_world(home, np.stack([step * course.near(u), aside], axis=-1)),
-        bob=np.zeros(len(u)),
-        bearing=np.full(len(u), home.bearing),
-        lean=np.zeros(len(u)),
-        list=np.zeros(len(u)),
-    )
-    return pelvis, feet
+    ground = spot_to_world(home, np.stack([step * course.near(u), aside], axis=-1))
+    return inverse_kinematics.Pelvis.along(ground, home.bearing), feet
 
 
 def _embrace(

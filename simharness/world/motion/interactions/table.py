@@ -7,17 +7,17 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.world.humans.anatomy import SIDES
+from simharness.world.humans.anatomy import OTHER, SIDES
 from simharness.world.motion.activities.gestures import gesture
 from simharness.world.motion.activities.sitting import Seat, fit_seat
 from simharness.world.motion.activity_registry import activity
 from simharness.world.motion.interactions import partners
-from simharness.world.motion.motion import Motion, Performance, Prop, Trajectory
+from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import foot_path, pelvis_from_hips, spot_to_world, stance
-from simharness.world.motion.poses.inverse_kinematics import reach_with, solve_legs
+from simharness.world.motion.poses.inverse_kinematics import PALM_DOWN, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.timing import blend, gesture_envelope, relaxed_posture, smooth_noise
+from simharness.world.motion.poses.timing import blend, draw_side, gesture_envelope, relaxed_posture, smooth_noise
 
 _SEATED = 0.65  # probability that they sit
 _DEPTH, _WIDTH = (0.60, 0.72), (0.9, 1.3)  # metres: depth of the table between them, and its width
@@ -28,13 +28,7 @@ _LAP = 0.21  # metres: least height of the table top above the seat, for thighs 
 _OVER_SEAT = 0.27  # metres: usual height of the table top above the seat
 _UNDER_ELBOW = 0.04  # metres: depth of a standing table below the elbows
 _ON_TABLE = 0.022  # metres: height of a resting palm above the table; the wrist is thicker than the palm
-_CHAIR = 0.46  # metres: width of a chair
 _RESTING = np.radians([35.0, 10.0, 30.0, 70.0, 45.0, 0.0])  # angles of an arm that lies on a table
-# Orientation of a hand that lies on its palm, fingers ahead.
-_FLAT = {
-    "right": np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
-    "left": np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
-}
 _INWARD = np.radians(35.0)  # inward rotation of the fingers of both hands
 
 
@@ -65,16 +59,19 @@ def table(
     top = _top(performers, seats)
     edges = [_belly(mover) + _BELLY for mover in performers]
     if seated:  # room for toes and knees under the table
-        depth = max(depth, sum(_toes(mover, seat) for mover, seat in zip(performers, seats, strict=True)) - sum(edges))
+        toes = [float(max(sole[:, 0].max() for sole in mover.soles.values())) for mover in performers]
+        reach = [_ankles(seat) + ahead + _TOES_APART / 2 for seat, ahead in zip(seats, toes, strict=True)]
+        depth = max(depth, sum(reach) - sum(edges))
     between = edges[0] + depth + edges[1]
     spots = partners.face_to_face(spot, between, share=(edges[0] + depth / 2) / between)
-    props = [Prop("table", (depth, width, top), _standing(spot, 0.0, time))]
+    props = [Prop.at_rest("table", (depth, width, top), spot.place, spot.bearing)]
     motions = []
     for person, (mover, home) in enumerate(zip(performers, spots, strict=True)):
         place = _Place(home, top, edges[person], edges[person] + depth / 2)
         if seated:
             motion, ankles = _seated(mover, seats[person], home, time, rng)
-            props.append(_chair(seats[person], home, ankles, time))
+            middle = ankles + (seats[person].front + seats[person].back) / 2
+            props.append(seats[person].chair(spot_to_world(home, [middle, 0.0]), home.bearing))
         else:
             motion = partners.look_ahead(gesture("stand", mover, home, time, rng=rng))
         motions.append(_TASKS[(first, other)[person]](mover, motion, place, time, rng))
@@ -96,11 +93,6 @@ def _belly(mover: Kinematics) -> float:
     shoulder = mover.arms["right"].anchors[0]
     trunk = skin[(np.abs(skin[:, 1]) < 0.6 * abs(shoulder[1])) & (skin[:, 2] > 0.0) & (skin[:, 2] < 0.6 * shoulder[2])]
     return float(trunk[:, 0].max())
-
-
-def _toes(mover: Kinematics, seat: Seat) -> float:
-    """Return the distance from a seated pelvis forward to the toes, plus half the gap between toes, metres."""
-    return _ankles(seat) + float(max(sole[:, 0].max() for sole in mover.soles.values())) + _TOES_APART / 2
 
 
 def _ankles(seat: Seat) -> float:
@@ -126,18 +118,6 @@ def _seated(mover: Kinematics, seat: Seat, home: Spot, time: Floats, rng: np.ran
     return solve_legs(mover, time, pelvis, height, feet, curves), ankles
 
 
-def _chair(seat: Seat, home: Spot, ankles: float, time: Floats) -> Prop:
-    middle = ankles + (seat.front + seat.back) / 2
-    return Prop("chair", (seat.front - seat.back, _CHAIR, seat.height), _standing(home, middle, time))
-
-
-def _standing(spot: Spot, ahead: float, time: Floats) -> Trajectory:
-    """Return the trajectory of an object that stands still ahead of a spot, with its bearing."""
-    half = spot.bearing / 2
-    pose = np.array([[*spot_to_world(spot, [ahead, 0.0]), 0.0, np.cos(half), 0.0, 0.0, np.sin(half)]])
-    return Trajectory(time[:1], pose)
-
-
 def _lay(mover: Kinematics, motion: Motion, place: _Place, side: str, at: Floats, roll: float = 0.0) -> Motion:
     """Return the motion with a hand on or above the table.
 
@@ -152,7 +132,7 @@ def _lay(mover: Kinematics, motion: Motion, place: _Place, side: str, at: Floats
     sign = -1.0 if side == "right" else 1.0
     ground = spot_to_world(place.spot, at + [place.edge, 0.0, place.top + _ON_TABLE])
     tilt = Rotation.from_euler("ZX", [place.spot.bearing - sign * _INWARD, -sign * roll]).as_matrix()
-    turns = np.tile(tilt @ _FLAT[side], (len(at), 1, 1))
+    turns = np.tile(tilt @ PALM_DOWN[side], (len(at), 1, 1))
     return reach_with(mover, motion, side, ground, turn=turns, guess=_RESTING, turn_weight=0.02)
 
 
@@ -190,13 +170,10 @@ def _write(mover: Kinematics, motion: Motion, place: _Place, time: Floats, rng: 
 
 def _reach(mover: Kinematics, motion: Motion, place: _Place, time: Floats, rng: np.random.Generator) -> Motion:
     """Reach to the centre of the table with one hand now and then."""
-    on, aside, far = (
-        gesture_envelope(time, rng, hold=0.8, rest=1.2, raised=1.0),
-        rng.uniform(-0.12, 0.12),
-        rng.uniform(0.7, 1.0),
-    )
-    side = "right" if rng.uniform() < 0.75 else "left"
-    other = "left" if side == "right" else "right"
+    on = gesture_envelope(time, rng, hold=0.8, rest=1.2, raised=1.0)
+    aside, far = rng.uniform(-0.12, 0.12), rng.uniform(0.7, 1.0)
+    side, _ = draw_side(rng)
+    other = OTHER[side]
     motion = partners.lean_forward(motion, 4.0 + 14.0 * on)
     motion = _lay(mover, motion, place, other, _rest(mover, other, len(time)))
     at = _rest(mover, side, len(time))

@@ -149,14 +149,8 @@ def pelvis_from_hips(
     ahead = hip[:, 0] - (x * np.cos(lean) + z * np.sin(lean))
     up = hip[:, 1] - (z * np.cos(lean) - x * np.sin(lean))
     aside = np.broadcast_to(np.asarray(aside, float), len(hip))
-    pelvis = Pelvis(
-        ground=spot_to_world(spot, np.stack([ahead, aside], axis=-1)),
-        bob=np.zeros(len(hip)),
-        bearing=np.broadcast_to(spot.bearing + np.asarray(bearing, float), len(hip)),
-        lean=np.broadcast_to(np.asarray(lean, float), len(hip)),
-        list=np.zeros(len(hip)),
-    )
-    return pelvis, up
+    ground = spot_to_world(spot, np.stack([ahead, aside], axis=-1))
+    return Pelvis.along(ground, spot.bearing + np.asarray(bearing, float), lean=lean), up
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,12 @@ from simharness.world.motion.poses.kinematics import Kinematics
 _REACH, _FULL_REACH = 0.95, 0.985  # of the arm length: largest distance reached exactly, and largest distance at all
 _PULL = 0.01  # metres per radian: pull of an arm towards its start angles; moves the palm by about 0.3 mm
 
+PALM_DOWN = {
+    "right": np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
+    "left": np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+}
+"""By side, orientation of a hand that lies on its palm, fingers ahead; columns: its x (thumb), y and z (wrist) axes."""
+
 
 @dataclass(frozen=True)
 class Foot:
@@ -48,6 +54,14 @@ class Pelvis:
     """Lean, forward positive, (T,) radians."""
     list: Floats
     """List, left side up positive, (T,) radians."""
+
+    @classmethod
+    def along(
+        cls, ground: Floats, bearing: ArrayLike, *, lean: ArrayLike = 0.0, list: ArrayLike = 0.0, bob: ArrayLike = 0.0
+    ) -> "Pelvis":
+        """Return the pelvis along a path (T, 2) on the floor; each other value is (T,) or constant."""
+        values = (np.broadcast_to(np.asarray(each, float), len(ground)) for each in (bob, bearing, lean, list))
+        return cls(ground, *values)
 
     @property
     def turn(self) -> Rotation:

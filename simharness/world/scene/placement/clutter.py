@@ -12,7 +12,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.scenario.sections.room_section import ClutterSection, DecoysSection, RoomSection
 from simharness.types.random_streams import stream
-from simharness.world.motion.motion import Trajectory
+from simharness.world.motion.motion import Trajectory, upright_poses
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.laboratory import draw_box, draw_mannequin, draw_shelf
 from simharness.world.scene.objects.materials import draw_sheet
@@ -197,8 +197,7 @@ class _Path:
         place = self.middle + np.column_stack([np.cos(angle), np.sin(angle)]) * self.radii @ turn
         ahead = np.column_stack([-np.sin(angle), np.cos(angle)]) * self.radii @ turn * np.sign(self.period)
         yaw = np.arctan2(ahead[:, 1], ahead[:, 0]) if self.radii[1] else np.full(len(time), self.bearing)
-        flat = np.zeros(len(time))
-        return np.column_stack([place, flat, np.cos(yaw / 2), flat, flat, np.sin(yaw / 2)])
+        return upright_poses(place, yaw)
 
 
 def _draw_path(rng: np.random.Generator, space: FreeSpace) -> _Path:

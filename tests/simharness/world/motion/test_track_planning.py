@@ -32,7 +32,7 @@ def apart(tracks, wishes, *, span, step=1 / 50):
         ([WALK, STAND] * 4 + [WALK], 2.0, 0.8),
         ([WALK, STAND] * 3, 3.0, 1.5),
         ([RUN, WALK, STAND], 2.5, 0.8),
-        ([SpotRequest("table", 0.7, together=True), WALK, SpotRequest("hug", 0.4, together=True), WALK], 2.5, 0.8),
+        ([SpotRequest("table", 0.7, 2), WALK, SpotRequest("hug", 0.4, 2), WALK], 2.5, 0.8),
     ],
 )
 def test_everyone_is_apart_and_inside_at_all_times(seed, wishes, area, spacing):
