@@ -202,13 +202,13 @@ def schedule_exposures(
     time = as_array(time, ("T",), "time")
     phases = np.zeros(len(rig)) if phases is None else as_array(phases, (len(rig),), "phases")
     camera_of_view = _cameras_of_views(faults, rig)
-    dead = _dead(faults, rig)
+    _check_exists(f"faults.dead = {_as_toml(faults.dead)}", faults.dead, rig)
     if not len(time):
         ideal = ExposureSchedule.ideal(rig, time)
         return replace(ideal, believed_rig=_believed(rig, faults, seed), camera_of_view=camera_of_view)
     turns = [every[view % len(every)] if every else 1 for view in range(len(rig))]
     source = np.stack([_sources(faults, len(time), seed, view, turns[view]) for view in range(len(rig))], axis=1)
-    source[:, dead] = -1
+    source[:, list(faults.dead)] = -1
     clock = np.stack([_clock(faults, time, seed, view, phases[view]) for view in range(len(rig))], axis=1)
     known = clock if faults.clocks_known else time[:, None] + np.clip(phases, -MAX_CLOCK_ERROR, MAX_CLOCK_ERROR)
     known = np.where(source < 0, np.nan, known)
@@ -291,16 +291,11 @@ def _cameras_of_views(faults: FaultsSection, rig: Rig) -> Integers:
             )
         if rig[a].size != rig[b].size:
             raise ValueError(
-                f"faults.swapped: the pictures of cameras {a} and {b} have different sizes, {_by(rig[a].size)} and "
-                f"{_by(rig[b].size)}, so the swap would be obvious; swap cameras of one size"
+                "faults.swapped: the pictures of cameras {} and {} have different sizes, {} x {} and {} x {}, so the "
+                "swap would be obvious; swap cameras of one size".format(a, b, *rig[a].size, *rig[b].size)
             )
         camera_of_view[a], camera_of_view[b] = b, a
     return camera_of_view
-
-
-def _dead(faults: FaultsSection, rig: Rig) -> Integers:
-    _check_exists(f"faults.dead = {_as_toml(faults.dead)}", faults.dead, rig)
-    return np.array(faults.dead, np.int64)
 
 
 def _check_exists(key: str, cameras: tuple[int, ...], rig: Rig) -> None:
@@ -313,7 +308,3 @@ def _check_exists(key: str, cameras: tuple[int, ...], rig: Rig) -> None:
 
 def _as_toml(value: tuple) -> str:
     return str(value).replace(",)", ")").replace("(", "[").replace(")", "]")
-
-
-def _by(size: tuple[int, int]) -> str:
-    return f"{size[0]} x {size[1]}"

@@ -37,6 +37,7 @@ _ASSIST_RATE = 2 * np.pi * 2.0  # rad/s: rate at which unbounded assistance woul
 # farther away has fallen or been pushed away, and is not dragged along the floor.
 _REACH = (0.4, 1.0)
 _GYRATION = 0.3  # metres: radius of gyration of a body about its pelvis, for the assisting torque
+_STILL = 1e-6  # metres and quaternion units: a prop that moves more is carried, and touches nobody
 _BAR = 0.018  # metres: radius of the bars that represent the soles
 _CONTACT_TIME = 0.006  # s: time constant of contacts; MuJoCo requires at least two steps
 _BONES = {
@@ -176,8 +177,10 @@ class MotionServos:
         self._moving = [solid for solid in solids if solid.trajectory is not None]
         self._mocap = [int(self.model.body(solid.name).mocapid[0]) for solid in self._moving]
         for solid in self._moving:
-            if solid.kind == "prop" and _is_moved(solid):
-                _without_contact(self.model, solid.name)
+            trajectory = solid.trajectory
+            if solid.kind == "prop" and trajectory is not None and np.ptp(trajectory.pose, axis=0).max() > _STILL:
+                geoms = self.model.geom_bodyid == self.model.body(solid.name).id
+                self.model.geom_contype[geoms] = self.model.geom_conaffinity[geoms] = 0
         _replace_foot_capsules(self.model)
         # MuJoCo scales contact forces with the inertia at the contact, which is small at a foot that carries a body:
         # with default parameters the foot sinks in by a centimetre.
@@ -344,7 +347,8 @@ def _person(model: mujoco.MjModel, body: Body, prefix: str) -> _Person:
     pelvis = int(model.body(f"{prefix}{body.bones[0]}").id)
     mass = float(model.body_subtreemass[pelvis])
     size = mass * body.stature / _ADULT
-    stiffness, strength = size * np.array([ANATOMY["servos"][_joint(name)] for name in DOFS]).T
+    servos = [servo for dof in DOFS for joint, servo in ANATOMY["servos"].items() if joint in dof.split("_")]
+    stiffness, strength = size * np.array(servos).T
     return _Person(
         pelvis=pelvis,
         mass=mass,
@@ -355,11 +359,6 @@ def _person(model: mujoco.MjModel, body: Body, prefix: str) -> _Person:
         stiffness=stiffness,
         strength=strength,
     )
-
-
-def _joint(dof: str) -> str:
-    """Return the key of the servos for a degree of freedom: "knee" for "left_knee_flexion"."""
-    return next(word for word in dof.split("_") if word in ANATOMY["servos"])
 
 
 def _replace_foot_capsules(model: mujoco.MjModel) -> None:
@@ -388,12 +387,3 @@ def _replace_foot_capsules(model: mujoco.MjModel) -> None:
         model.geom_rbound[geom] = half + _BAR
         model.geom_aabb[geom] = 0.0, 0.0, 0.0, _BAR, _BAR, half + _BAR
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE  # its boxes are those of the original capsules
-
-
-def _is_moved(solid: Solid) -> bool:
-    return solid.trajectory is not None and float(np.ptp(solid.trajectory.pose, axis=0).max()) > 1e-6
-
-
-def _without_contact(model: mujoco.MjModel, name: str) -> None:
-    geoms = model.geom_bodyid == model.body(name).id
-    model.geom_contype[geoms] = model.geom_conaffinity[geoms] = 0

@@ -29,15 +29,8 @@ _ARM_OUT = 0.2  # angle of the upper arms of a mannequin from the vertical, radi
 
 def draw_mannequin(rng: np.random.Generator) -> ObjectModel:
     """Draw a shop mannequin: an unclothed body of one colour on a round base."""
-    body = make_body(
-        Shape(
-            gender=float(rng.choice([0.05, 0.95])),
-            muscle=0.35,
-            weight=float(rng.uniform(0.2, 0.5)),
-            height=float(rng.uniform(0.35, 0.45)),
-            proportions=0.0,
-        )
-    )
+    gender, weight, height = rng.choice([0.05, 0.95]), rng.uniform(0.2, 0.5), rng.uniform(0.35, 0.45)
+    body = make_body(Shape(gender, muscle=0.35, weight=weight, height=height, proportions=0.0))
     color, twist, bend = _SHOP_COLORS[rng.integers(len(_SHOP_COLORS))], rng.uniform(-0.2, 0.2), rng.uniform(0.1, 0.6, 2)
     turns = {"Spine": np.array([0.0, 0.0, twist])}
     for side, flexed in zip(("Left", "Right"), bend, strict=True):
@@ -52,12 +45,7 @@ def draw_mannequin(rng: np.random.Generator) -> ObjectModel:
     base = 0.025
     offset = np.array([0.0, 0.0, base - float(skin[:, 2].min())])
     offset[:2] = -skin[skin[:, 2] < skin[:, 2].min() + 0.05, :2].mean(axis=0)
-    statue = Mesh(
-        vertices=(skin + offset).astype(np.float32),
-        faces=body.faces,
-        colors=np.tile(color.astype(np.float32), (len(body.faces), 1)),
-        smooth=True,
-    )
+    statue = Mesh(skin + offset, body.faces, np.tile(color, (len(body.faces), 1)), smooth=True)
     foot = bar_mesh((0.0, 0.0, 0.0), (0.0, 0.0, base), 0.27, _BASE, sides=28)
     geoms = tuple(Surface(mesh.vertices.astype(float), mesh.faces) for mesh in (statue, foot))
     return ObjectModel(joined(statue, foot), geoms, body.joints(bones) + offset)

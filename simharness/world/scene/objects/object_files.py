@@ -112,7 +112,7 @@ class ObjectFile:
             sheet = Sheet.pack({"plain": np.ones((8, 8, 3)), **{name: self.textures[name] / 255 for name in names}})
         meshes, uv = [], []
         for number, part in enumerate(self.parts):
-            meshes.append(part.mesh.moved((part.vertices + self.offset).astype(np.float32)))
+            meshes.append(part.mesh.moved(part.vertices + self.offset))
             if sheet is not None:
                 name = part.texture or "plain"
                 place = None if part.uv is None else _within(part.uv)
@@ -136,7 +136,7 @@ class ObjectFile:
         """Return the model to be placed, stretched along x, y and z by ``scale`` (3,); see :meth:`mesh`."""
         stretch: Floats = np.asarray(scale, float)
         points: list[Floats] = [(part.vertices + self.offset) * stretch for part in self.parts]
-        mesh = self.mesh(sheet).moved(np.concatenate(points).astype(np.float32))
+        mesh = self.mesh(sheet).moved(np.concatenate(points))
         geoms = (part.geom(each) for part, each in zip(self.parts, points, strict=True))
         figure = None if self.figure is None else self.figure * stretch
         return ObjectModel(mesh, tuple(geoms), figure, None if self.mirror is None else self.mirror.stretched(scale))
@@ -148,10 +148,15 @@ def variants(name: str) -> tuple[Path, ...]:
     return (first, *sorted(ASSETS.glob(f"{name}.[0-9]*.xml")))
 
 
+def draw_variant(rng: np.random.Generator, name: str) -> ObjectFile:
+    """Draw a variant of a shipped object."""
+    files = variants(name)
+    return load_shipped(files[rng.integers(len(files))])
+
+
 def draw_shipped(rng: np.random.Generator, name: str, stretch: float, *, height: float | None = None) -> ObjectModel:
     """Draw a variant of a shipped object, stretched in width and height by up to a share, or to a height in metres."""
-    files = variants(name)
-    file, (wide, tall) = load_shipped(files[rng.integers(len(files))]), 1 + stretch * rng.uniform(-1, 1, 2)
+    file, (wide, tall) = draw_variant(rng, name), 1 + stretch * rng.uniform(-1, 1, 2)
     return file.model(scale=(wide, wide, tall if height is None else height / file.size[2]))
 
 

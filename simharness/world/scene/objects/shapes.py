@@ -1,4 +1,4 @@
-"""Meshes of simple shapes (quadrilaterals, boxes, bars, bodies of revolution, lofted skins),.
+"""Meshes of simple shapes (quadrilaterals, boxes, bars, bodies of revolution, lofted skins).
 
 Faces are counter-clockwise as seen from outside. Creases have separate vertices on both sides, so a smooth mesh may
 have flat sides and sharp edges.
@@ -23,13 +23,8 @@ _CREASE = np.cos(np.radians(40))  # a profile that bends more has a sharp edge
 
 def quad_mesh(vertices: Floats, quads: NDArray[np.int_], colors: Floats) -> Mesh:
     """Return the triangle mesh of quadrilaterals (k, 4), counter-clockwise from outside, with colours (k, 3)."""
-    faces = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    return Mesh(
-        vertices=vertices.astype(np.float32),
-        faces=faces.astype(np.int32),
-        colors=np.repeat(np.clip(colors, 0, 1), 2, axis=0).astype(np.float32),
-        smooth=False,
-    )
+    faces = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.int32)
+    return Mesh(vertices.astype(np.float32), faces, np.repeat(np.clip(colors, 0, 1), 2, axis=0).astype(np.float32))
 
 
 def outline(half: Floats, each: int) -> Floats:
@@ -71,7 +66,7 @@ def bar_mesh(start: ArrayLike, end: ArrayLike, radius: float, color: ArrayLike, 
     across = np.cross(along, [0.0, 1.0, 0.0] if abs(along[1]) < 0.9 else [1.0, 0.0, 0.0])
     across /= np.linalg.norm(across)
     axes = np.stack([across, np.cross(along, across), along])
-    return replace(upright, vertices=(upright.vertices @ axes + (a + b) / 2).astype(np.float32))
+    return upright.moved(upright.vertices @ axes + (a + b) / 2)
 
 
 def lathe(profile: ArrayLike, colors: ArrayLike, *, sides: int = 16, squash: float = 1.0) -> Mesh:
@@ -127,14 +122,9 @@ def loft(rings: ArrayLike, colors: ArrayLike, *, edges: Sequence[int] = ()) -> M
 def joined(*meshes: Mesh) -> Mesh:
     """Return one mesh of several, smooth if any is; none may have a texture."""
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    return Mesh(
-        vertices=np.concatenate([mesh.vertices for mesh in meshes]),
-        faces=np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]).astype(
-            np.int32
-        ),
-        colors=np.concatenate([mesh.colors for mesh in meshes]),
-        smooth=any(mesh.smooth for mesh in meshes),
-    )
+    faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)])
+    vertices, colors = (np.concatenate([getattr(mesh, key) for mesh in meshes]) for key in ("vertices", "colors"))
+    return Mesh(vertices, faces, colors, smooth=any(mesh.smooth for mesh in meshes))
 
 
 def box_model(boxes: Sequence[Box], colors: ArrayLike) -> ObjectModel:

@@ -44,7 +44,7 @@ class ObjectModel:
         return Solid(
             kind,
             name,
-            replace(self.mesh, vertices=carried(self.mesh.vertices, place, yaw).astype(np.float32)),
+            self.mesh.moved(carried(self.mesh.vertices, place, yaw)),
             tuple(geom.moved(place, yaw) for geom in self.geoms),
             self.hull(place, yaw),
             figure=None if self.figure is None else carried(self.figure, place, yaw),

@@ -16,7 +16,7 @@ from simharness.world.motion.motion import Trajectory, upright_poses
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.laboratory import draw_box, draw_mannequin, draw_shelf
 from simharness.world.scene.objects.materials import draw_sheet
-from simharness.world.scene.objects.object_files import draw_shipped, load_object, load_shipped, variants
+from simharness.world.scene.objects.object_files import draw_shipped, draw_variant, load_object
 from simharness.world.scene.objects.solids import ObjectModel, Solid, yaw_of
 from simharness.world.scene.placement.free_space import (
     BODY_HALF_WIDTH,
@@ -115,13 +115,22 @@ def _place_file(seed: int, file: Path, k: int, site: Site) -> Solid:
     """Read the object of a file and find a place for it near people."""
     model = load_object(file).model()
     solid = _find(seed, "object", k, model, site, near_people, name=f"object{k} {file.stem}")
+    size = " x ".join(f"{2 * half:.2f}" for half in model.extent.half)
+    remedy = "scale the object if its lengths are not metres, name fewer objects, lower people.count"
+    return _placed(solid, "clutter.objects", f"{file}, {size} m large,", site, remedy)
+
+
+def _placed(solid: Solid | None, key: str, what: str, site: Site, remedy: str) -> Solid:
+    """Return the solid if a place was found for it.
+
+    Raises:
+        ValueError: there is none; the message names the key of the scenario and what to change.
+    """
     if solid is None:
-        size = " x ".join(f"{2 * half:.2f}" for half in model.extent.half)
         raise ValueError(
-            f"clutter.objects: found no place for {file}, {size} m large, in {TRIES} tries, clear of "
-            f"{len(site.solids)} other objects, of the paths of people and of the cameras, and with 40 % of each "
-            f"picture free, in room.size = {list(site.space.room.size)}: scale the object if its lengths are not "
-            "metres, name fewer objects, lower people.count, or enlarge room.size"
+            f"{key}: found no place for {what} in {TRIES} tries, clear of {len(site.solids)} other objects, of the "
+            "paths of people and of the cameras, and with 40 % of each picture free, in room.size = "
+            f"{list(site.space.room.size)}: {remedy}, or enlarge room.size"
         )
     return solid
 
@@ -138,14 +147,8 @@ def _find(
 def _place(seed: int, kind: ClutterKind, k: int, site: Site) -> Solid:
     model = kind.draw(stream(seed, "clutter", kind.name, k), site.space.room)
     solid = _find(seed, kind.name, k, model, site, kind.sample_place, name=f"{kind.name}{k}")
-    if solid is None:
-        raise ValueError(
-            f"clutter.{kind.plural}: found no place for {kind.name} {k} in {TRIES} tries, clear of {len(site.solids)} "
-            "other objects, of the paths of people and of the cameras, and with 40 % of each picture free, in "
-            f"room.size = {list(site.space.room.size)}: lower clutter.{kind.plural} or people.count, or enlarge "
-            "room.size"
-        )
-    return solid
+    key = f"clutter.{kind.plural}"
+    return _placed(solid, key, f"{kind.name} {k}", site, f"lower {key} or people.count")
 
 
 def place_cart(seed: int, k: int, site: Site) -> Solid:
@@ -250,13 +253,8 @@ def place_decoys(seed: int, decoys: DecoysSection, space: FreeSpace) -> tuple[So
             place_rng = stream(seed, "decoys", name, k, "place")
             sample_place = _at_wall if on_wall else near_people
             solid = site.find(place_rng, model, sample_place, kind="decoy", name=f"{name}{k}", at_wall=on_wall)
-            if solid is None:
-                raise ValueError(
-                    f"decoys.{plural}: found no place for {name} {k} in {TRIES} tries, clear of {len(site.solids)} "
-                    f"other objects, of the paths of people and of the cameras, in room.size = "
-                    f"{list(space.room.size)}: lower decoys.{plural} or people.count, or enlarge room.size"
-                )
-            site.add(solid)
+            key = f"decoys.{plural}"
+            site.add(_placed(solid, key, f"{name} {k}", site, f"lower {key} or people.count"))
     return tuple(site.solids[len(space.taken) :])
 
 
@@ -264,8 +262,7 @@ def _decoy(rng: np.random.Generator, name: str, on_wall: bool) -> ObjectModel:
     """Draw a decoy, as it hangs on a wall or as it stands."""
     if name == "mannequin":
         return draw_mannequin(rng)
-    files = variants(f"{'wall_' * on_wall}{name.replace(' ', '_')}")
-    return load_shipped(files[rng.integers(len(files))]).model()
+    return draw_variant(rng, f"{'wall_' * on_wall}{name.replace(' ', '_')}").model()
 
 
 def _at_wall(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
@@ -310,8 +307,7 @@ def place_furniture(seed: int, space: FreeSpace, openings: Sequence[Opening]) ->
         number = int(stream(seed, "room", "furniture", name).integers(low, high + 1))
         for k in range(max(1, round(share * number))):
             key = ("room", "furniture", name, k)
-            files = variants(name)
-            model = load_shipped(files[stream(seed, *key).integers(len(files))]).model(sheet)
+            model = draw_variant(stream(seed, *key), name).model(sheet)
             solid = _find_at_wall(stream(seed, *key, "place"), model, f"{name}{k}", site, walls, openings, area, lines)
             if solid is not None:
                 site.add(solid)

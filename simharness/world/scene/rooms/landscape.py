@@ -23,7 +23,7 @@ from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box, carried
 from simharness.world.scene.objects.materials import draw_sheet
-from simharness.world.scene.objects.object_files import load_shipped, variants
+from simharness.world.scene.objects.object_files import draw_variant
 from simharness.world.scene.objects.shapes import outline, ring_mesh
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.textures import FINISHES, drawn_pictures, read_picture
@@ -105,8 +105,7 @@ def _plants(seed: int, clear: float) -> Mesh:
     plants += [(stream(seed, "room", "far shrub", k), "far_shrub", _SHRUB_SCALE, 18.0, 1.5) for k in range(shrubs)]
     meshes = []
     for rng, name, scales, reach, crown in plants:
-        files = variants(name)
-        mesh = load_shipped(files[rng.integers(len(files))]).mesh(sheet)
+        mesh = draw_variant(rng, name).mesh(sheet)
         scale, far, turn, yaw = rng.uniform(*scales), rng.uniform() ** 1.3 * reach, *rng.uniform(0, 2 * np.pi, 2)
         away = clear + scale * crown + far
         place = (away * np.cos(turn), away * np.sin(turn))

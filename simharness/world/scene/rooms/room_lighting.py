@@ -10,7 +10,7 @@ import numpy as np
 
 from mvpose.files.input_files import parse_toml
 from simharness.scenario.sections.room_section import RoomSection
-from simharness.types.lighting import AreaLight, Lighting, LightSources, Panorama, Sun, Vector
+from simharness.types.lighting import AreaLight, Lighting, LightSources, Sun, Vector
 from simharness.types.random_streams import stream
 from simharness.world.scene.rooms.landscape import panorama
 
@@ -72,7 +72,10 @@ def room_lighting(room: RoomSection, seed: int, areas: Sequence[AreaLight] | Non
     mood = MOODS[name]
     sun = None if mood.sun is None else replace(mood.sun, direction=_towards(light.direction, mood.sun))
     sources = LightSources(tuple(areas), sun, brightness=mood.brightness)
-    return replace(light, sources=sources, panorama=view_outside(name, light, seed, mood.window))
+    # Windows show a view that is exposed for itself: outside it is many times as bright as inside.
+    bearing, (red, green, blue) = float(np.arctan2(light.direction[1], light.direction[0])), mood.window
+    view = panorama(seed, name, bearing, (_EXPOSED * red, _EXPOSED * green, _EXPOSED * blue))
+    return replace(light, sources=sources, panorama=view)
 
 
 def room_mood(room: RoomSection, seed: int) -> Mood:
@@ -95,20 +98,6 @@ def open_air(name: str, light: Lighting, seed: int) -> Lighting:
     sources = LightSources((), sun, weather["sky"], brightness=weather["brightness"], balance=weather["balance"])
     direction = (float(x), float(y), float(z))
     return replace(light, direction=direction, sources=sources, panorama=panorama(seed, name, bearing))
-
-
-def view_outside(name: str, light: Lighting, seed: int, window: Vector) -> Panorama:
-    """Return what the windows of a room show, exposed for itself: outside it is many times as bright as inside.
-
-    Args:
-        name: name of the weather, that of the lighting.
-        light: lighting in closed form.
-        seed: seed of the scenario.
-        window: radiance of the windows.
-    """
-    bearing = float(np.arctan2(light.direction[1], light.direction[0]))
-    shown = (_EXPOSED * window[0], _EXPOSED * window[1], _EXPOSED * window[2])
-    return panorama(seed, name, bearing, shown)
 
 
 def _towards(direction: Vector, sun: Sun) -> Vector:
