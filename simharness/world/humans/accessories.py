@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
-from simharness.world.humans.added_mesh import AddedMesh, add_mesh, attached, grid, hull, rigid, rounded
+from simharness.world.humans.added_mesh import AddedMesh, add_mesh, attached, grid, heading, hull, rigid, rounded, unit
 from simharness.world.humans.body import Body, FacePart
 from simharness.world.humans.face_colors import Color
 from simharness.world.humans.head_wear import glasses, hat, mask
@@ -117,20 +117,20 @@ def _shoulder_strap(
         y = side * scale * (_APART + shift)
         slab = trunk[(np.abs(trunk[:, 1] - y) < 0.018) & (trunk[:, 2] > low - 0.12 * scale)]
         reach = hull(slab[:, [0, 2]] - core, over) + _OVER
-        line = core + reach[:, None] * np.column_stack([np.cos(over), np.sin(over)])
+        line = core + reach[:, None] * heading(over)
         edges.append(np.column_stack([line[:, 0], np.full(len(line), y), line[:, 1]]))
     front = 0.5 * (edges[0][-1] + edges[1][-1])
     start = np.arctan2(abs(front[1]), front[0] - core[0])
     under = np.linspace(start, np.radians(150), 6)
     heights = np.linspace(front[2], middle[2] - 0.28 * height, len(under))
     for edge, shift in enumerate((0.4 * _STRAP, -0.4 * _STRAP)):
-        line = []
+        below = []
         for bearing, z in zip(under, heights + shift, strict=True):
             slab = trunk[np.abs(trunk[:, 2] - z) < 0.02]
             fan = np.array([bearing - 0.35, bearing - 0.17, bearing, bearing + 0.17, bearing + 0.35])
             away = float(hull((slab[:, :2] - [core[0], 0.0]) * [1, side], fan)[2]) + _OVER
-            line.append([core[0] + away * np.cos(bearing), side * away * np.sin(bearing), z])
-        edges[edge] = np.concatenate([edges[edge], line[1:]])
+            below.append([core[0] + away * np.cos(bearing), side * away * np.sin(bearing), z])
+        edges[edge] = np.concatenate([edges[edge], below[1:]])
     return _band(edges[0], edges[1], np.array([core[0], side * 0.6 * _APART * scale, low]), closed=False)
 
 
@@ -187,12 +187,8 @@ def _trunk(body: Body, lower: tuple[FacePart, ...] = ()) -> tuple[Floats, NDArra
 
 def _band(first: Floats, second: Floats, core: Floats, *, closed: bool) -> tuple[Floats, NDArray[np.int32]]:
     """Return a strap between two edges (c, 3), with sides that reach into the clothes towards a point ``core`` (3,)."""
-    inner = [edge + _SIDES * _unit(core - edge) for edge in (first, second)]
+    inner = [edge + _SIDES * unit(core - edge) for edge in (first, second)]
     return np.concatenate([inner[0], first, second, inner[1]]), grid(4, len(first), closed=closed)
-
-
-def _unit(vectors: Floats) -> Floats:
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def _rounded_box(middle: Floats, half: Floats) -> tuple[Floats, NDArray[np.int32]]:

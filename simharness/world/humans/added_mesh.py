@@ -69,6 +69,11 @@ def grid(rows: int, columns: int, *, closed: bool) -> NDArray[np.int32]:
     return np.concatenate([np.column_stack([a, c, d]), np.column_stack([a, d, b])]).astype(np.int32)
 
 
+def unit(vectors: Floats) -> Floats:
+    """Return vectors (..., d) with unit length; a vector without length stays zero."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))
+
+
 def rounded(value: Floats, power: float) -> Floats:
     """Return sines or cosines raised to a power, with their signs: coordinates of superellipses."""
     return np.sign(value) * np.abs(value) ** power
@@ -76,7 +81,12 @@ def rounded(value: Floats, power: float) -> Floats:
 
 def hull(points: Floats, bearing: Floats) -> Floats:
     """Return the distance from the origin to the convex hull of points (n, 2) at bearings (c,), metres."""
-    return hull_reach(points, np.column_stack([np.cos(bearing), np.sin(bearing)]))
+    return hull_reach(points, heading(bearing))
+
+
+def heading(bearing: Floats) -> Floats:
+    """Return the unit vectors (c, 2) at bearings (c,) in radians."""
+    return np.column_stack([np.cos(bearing), np.sin(bearing)])
 
 
 def hull_reach(points: Floats, directions: Floats) -> Floats:

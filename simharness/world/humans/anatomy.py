@@ -47,6 +47,10 @@ RANGES: Mapping[str, tuple[float, float]] = MappingProxyType(
 DOFS: tuple[str, ...] = tuple(RANGES)
 """Names of the 35 degrees of freedom, in the order of every array of angles."""
 
+TRUNK, LEG, ARM = tuple(ANATOMY["spine"])[:6], tuple(ANATOMY["limbs"])[:6], tuple(ANATOMY["limbs"])[7:]
+"""Names of the hinges of lumbar spine and thorax, of a leg and of an arm, without the side, outwards; the clavicle,
+which carries the arm, is in none."""
+
 PAIRED_SEGMENTS: frozenset[str] = frozenset({"upper_arm", "forearm", "hand", "thigh", "shank", "foot"})
 
 

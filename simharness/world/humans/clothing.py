@@ -16,7 +16,7 @@ from scipy import sparse
 
 from mvpose.arrays import Floats
 from simharness.world.humans.accessories import accessory_colors
-from simharness.world.humans.added_mesh import AddedMesh, add_mesh
+from simharness.world.humans.added_mesh import AddedMesh, add_mesh, unit
 from simharness.world.humans.body import Body, FacePart
 from simharness.world.humans.face_colors import express, groom
 from simharness.world.humans.skirts_and_hair import bob, bun, curls, long_hair, ponytail, skirt
@@ -124,7 +124,7 @@ def dress(body: Body, look: Look) -> Body:
     normals = _vertex_normals(rest, body.faces)[source]
     normals[worn == Garment.SOLE, 2] = 0.0  # a shoe is wider than the foot, but stands on the same floor
     leg = (worn == Garment.TROUSERS) & (level > 1)
-    normals[leg] = _horizontal(normals[leg])  # normals over the foot point up and would lift the hem
+    normals[leg] = unit(normals[leg] * [1, 1, 0])  # normals over the foot point up and would lift the hem
     vertices = _draped(rest[source], faces, garment, look.fit)
     vertices[leg, 2] -= look.fit * _BREAK * np.clip((level[leg] - 1.5) / 0.4, 0, 1)
     thickness = _thickness(worn, level, along_arm, adjacent[1] / adjacent.sum(0), look)
@@ -212,17 +212,11 @@ def _draped(vertices: Floats, faces: NDArray[np.int32], garment: NDArray[np.int6
     return vertices
 
 
-def _horizontal(normals: Floats) -> Floats:
-    """Return normals (v, 3) projected to the horizontal plane, with unit length."""
-    level = normals * [1, 1, 0]
-    return level / np.maximum(np.linalg.norm(level, axis=1, keepdims=True), 1e-12)
-
-
 def _vertex_normals(vertices: Floats, faces: NDArray[np.int32]) -> Floats:
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     normals = np.zeros_like(vertices)
     np.add.at(normals, faces, np.cross(b - a, c - a)[:, None, :])
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return unit(normals)
 
 
 # Pixels. Twice as many along a limb as around it: seen from the side, the texture is short in the latter direction, and
@@ -312,18 +306,26 @@ def texture_coordinates(body: Body, *, top: NDArray[np.bool_], bottom: NDArray[n
     return np.stack([around, down], axis=2).astype(np.float32)
 
 
+def limb_frame(points: Floats, joints: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return where points (..., 3) are on a limb with three joints (3, 3).
+
+    Returns:
+        Axis of the nearer segment, (..., 3), its first joint, (..., 3), and distance along the limb, (...) metres.
+    """
+    upper, lower = unit(joints[1] - joints[0]), unit(joints[2] - joints[1])
+    beyond = ((points - joints[1]) @ (upper + lower) > 0)[..., None]
+    bend = np.linalg.norm(joints[1] - joints[0])
+    along = np.where(beyond[..., 0], bend + (points - joints[1]) @ lower, (points - joints[0]) @ upper)
+    return np.where(beyond, lower, upper), np.where(beyond, joints[1], joints[0]), along
+
+
 def _limb_coordinates(points: Floats, joints: Floats, *, mirrored: bool) -> tuple[Floats, Floats]:
     """Return cylinder coordinates of points (..., 3) on a limb with three joints (3, 3).
 
     Returns:
         Bearing around the limb, radians, and distance along it from the first joint, metres, each (...).
     """
-    upper, lower = joints[1] - joints[0], joints[2] - joints[1]
-    lengths = np.linalg.norm(upper), np.linalg.norm(lower)
-    upper, lower = upper / lengths[0], lower / lengths[1]
-    beyond = ((points - joints[1]) @ (upper + lower) > 0)[..., None]
-    along = np.where(beyond[..., 0], lengths[0] + (points - joints[1]) @ lower, (points - joints[0]) @ upper)
-    axis, origin = np.where(beyond, lower, upper), np.where(beyond, joints[1], joints[0])
+    axis, origin, along = limb_frame(points, joints)
     off = points - origin
     off = off - (off * axis).sum(-1, keepdims=True) * axis
     forward = np.array([1.0, 0, 0]) - axis * axis[..., :1]

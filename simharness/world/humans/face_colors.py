@@ -12,7 +12,7 @@ are an assumption: no published counts were found for them. The albedos are chos
 """
 
 from collections.abc import Mapping
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -28,19 +28,12 @@ Color = tuple[float, float, float]
 Palette = Mapping[str, tuple[str, float]]
 """Hexadecimal sRGB albedo and share in per cent of each colour."""
 
-_FILE = Path(__file__).parent / "data" / "palettes.toml"
+PALETTES: Mapping[str, Palette] = TypeAdapter(dict[str, Palette]).validate_python(
+    parse_toml((Path(__file__).parent / "data" / "palettes.toml").read_text(encoding="utf-8"))
+)
+"""Colours of "tops", "trousers", "shoes", "frames" (of glasses), "hats", "bags" and "masks"."""
 
 _LIGHTNESS, _WARMTH = 0.07, 0.012  # largest variation of a colour: relative, and between red and blue
-
-
-@lru_cache(maxsize=1)
-def _palettes() -> Mapping[str, Palette]:
-    return TypeAdapter(dict[str, Palette]).validate_python(parse_toml(_FILE.read_text(encoding="utf-8")))
-
-
-def palette(name: str) -> Palette:
-    """Return the colours of "tops", "trousers", "shoes", "frames" (of glasses), "hats", "bags" or "masks"."""
-    return _palettes()[name]
 
 
 def draw_color(palette: Palette, place: float, lightness: float, warmth: float) -> Color:

@@ -10,8 +10,9 @@ from scipy.spatial import cKDTree
 
 from mvpose.arrays import Floats
 from simharness.types.mesh import Finish, Material, Mesh
+from simharness.world.humans.added_mesh import unit
 from simharness.world.humans.body import Body, FacePart, body_model
-from simharness.world.humans.clothing import Garment, garments, paint
+from simharness.world.humans.clothing import Garment, garments, limb_frame, paint
 from simharness.world.humans.face_colors import places_of_head
 from simharness.world.humans.wardrobe import LOOKS, Look
 
@@ -90,7 +91,7 @@ def _strands(points: Floats) -> Floats:
     """Return the direction of hair at points relative to the whorl, (n, 3): away from it and, on the sides, down."""
     away = points / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 1e-9)
     away[:, 2] -= np.clip(-points[:, 2] / 0.1, 0, 2)
-    return _unit(away)
+    return unit(away)
 
 
 def _cloth(body: Body, cloth: NDArray[np.int64]) -> tuple[Floats, NDArray[np.float32]]:
@@ -100,15 +101,10 @@ def _cloth(body: Body, cloth: NDArray[np.int64]) -> tuple[Floats, NDArray[np.flo
     on_arm, left = part[cloth] == FacePart.ARM, points[:, 1] > 0
     grain, place = np.tile([0.0, 0.0, -1.0], (len(points), 1)), -points[:, 2]
     for side, on_side in (("Left", left), ("Right", ~left)):
-        shoulder, elbow, wrist = (body.heads[body.index(side + bone)] for bone in ("Arm", "ForeArm", "Hand"))
+        joints = np.stack([body.heads[body.index(side + bone)] for bone in ("Arm", "ForeArm", "Hand")])
         arm = on_arm & on_side
-        upper, lower = _unit(elbow - shoulder), _unit(wrist - elbow)
-        beyond = (points[arm] - elbow) @ (upper + lower) > 0
-        grain[arm] = np.where(beyond[:, None], lower, upper)
-        along = np.where(
-            beyond, np.linalg.norm(elbow - shoulder) + (points[arm] - elbow) @ lower, (points[arm] - shoulder) @ upper
-        )
-        place[arm] = along - shoulder[2]
+        grain[arm], _, along = limb_frame(points[arm], joints)
+        place[arm] = along - joints[0, 2]
     x, y, z = points.T
     place = place + _SLANT * (x + np.abs(y) * np.where(on_arm, 0.0, 1.0))
     place += _WANDER * (2 * np.sin(23 * x + 17 * z + 1) * np.sin(27 * y - 11 * z) + np.sin(13 * x - 25 * y + 23 * z))
@@ -125,7 +121,3 @@ def _ahead(points: Floats, direction: Floats, distance: float) -> NDArray[np.int
     score = np.where(length > 0.3 * distance, straight - 2 * np.abs(length / distance - 1), -9.0)
     best = near[np.arange(len(points)), score.argmax(axis=1)]
     return np.where(score.max(axis=1) > -1.5, best, np.arange(len(points)))
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
-from simharness.world.humans.added_mesh import AddedMesh, FacePoints, grid, hull, hull_reach, rigid, rounded
+from simharness.world.humans.added_mesh import AddedMesh, FacePoints, grid, heading, hull, hull_reach, rigid, rounded
 from simharness.world.humans.body import Body, FacePart
 
 Sheet = tuple[Floats, NDArray[np.int32]]
@@ -99,7 +99,7 @@ def mask(body: Body) -> list[AddedMesh]:
         slab = face.face[np.abs(face.face[:, 2] - z) < 0.010 * scale]
         slab = slab[slab[:, 0] > axis[0]]
         reach = hull(slab[:, :2] - axis, bearing) + _GAP
-        rows.append(np.column_stack([axis + reach[:, None] * _directions(bearing), np.full(len(bearing), z)]))
+        rows.append(np.column_stack([axis + reach[:, None] * heading(bearing), np.full(len(bearing), z)]))
     cloth = np.stack(rows)
     cloth[-1, :, 0] = np.minimum(cloth[-1, :, 0], cloth[-2, :, 0] - 0.012 * scale)  # under the chin
     sheets: list[Sheet] = [(cloth.reshape(-1, 3), grid(len(rows), cloth.shape[1], closed=False))]
@@ -130,7 +130,7 @@ def hat(body: Body, *, kind: str) -> list[AddedMesh]:
     center[2] = behind + slope * (center[0] - back)
     bearing = np.linspace(0, 2 * np.pi, _COLUMNS, endpoint=False)
     rise = np.linspace(np.pi / 2, 0, _ROWS)
-    around = np.column_stack([_directions(bearing), np.zeros(_COLUMNS)])
+    around = np.column_stack([heading(bearing), np.zeros(_COLUMNS)])
     flat = (np.cos(rise)[:, None, None] * around + np.sin(rise)[:, None, None] * [0, 0, 1]).reshape(-1, 3)
     directions = flat + np.outer(slope * flat[:, 0], [0, 0, 1])  # the edge is tilted to the front
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -171,7 +171,7 @@ def _visor(edge: Floats, bearing: Floats, scale: float) -> Sheet:
 
 def _brim(edge: Floats, bearing: Floats, scale: float) -> Sheet:
     """Return the brim around the edge (c, 3) of a hat."""
-    outward = np.column_stack([_directions(bearing), np.zeros(len(bearing))])
+    outward = np.column_stack([heading(bearing), np.zeros(len(bearing))])
     rows = [edge - 0.003 * outward]
     for share in (0.5, 1.0):
         droop = -0.10 * share + 0.22 * share**2 * np.sin(bearing) ** 2  # turned up at the sides
@@ -185,7 +185,3 @@ def _disc(outline: Floats) -> Sheet:
     across = np.arange(count)
     faces = np.column_stack([np.full(count, count), across, (across + 1) % count]).astype(np.int32)
     return np.concatenate([outline, outline.mean(axis=0, keepdims=True)]), faces
-
-
-def _directions(bearing: Floats) -> Floats:
-    return np.column_stack([np.cos(bearing), np.sin(bearing)])

@@ -96,7 +96,8 @@ def capsule_masses(body: Body, capsules: Sequence[Capsule]) -> list[float]:
     The masses sum to ``body.mass``.
     """
     fractions = mass_fractions(body.shape.gender)
-    segments = [(_segment(capsule.bone), _side(capsule.bone)) for capsule in capsules]
+    trunk = ANATOMY["trunk"]
+    segments = [(_segment(each.bone), "" if each.bone in trunk else each.bone[:4]) for each in capsules]  # with side
     volumes = {
         segment: sum(c.volume for c, each in zip(capsules, segments, strict=True) if each == segment)
         for segment in set(segments)
@@ -113,10 +114,6 @@ def _segment(bone: str) -> str:
     name = bone.removeprefix("Left").removeprefix("Right")
     ends = {"Hand": "hand", "Foot": "foot"} | {part: segment for segment, rod in _RODS.items() for part in rod.bones}
     return ends[name]
-
-
-def _side(bone: str) -> str:
-    return "" if bone in ANATOMY["trunk"] else bone[:4]
 
 
 SKIN_GROUP = 1  # MuJoCo geom group of the capsules
@@ -255,7 +252,9 @@ def person_spec(body: Body, name: str) -> mujoco.MjSpec:
         parent_body = spec.worldbody if parent < 0 else bodies[parent]
         position = [0, 0, height] if parent < 0 else body.heads[bone] - body.heads[parent]
         local = turn[bone] if parent < 0 else turn[parent].T @ turn[bone]
-        part = parent_body.add_body(name=body.bones[bone], pos=position, quat=_quaternion(local))
+        quat = np.empty(4)
+        mujoco.mju_mat2Quat(quat, np.ascontiguousarray(local).ravel())
+        part = parent_body.add_body(name=body.bones[bone], pos=position, quat=quat)
         if parent < 0:
             part.add_freejoint(name="root")
         for hinge in HINGES:
@@ -294,10 +293,3 @@ def _labels(capsules: Sequence[Capsule]) -> list[str]:
     """Return a name for each capsule: that of its bone, numbered if the bone has several."""
     bones = [capsule.bone for capsule in capsules]
     return [bone if bones.count(bone) == 1 else f"{bone} {bones[:k].count(bone)}" for k, bone in enumerate(bones)]
-
-
-def _quaternion(rotation: Floats) -> Floats:
-    """Return the quaternion w, x, y, z of a rotation (3, 3)."""
-    quaternion = np.empty(4)
-    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(rotation).ravel())
-    return quaternion

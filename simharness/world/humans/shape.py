@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
-from simharness.world.humans.skinning import skin
 
 # For every limb: its first bone, further bones that move its far half, and the bone at its end.
 _CHAINS: Mapping[str, tuple[str, tuple[str, ...], str]] = MappingProxyType(
@@ -70,15 +69,6 @@ def limb_stretches(
 
 def _stretch(axis: Floats, factor: float) -> Floats:
     return np.eye(3) + (factor - 1) * np.outer(axis, axis) / (axis @ axis)
-
-
-def stretch_vertices(
-    vertices: Floats, weight_bones: NDArray[np.uint8], weights: NDArray[np.float32], maps: NDArray[np.float32]
-) -> Floats:
-    """Apply affine bone maps (B, 3, 4) to vertices (n, 3) by linear blend skinning; bones and weights are (n, w)."""
-    out = np.empty((len(vertices), 3), np.float32)
-    skin(vertices.astype(np.float32), weight_bones, weights, maps, out)
-    return out.astype(float)
 
 
 LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(

@@ -8,7 +8,7 @@ So a ring is the hull of two round sections, like cloth around both legs, and no
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.world.humans.added_mesh import AddedMesh, FacePoints, grid, hull, rigid
+from simharness.world.humans.added_mesh import AddedMesh, FacePoints, grid, heading, hull, rigid
 from simharness.world.humans.body import Body, FacePart
 from simharness.world.humans.skinning import Skirt
 
@@ -110,7 +110,7 @@ def long_hair(body: Body, *, volume: float) -> AddedMesh:
     height = np.linspace(top, end, 18)
     bearing = np.radians(np.linspace(*_BEHIND, 25))
     center = np.array([0.5 * (scalp[:, 0].min() + scalp[:, 0].max()), 0.0])
-    directions = np.column_stack([np.cos(bearing), np.sin(bearing)])
+    directions = heading(bearing)
     thick = 0.006 + 0.006 * volume
     rows, fall = [], np.zeros(len(bearing))
     for z in height:
@@ -142,10 +142,7 @@ def bun(body: Body, *, volume: float, low: bool = False) -> AddedMesh:
     around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 16, endpoint=False), np.linspace(np.pi / 2, -np.pi / 2, 9))
     ball = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), 0.9 * np.sin(up)], -1).reshape(-1, 3)
     vertices = np.array([behind - (0.2 if low else 0.55) * radius, 0.0, height]) + radius * ball
-    faces = grid(9, 16, closed=True)
-    weights = np.tile(np.array([1, 0, 0, 0], np.float32), (len(vertices), 1))
-    bones = np.full((len(vertices), 4), body.index("Head"), np.uint8)
-    return AddedMesh(vertices, faces, FacePart.SCALP, np.ones(len(faces)), bones, weights)
+    return rigid(body, "Head", [(vertices, grid(9, 16, closed=True))], FacePart.SCALP)
 
 
 def head_points(body: Body) -> tuple[Floats, Floats]:
@@ -173,7 +170,7 @@ def bob(body: Body, *, volume: float) -> AddedMesh:
     eyes, height = face.eye[2], face.crown - face.eye[2]
     center = np.array([0.5 * (face.scalp[:, 0].min() + face.scalp[:, 0].max()), 0.0])
     bearing = np.radians(np.linspace(*_BOB, 23))
-    directions = np.column_stack([np.cos(bearing), np.sin(bearing)])
+    directions = heading(bearing)
     points = np.concatenate([face.face, face.scalp])
     rows, fall = [], np.zeros(len(bearing))
     levels = np.linspace(eyes + 0.86 * height, eyes - 0.85 * height, 12)

@@ -20,7 +20,7 @@ import numpy as np
 
 from mvpose.files.input_files import parse_toml
 from simharness.types.random_streams import stream
-from simharness.world.humans.face_colors import EXPRESSIONS, Color, draw_color, palette
+from simharness.world.humans.face_colors import EXPRESSIONS, PALETTES, Color, draw_color
 from simharness.world.humans.population import draw_sex
 
 GLASSES = ("none", "rectangular", "round", "sunglasses")
@@ -47,7 +47,7 @@ def draw_accessories(rng: np.random.Generator, *, female: bool) -> dict[str, Any
         "glasses": _choice(glasses, drawn[0]),
         **{kind: _choice(wearers[kind], drawn[k]) for k, kind in enumerate(("hat", "mask", "bag"), 2)},
         **{
-            f"{kind}_color": draw_color(palette(f"{kind}s"), *drawn[k : k + 3])
+            f"{kind}_color": draw_color(PALETTES[f"{kind}s"], *drawn[k : k + 3])
             for k, kind in zip((5, 8, 11, 14), ("frame", "hat", "bag", "mask"), strict=True)
         },
     }
@@ -187,15 +187,15 @@ def draw_look(rng: np.random.Generator, *, female: bool = False, place: float | 
     sex = "female" if female else "male"
     skin = _between(LOOKS["skins"], drawn[1])
     lower_garment = _pick(LOOKS["lower_garments"][sex], drawn[12])
-    top = draw_color(palette("tops"), place % 1, drawn[4], drawn[5])
+    top = draw_color(PALETTES["tops"], place % 1, drawn[4], drawn[5])
     return Look(
         skin=skin,
         hair=_color(_pick(LOOKS["hair"], drawn[1] + (1 - drawn[1]) * drawn[2])),
         lips=mix(skin, (0.62, 0.22, 0.22), 0.45),
         eyes=_color(_pick(LOOKS["eyes"], drawn[3])),
         top=top,
-        trousers=draw_color(palette("trousers"), drawn[6], drawn[20], drawn[21]),
-        shoes=draw_color(palette("shoes"), drawn[7], drawn[22], drawn[23]),
+        trousers=draw_color(PALETTES["trousers"], drawn[6], drawn[20], drawn[21]),
+        shoes=draw_color(PALETTES["shoes"], drawn[7], drawn[22], drawn[23]),
         accent=_contrasting(top, drawn[13]),
         sleeves="long" if lower_garment == "coat" else _pick(("short", "short", "half", "long", "long"), drawn[8]),
         legs="long" if lower_garment == "coat" else _pick(("shorts", "cropped", *("long",) * 4), drawn[9]),
@@ -234,9 +234,8 @@ def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0
     if not 0 <= look_alike <= 1:
         raise ValueError(f"look_alike must be from 0 to 1, got {look_alike}")
     start = stream(seed, "people", "hue").random()
-    uniform = _with_accessories(
-        draw_look(stream(seed, "people", "uniform")), stream(seed, "people", "uniform", "accessories"), female=False
-    )
+    worn = draw_accessories(stream(seed, "people", "uniform", "accessories"), female=False)
+    uniform = replace(draw_look(stream(seed, "people", "uniform")), **worn)
     changes = stream(seed, "people", "uniform", "changes").random(len(UNIFORM_CHOICES)) < look_alike
     looks = []
     for i in range(count):
@@ -245,10 +244,9 @@ def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0
         if not female:
             look = _groomed(look, stream(seed, "people", i, "grooming"))
         look = _styled(look, stream(seed, "people", i, "hair style"), female=female)
-        look = _with_accessories(look, stream(seed, "people", i, "accessories"), female=female)
-        look = replace(
-            look, expression=_pick(LOOKS["expressions"], float(stream(seed, "people", i, "expression").random()))
-        )
+        worn = draw_accessories(stream(seed, "people", i, "accessories"), female=female)
+        expression = _pick(LOOKS["expressions"], float(stream(seed, "people", i, "expression").random()))
+        look = replace(look, expression=expression, **worn)
         looks.append(_toward(look, uniform, look_alike, changes.tolist()) if i < (alike or count) else look)
     return tuple(looks)
 
@@ -276,11 +274,6 @@ def _styled(look: Look, rng: np.random.Generator, *, female: bool) -> Look:
             if of_women < share:
                 return replace(look, hair_style=style)
     return look
-
-
-def _with_accessories(look: Look, rng: np.random.Generator, *, female: bool) -> Look:
-    """Return the look with accessories drawn from a random stream."""
-    return replace(look, **draw_accessories(rng, female=female))
 
 
 def _toward(look: Look, uniform: Look, share: float, changes: list[bool]) -> Look:

@@ -12,7 +12,7 @@ from scipy.linalg import solveh_banded
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.world.humans.anatomy import DOFS
+from simharness.world.humans.anatomy import ARM, DOFS, RANGES
 from simharness.world.humans.mujoco_model import HINGES
 
 _X, _Y, _Z = np.eye(3)
@@ -21,15 +21,6 @@ _LARGEST_STEP = 0.4  # radians per iteration
 _SMOOTH = 1.5  # weight of angular acceleration (radians per frame²): passes motion below about 8 Hz at 60 Hz
 _EASE = 0.03  # weight of the distance from the relaxed angles: decides where nothing else does
 _LAZY = 0.01  # weight of the angles themselves: prefers the smaller of two equivalent solutions
-ARM: tuple[str, ...] = (
-    "shoulder_flexion",
-    "shoulder_abduction",
-    "shoulder_rotation",
-    "elbow_flexion",
-    "forearm_pronation",
-    "wrist_flexion",
-)
-"""Names of the hinges from the clavicle to the hand, without the side."""
 
 
 @dataclass(frozen=True)
@@ -160,8 +151,7 @@ def _euler(upper: Floats, fore: Floats) -> Floats:
 
 def _continuous(sets: Floats) -> Floats:
     """Choose among S solutions (S, T, n) the sequence (T, n) with least strain and jumps (Viterbi, 1967)."""
-    names = ("shoulder_flexion", "shoulder_abduction", "shoulder_rotation", "elbow_flexion")
-    low, high = np.array([HINGES[DOFS.index(f"left_{name}")].range for name in names]).T
+    low, high = np.array([RANGES[f"left_{name}"] for name in ARM[:4]]).T
     middle = (low + high) / 2
     sets = middle + np.angle(np.exp(1j * (sets - middle)))
     # The twist of a straight arm and the flexion of an arm that points sideways are undetermined: low weight.

@@ -13,9 +13,9 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.world.humans.anatomy import DOFS, SIDES
+from simharness.world.humans.anatomy import ARM, DOFS, SIDES
 from simharness.world.motion.mocap.foot_contact import FootPath, detect_stances, make_sole, plant_foot
-from simharness.world.motion.mocap.limb_angles import ARM, arm_angles, into, thigh_and_shank
+from simharness.world.motion.mocap.limb_angles import arm_angles, into, thigh_and_shank
 from simharness.world.motion.mocap.skeleton import JointMap, RecordedMotion, map_joints
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.inverse_kinematics import pelvis_height

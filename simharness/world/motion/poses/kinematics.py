@@ -10,22 +10,12 @@ from scipy.ndimage import gaussian_filter1d
 
 from mvpose.arrays import Floats
 from mvpose.skeleton import COCO17
-from simharness.world.humans.anatomy import DOFS, RANGES, SIDES
+from simharness.world.humans.anatomy import ARM, DOFS, LEG, RANGES, SIDES, TRUNK
 from simharness.world.humans.body import Body
 from simharness.world.humans.mujoco_model import bone_transforms, person_spec
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematic_chain import Chain
 
-_TRUNK = ("lumbar_flexion", "lumbar_bending", "lumbar_rotation", "thorax_flexion", "thorax_bending", "thorax_rotation")
-_LEG = ("hip_flexion", "hip_abduction", "hip_rotation", "knee_flexion", "ankle_dorsiflexion", "ankle_inversion")
-_ARM: tuple[str, ...] = (
-    "shoulder_flexion",
-    "shoulder_abduction",
-    "shoulder_rotation",
-    "elbow_flexion",
-    "forearm_pronation",
-)
-_ARM += ("wrist_flexion",)
 _FEET = {"left": "LeftFoot", "right": "RightFoot"}
 _ORIGIN = np.array([0.0, 0, 0, 1, 0, 0, 0])
 _SOLE = 0.03  # metres: skin this near the floor in the neutral stance belongs to the sole
@@ -54,8 +44,8 @@ class Kinematics:
         ranges: lowest and highest value of every angle, (D, 2) radians.
     """
 
-    leg_order = _LEG
-    arm_order = _ARM
+    leg_order = LEG
+    arm_order = ARM
 
     def __init__(self, body: Body) -> None:
         self.body = body
@@ -65,22 +55,21 @@ class Kinematics:
         self._address = Addresses(self._model, body, prefix="")
         self.ranges = np.array([RANGES[name] for name in DOFS])
         self._neutral = self._pose(_ORIGIN, np.zeros(len(DOFS)))
-        self.legs = {side: self._leg(side) for side in SIDES}
+        self.legs = {
+            side: self._chain([f"{side}_{name}" for name in LEG], end=self._head(_FEET[side])) for side in SIDES
+        }
         self.trunks = {side: self._chain(self.trunk_order(side), end=np.zeros(3)) for side in SIDES}
-        self.arms = {side: self._chain([f"{side}_{name}" for name in _ARM], end=self._palm(side)) for side in SIDES}
+        self.arms = {side: self._chain([f"{side}_{name}" for name in ARM], end=self._palm(side)) for side in SIDES}
 
     @staticmethod
     def trunk_order(side: str) -> list[str]:
         """Return the names of the hinges of one side's trunk in the order of the chain."""
-        return [*_TRUNK, f"{side}_clavicle_elevation"]
+        return [*TRUNK, f"{side}_clavicle_elevation"]
 
     def transforms(self, motion: Motion) -> Floats:
         """Return the skinning transforms of the bones, (T, B, 3, 4)."""
-        bones = len(self.body.bones)
-        places, turns = np.empty((len(motion), bones, 3)), np.empty((len(motion), bones, 3, 3))
-        for frame, (root, angles) in enumerate(zip(motion.root, motion.angles, strict=True)):
-            places[frame], turns[frame] = self._pose(root, angles)
-        return bone_transforms(self.body, places, turns)
+        poses = [self._pose(root, angles) for root, angles in zip(motion.root, motion.angles, strict=True)]
+        return bone_transforms(self.body, *map(np.stack, zip(*poses, strict=True)))
 
     def joints(self, motion: Motion) -> Floats:
         """Return the COCO-17 joints, (T, 17, 3) metres."""
@@ -156,14 +145,14 @@ class Kinematics:
     def leg_parts(self) -> tuple[float, float]:
         """Lengths of thigh and shank, metres."""
         leg = self.legs["left"]
-        hip, knee, ankle = leg.anchors[0], leg.anchors[_LEG.index("knee_flexion")], leg.end
+        hip, knee, ankle = leg.anchors[0], leg.anchors[LEG.index("knee_flexion")], leg.end
         return float(np.linalg.norm(knee - hip)), float(np.linalg.norm(ankle - knee))
 
     @cached_property
     def kneecap(self) -> float:
         """Distance from the axis of the knee forward to the skin, metres."""
         leg = self.legs["left"]
-        knee = leg.anchors[_LEG.index("knee_flexion")]
+        knee = leg.anchors[LEG.index("knee_flexion")]
         near = (np.abs((self.neutral_skin - knee)[:, 1:]) < _KNEE).all(axis=1)
         return float((self.neutral_skin[near, 0] - knee[0]).max())
 
@@ -177,9 +166,6 @@ class Kinematics:
         self._address.write(self._data.qpos, root, angles)
         mujoco.mj_kinematics(self._model, self._data)
         return self._address.read(self._data)
-
-    def _leg(self, side: str) -> Chain:
-        return self._chain([f"{side}_{name}" for name in _LEG], end=self._head(_FEET[side]))
 
     def _palm(self, side: str) -> Floats:
         """Return the centre of the palm in the neutral pose, on the skin, (3,) metres."""

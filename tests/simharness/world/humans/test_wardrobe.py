@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simharness.types.random_streams import stream
-from simharness.world.humans.face_colors import name_at, palette
+from simharness.world.humans.face_colors import PALETTES, name_at
 from simharness.world.humans.population import draw_sex, draw_shape
 from simharness.world.humans.wardrobe import (
     HAIR_STYLES,
@@ -35,14 +35,14 @@ def test_few_people_of_one_scene_have_tops_of_one_colour():
     """Places of the golden ratio are never close: of four people no more than two share even the commonest colour."""
     for seed in range(30):
         places = (stream(seed, "people", "hue").random() + np.arange(4) * (5**0.5 - 1) / 2) % 1
-        names = [name_at(palette("tops"), place) for place in places]
+        names = [name_at(PALETTES["tops"], place) for place in places]
         assert max(map(names.count, names)) <= 2
         assert len({look.top for look in draw_looks(seed, 8)}) == 8
 
 
 @pytest.mark.parametrize("kind", ["tops", "trousers", "shoes", "frames", "hats", "bags", "masks"])
 def test_colours_are_drawn_by_their_shares(kind):
-    colors = palette(kind)
+    colors = PALETTES[kind]
     names = [name_at(colors, place) for place in (np.arange(10_000) + 0.5) / 10_000]
     assert sum(share for _, share in colors.values()) == pytest.approx(100)
     for name, (_, share) in colors.items():
@@ -51,7 +51,7 @@ def test_colours_are_drawn_by_their_shares(kind):
 
 def test_tops_have_the_published_shares_and_saturated_ones_are_rare():
     """Black, white and red of 14,221 tops: arXiv 1904.07460. Saturation and value as in HSV."""
-    share = {name: part for name, (_, part) in palette("tops").items()}
+    share = {name: part for name, (_, part) in PALETTES["tops"].items()}
     published = {("black", "charcoal"): 3581, ("white", "cream"): 3264, ("red", "burgundy", "pink"): 1870}
     for names, count in published.items():
         assert sum(share[name] for name in names) == pytest.approx(100 * count / 14_221, abs=0.1)

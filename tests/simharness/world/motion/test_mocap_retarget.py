@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simharness.types.random_streams import stream
-from simharness.world.humans.anatomy import DOFS
+from simharness.world.humans.anatomy import ARM, DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape
 from simharness.world.motion.mocap.bvh import read_bvh
 from simharness.world.motion.mocap.clip import Clip, back_and_forth
-from simharness.world.motion.mocap.limb_angles import ARM, arm_angles
+from simharness.world.motion.mocap.limb_angles import arm_angles
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
 
