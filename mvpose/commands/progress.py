@@ -4,13 +4,15 @@ for the trials of a study.
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator
-from typing import Protocol
+from collections.abc import Callable, Iterable, Iterator
+from typing import Protocol, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from mvpose.commands.errors import RunError
+
+T = TypeVar("T")
 
 _LINE_SECONDS = 10.0  # seconds between two lines where stderr is not a terminal
 _UNSETTLED = 2  # first steps include compilation: a rate that counts them gives many times the remaining time
@@ -40,6 +42,13 @@ class Silence:
     def stage(self, name: str, total: int, *, done: int = 0) -> Iterator[Advance]:
         """Begin a stage without output."""
         yield _ignore
+
+
+def counted(items: Iterable[T], advance: Callable[[int], object]) -> Iterator[T]:
+    """Yield items, and report each as a finished step before the next one is taken."""
+    for item in items:
+        yield item
+        advance(1)
 
 
 class Stages:

@@ -11,7 +11,6 @@ Hartley & Zisserman, "Multiple View Geometry", section 5.2).
 """
 
 import hashlib
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import cast
@@ -23,6 +22,7 @@ from mvpose.camera import Camera, Rig
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import Key, KeyedDraws
 from simharness.detector.steps import Context, registered_steps
+from simharness.detector.viewing_conditions import VISIBLE, oks_units
 from simharness.planning.standing_people import StandingScenes
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.random_streams import stream
@@ -35,6 +35,7 @@ _LIMBS = np.arange(5, 17)  # shoulders to ankles
 _STEP = 1e-4  # metres, of the differences by which the projection is derived
 _SINGULAR = 1e-4  # reciprocal condition of a sum of information below which one direction is unknown
 _SHARED = "all"  # part of the key of draws that all views share
+_LEAST_DEVIATION = 0.5  # pixels: no keypoint is more exact than the grid from which it is read
 
 
 @dataclass(frozen=True)
@@ -107,11 +108,19 @@ def detect_in(
     time = np.arange(len(scenes), dtype=float)
     sequence = Sequence(scenes.landmarks, np.arange(scenes.people), time, scenes.present)
     draws = _CameraDraws(_seed_of(camera, seed), time, 1, common=seed)
-    context = Context(sequence, views, cast(Rig, _OneCamera(camera)), _independent(detector), draws)
+    context = Context(sequence, views, cast(Rig, _OneCamera([camera])), _independent(detector), draws)
     block = DetectionBlock.of_people(views)
     for each in registered_steps():
         block = each.apply(block, context)
     return block
+
+
+def keypoint_deviation(detector: DetectorSection, views: Views) -> Floats:
+    """Return the standard deviation of good keypoints in one camera, pixels, (S, Q, 17)."""
+    keypoints = detector.keypoints
+    usual = np.array(keypoints.scatter.by_joint()) * oks_units(views.boxes[:, 0])
+    deviation = usual * np.where(views.visibility[:, 0] == VISIBLE, 1.0, keypoints.scatter_hidden.by_joint())
+    return np.maximum(deviation, _LEAST_DEVIATION)
 
 
 def information(camera: Camera, joints: Floats, deviation: Floats) -> Floats:
@@ -161,24 +170,12 @@ def _seed_of(camera: Camera, seed: int) -> int:
     return int.from_bytes(hashlib.blake2b(name + numbers.tobytes(), digest_size=6).digest(), "little")
 
 
-@dataclass(frozen=True)
-class _OneCamera:
+class _OneCamera(tuple[Camera]):
     """Rig of one camera, as far as the steps of the detector use a rig; :class:`mvpose.Rig` has two or more."""
-
-    camera: Camera
-
-    def __iter__(self) -> Iterator[Camera]:
-        return iter((self.camera,))
-
-    def __len__(self) -> int:
-        return 1
-
-    def __getitem__(self, view: int) -> Camera:
-        return (self.camera,)[view]
 
     @property
     def centers(self) -> Floats:
-        return self.camera.center[None]
+        return self[0].center[None]
 
 
 @dataclass(frozen=True)

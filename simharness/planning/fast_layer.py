@@ -18,8 +18,7 @@ from mvpose.camera import Camera
 from mvpose.rays import Rays
 from mvpose.reconstruction import Triangulation
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.detector.viewing_conditions import VISIBLE, oks_units
-from simharness.planning.camera_terms import CameraTerms, covariance, detect_in
+from simharness.planning.camera_terms import CameraTerms, covariance, detect_in, keypoint_deviation
 from simharness.planning.standing_people import ACTIVITIES, StandingScenes, pose_pool, standing_scenes
 from simharness.planning.visibility import see, seen_joints
 from simharness.scenario.sections.detector_section import DetectorSection
@@ -30,7 +29,6 @@ from simharness.types.floor import Volume
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
 
-_LEAST_DEVIATION = 0.5  # pixels: no keypoint is more exact than the grid from which it is read
 _FIRST_MOMENTS, _MOMENT = 1.0, 1.0
 """Independent moments of a short recording, and seconds until the next one. Fitted on 32 simulated recordings of 8 s,
 seeds 1000 to 1017 and 1300 to 1313 of ``benchmarks.planning.simulated_rigs``, of which the intervals then hold 90 %."""
@@ -109,11 +107,7 @@ class FastLayer:
             raise ValueError(f"terms: expected a mvpose.Camera, got {type(camera).__name__}")
         views = see(camera, self.scenes, self.obstacles)
         block = detect_in(camera, self.scenes, views, self.detector, seed=self.seed)
-        seen = seen_joints(views)
-        keypoints = self.detector.keypoints
-        usual = np.array(keypoints.scatter.by_joint()) * oks_units(views.boxes[:, 0])
-        deviation = usual * np.where(views.visibility[:, 0] == VISIBLE, 1.0, keypoints.scatter_hidden.by_joint())
-        return CameraTerms(camera, self.scenes, seen, block, np.maximum(deviation, _LEAST_DEVIATION))
+        return CameraTerms(camera, self.scenes, seen_joints(views), block, keypoint_deviation(self.detector, views))
 
     def predict(self, terms: Sequence[CameraTerms], *, variant: str = "") -> "Prediction":
         """Return what a set of cameras makes of the people.

@@ -5,6 +5,7 @@ Geometry without people, obstacles or a detector: what :class:`~simharness.plann
 
 import numpy as np
 import shapely
+from scipy.ndimage import find_objects, label
 
 from mvpose import Rig
 from mvpose.arrays import Bools, Floats, Integers
@@ -36,7 +37,7 @@ def coverage(rig: Rig, places: Floats, heights: tuple[float, ...]) -> Integers:
         Numbers of cameras, (H, P).
     """
     points = np.stack([np.column_stack([places, np.full(len(places), height)]) for height in heights])
-    return seen(rig, points).sum(axis=0)
+    return np.sum([camera.inside(camera.project(points)) for camera in rig], axis=0)
 
 
 def whole_people(rig: Rig, places: Floats) -> Bools:
@@ -107,10 +108,8 @@ def good_rectangle(places: Floats, good: Bools) -> tuple[Floats, Floats] | None:
     cells = np.rint((places - low) / spacing).astype(int)
     mask = np.zeros(cells.max(axis=0) + 1, bool)
     mask[tuple(cells[good].T)] = True
-    found = largest_rectangle(mask, longest=max(mask.shape))
-    assert found is not None  # some cell is good
-    x0, x1, y0, y1 = found
-    return low + spacing * (np.array([x0, y0]) - 0.5), low + spacing * (np.array([x1, y1]) + 0.5)
+    x, y = largest_rectangle(mask)
+    return low + spacing * (np.array([x.start, y.start]) - 0.5), low + spacing * (np.array([x.stop, y.stop]) - 0.5)
 
 
 def grid_spacing(places: Floats) -> float:
@@ -120,35 +119,12 @@ def grid_spacing(places: Floats) -> float:
     return float(known.min()) if len(known) else 1.0
 
 
-def largest_rectangle(mask: Bools, *, longest: int) -> tuple[int, int, int, int] | None:
-    """Return first and last row, first and last column of the largest rectangle of true cells; None without any.
-
-    Args:
-        mask: cells, (rows, columns).
-        longest: one less than the largest number of rows or columns.
-    """
-    best, area = None, 0
+def largest_rectangle(mask: Bools) -> tuple[slice, slice]:
+    """Return rows and columns of the largest rectangle of true cells of a grid (rows, columns); empty without any."""
+    best, area = (slice(0, 0), slice(0, 0)), 0
     for first in range(len(mask)):
-        columns = np.ones(mask.shape[1], bool)
-        for last in range(first, min(len(mask), first + longest + 1)):
-            columns &= mask[last]
-            if not columns.any():
-                break
-            start, stop = _longest_run(columns)
-            stop = min(stop, start + longest + 1)
-            if (last - first + 1) * (stop - start) > area:
-                best, area = (first, last, start, stop - 1), (last - first + 1) * (stop - start)
+        for stop in range(first + 1, len(mask) + 1):
+            for (run,) in find_objects(label(mask[first:stop].all(axis=0))[0]):
+                if (stop - first) * (run.stop - run.start) > area:
+                    best, area = (slice(first, stop), run), (stop - first) * (run.stop - run.start)
     return best
-
-
-def seen(rig: Rig, points: Floats) -> Bools:
-    """Return which cameras have points (..., 3) in the picture, (V, ...)."""
-    return np.stack([camera.inside(camera.project(points)) for camera in rig])
-
-
-def _longest_run(row: Bools) -> tuple[int, int]:
-    """Return start and stop of the longest run of true cells of a row that has one."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], row.astype(int), [0]])))
-    starts, stops = edges[::2], edges[1::2]
-    k = int((stops - starts).argmax())
-    return int(starts[k]), int(stops[k])

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
 
 from mvpose import Rig
+from mvpose.files.json_values import json_value
 from simharness.planning.candidates import Candidate
 from simharness.planning.fast_layer import Prediction
 from simharness.planning.forecast_error import ForecastErrors, forecast_text
@@ -31,12 +32,12 @@ class Figures:
     """Least PCP of a place, percent; NaN where it was not computed."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return the figures as JSON values; null where unknown."""
+        """Return the figures by their names in JSON; NaN where unknown."""
         return {
-            "pcp": _interval(self.pcp),
-            "mpjpe_mm": _interval(self.error_mm),
-            "share_within_target": number(self.share),
-            "worst_pcp": number(self.worst),
+            "pcp": {"value": self.pcp.mean, "low": self.pcp.low, "high": self.pcp.high},
+            "mpjpe_mm": {"value": self.error_mm.mean, "low": self.error_mm.low, "high": self.error_mm.high},
+            "share_within_target": self.share,
+            "worst_pcp": self.worst,
         }
 
     @classmethod
@@ -49,13 +50,9 @@ class Figures:
             figures["pcp"], figures["mpjpe_mm"], 100.0 * float(within[known].mean()), float(prediction.pcp[known].min())
         )
 
-    def to_row(self) -> tuple[Any, ...]:
-        """Return the figures as values for the ledger; :meth:`of_row` reads them."""
-        return astuple(self)
-
     @classmethod
     def of_row(cls, row: Sequence[Any]) -> Self:
-        """Return the figures of a row of the ledger."""
+        """Return the figures of a row of the ledger, which has them as a tuple."""
         pcp, error, share, worst = row
         return cls(Interval(*pcp), Interval(*error), share, worst)
 
@@ -141,7 +138,7 @@ class RigPlan:
     def to_json(self) -> dict[str, Any]:
         """Return the plan as JSON values."""
         simulated = self.best.simulated
-        return {
+        content = {
             "room": self.room.name,
             "seed": self.seed,
             "cameras": {each.name: self._camera(k, each) for k, each in enumerate(self.cameras)},
@@ -159,13 +156,12 @@ class RigPlan:
             "curve": [{"cameras": p.cameras, "cost": p.cost, **p.figures.to_json()} for p in self.curve],
             "map": {
                 "places": self.prediction.places.round(3).tolist(),
-                "pcp": _numbers(self.prediction.pcp.tolist()),
-                "error_mm": _numbers(self.prediction.error_mm.tolist()),
-                "views": _numbers(self.prediction.views.tolist()),
+                **{key: getattr(self.prediction, key) for key in ("pcp", "error_mm", "views")},
             },
             "near_best": self.near_best,
             "candidates": self.candidates,
         }
+        return {key: json_value(value, decimals=4) for key, value in content.items()}
 
     def _camera(self, index: int, camera: PlannedCamera) -> dict[str, Any]:
         built = self.rig[index]
@@ -174,8 +170,8 @@ class RigPlan:
             "direction": built.R[2].round(4).tolist(),
             "mount": camera.mount,
             "lens": camera.lens,
-            "sure": number(camera.sure),
-            "worth": number(camera.worth),
+            "sure": camera.sure,
+            "worth": camera.worth,
         }
 
 
@@ -185,8 +181,7 @@ _NEARLY_ALL = 98.0  # PCP: more cameras add little
 def sentences(plan: RigPlan) -> list[str]:
     """Return what the plan says in plain sentences, the most important first."""
     room, figures, target = plan.room, plan.figures, plan.room.keys.target
-    area = f"{_extent(room)}"
-    people = "1 person" if room.keys.people.count == 1 else f"{room.keys.people.count} people"
+    area, people = size_text(*room.volume.size), people_text(room.keys.people.count)
     how = f"in {plan.simulated_scenes} simulated scenes" if plan.best.simulated is not None else "by the fast layer"
     lines = [
         f"{len(plan.rig)} cameras give {forecast_text(figures.pcp)} PCP and "
@@ -223,33 +218,24 @@ def sentences(plan: RigPlan) -> list[str]:
     sure = [each.name for each in placed if each.sure >= 0.8]
     free = [each.name for each in placed if each.sure < 0.4]
     if plan.near_best > 1 and sure:
-        lines.append(
-            f"{_names(sure)} {'hangs' if len(sure) == 1 else 'hang'} at about the same place in nearly every good rig."
-        )
+        hang = "hangs" if len(sure) == 1 else "hang"
+        lines.append(f"{names_text(sure)} {hang} at about the same place in nearly every good rig.")
     if plan.near_best > 1 and free:
-        lines.append(
-            f"{_names(free)} may also hang elsewhere: other good rigs do without {'it' if len(free) == 1 else 'them'}."
-        )
+        them = "it" if len(free) == 1 else "them"
+        lines.append(f"{names_text(free)} may also hang elsewhere: other good rigs do without {them}.")
     return lines
 
 
-def _names(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+def names_text(names: Sequence[str]) -> str:
+    """Return one name or more in a sentence: "cam1, cam2 and cam4"."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
-def _extent(room: Room) -> str:
-    x, y = room.volume.size.tolist()
+def people_text(count: int) -> str:
+    """Return a number of people in a sentence."""
+    return "1 person" if count == 1 else f"{count} people"
+
+
+def size_text(x: float, y: float) -> str:
+    """Return the sides of a rectangle, metres, in a sentence."""
     return f"{x:.1f} by {y:.1f} m"
-
-
-def _numbers(values: Sequence[float]) -> list[float | None]:
-    return [number(value) for value in values]
-
-
-def _interval(values: Interval) -> dict[str, float | None]:
-    return {"value": number(values.mean), "low": number(values.low), "high": number(values.high)}
-
-
-def number(value: float) -> float | None:
-    """Return a value as JSON has it, four decimal places; None for NaN and infinity."""
-    return round(float(value), 4) if math.isfinite(value) else None

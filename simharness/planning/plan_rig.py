@@ -7,13 +7,12 @@
 4. Confirmation: the best of them are simulated on the same scenes, beside the rigs that people hang without a plan.
 """
 
-import dataclasses
 import hashlib
 import json
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ import numpy as np
 
 from mvpose import Rig
 from mvpose.arrays import Floats
-from mvpose.commands.progress import Reporter, Silence
+from mvpose.commands.progress import Reporter, Silence, counted
 from simharness.planning.candidates import Candidate, alike, around, candidates_in
 from simharness.planning.fast_layer import FastLayer, Prediction
 from simharness.planning.forecast_error import ForecastErrors
@@ -100,8 +99,6 @@ def _count(room: Room, cameras: int | None) -> int | None:
     keys, where = room.keys.cameras, room.file or room.name
     count, key = (cameras, "--cameras") if cameras is not None else (keys.count, "cameras.count")
     if count is None:
-        if keys.budget is None:
-            raise ValueError(f"{where}: the number of cameras is missing: give --cameras N, or cameras.count or budget")
         return None
     if count < 2:
         raise ValueError(f"{where}: {key} = {count}: one camera gives no positions in space; expected at least 2")
@@ -124,7 +121,6 @@ class _Work:
         path = None if folder is None else folder / "search.json"
         self.ledger = Ledger(path, _identity(room, seed, effort.candidates))
         self.seconds: dict[str, float] = {}
-        self._terms: list[Floats] = []
 
     def plan(self) -> RigPlan:
         """Return the plan."""
@@ -171,26 +167,22 @@ class _Work:
         """Contributions of the cameras that hang already."""
         return [self.value.terms_of(camera) for camera in self.room.fixed]
 
-    @property
+    @cached_property
     def terms(self) -> list[Floats]:
         """Contributions of the candidates, computed when a step first needs them.
 
         Raises:
             ValueError: no candidate sees anybody.
         """
-        if not self._terms:
-            value = self.value
-            with self.reporter.stage("cameras", len(self.candidates)) as advance:
-                for each in self.candidates:
-                    self._terms.append(value.terms(each))
-                    advance(1)
-            seen = max(float(each[..., 4].mean()) for each in self._terms)
-            if seen < _PREVIEW_SHARE:
-                raise ValueError(
-                    f"{self.room.file or self.room.name}: no camera at any place sees anybody in the volume: obstacles "
-                    "hide it, or it is out of view; change obstacles, places, volume, or lenses"
-                )
-        return self._terms
+        value = self.value
+        with self.reporter.stage("cameras", len(self.candidates)) as advance:
+            terms = [value.terms(each) for each in counted(self.candidates, advance)]
+        if max(float(each[..., 4].mean()) for each in terms) < _PREVIEW_SHARE:
+            raise ValueError(
+                f"{self.room.file or self.room.name}: no camera at any place sees anybody in the volume: obstacles "
+                "hide it, or it is out of view; change obstacles, places, volume, or lenses"
+            )
+        return terms
 
     def _search(self, limits: Limits, starts: int, title: str) -> list[CandidateSet]:
         names = [f"start {limits.count} {k}" for k in range(starts)]
@@ -217,18 +209,17 @@ class _Work:
         best = sets[:_REFINED]
         results = []
         with self.reporter.stage("refine", len(best)) as advance:
-            for k, each in enumerate(best):
+            for k, each in enumerate(counted(best, advance)):
                 key = f"refined {self.count} {self.effort.starts} {k}"
 
                 def work(each: CandidateSet = each, key: str = key) -> Any:
                     fixed = self.fixed_terms
                     found = refine(self.value, self.room, each, seed=self.seed, key=key, fixed=fixed)
-                    return [[dataclasses.astuple(camera) for camera in found.candidates], found.value]
+                    return [[astuple(camera) for camera in found.candidates], found.value]
 
                 cameras, value = self.ledger.result(key, work)
                 chosen = tuple(Candidate(c[0], c[1], (c[2][0], c[2][1], c[2][2]), c[3], c[4]) for c in cameras)
                 results.append(CandidateSet(around(self.room, chosen), value))
-                advance(1)
         return results
 
     def _curve(self, best: CandidateSet) -> tuple[CurvePoint, ...]:
@@ -265,7 +256,7 @@ class _Work:
     def _figures_of(self, rig: Rig) -> tuple[Any, ...]:
         """Return the figures of a rig by the fast layer, as values for the ledger."""
         prediction = self.layer.predict([self.layer.terms(camera) for camera in rig], variant=VARIANT)
-        return Figures.of_prediction(prediction, self.room.keys.target).to_row()
+        return astuple(Figures.of_prediction(prediction, self.room.keys.target))
 
     def _judged(self, refined: Sequence[CandidateSet]) -> list[tuple[CandidateSet, Figures]]:
         """Return the refined sets with their figures by the fast layer, best first."""
@@ -330,13 +321,9 @@ class _Work:
                 reporter=self.reporter,
             )
             errors = ForecastErrors.of_detector(self.room.detector)
-            return [
-                Figures(
-                    errors.of_pcp(interval_of(results, each, "pcp")),
-                    errors.of_mm(interval_of(results, each, "mpjpe_mm")),
-                ).to_row()
-                for each in conditions
-            ]
+            of_pcp = [errors.of_pcp(interval_of(results, each, "pcp")) for each in conditions]
+            of_mm = [errors.of_mm(interval_of(results, each, "mpjpe_mm")) for each in conditions]
+            return [astuple(Figures(*both)) for both in zip(of_pcp, of_mm, strict=True)]
 
         found = self.ledger.result(f"simulated {self.effort.scenes} {key}", work)
         return [Figures.of_row(row) for row in found]

@@ -8,9 +8,11 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from mvpose.arrays import Bools, Integers
+from mvpose.files.json_values import json_value
 from simharness.planning.fast_layer import Prediction
 from simharness.planning.floor_coverage import good_rectangle
 from simharness.planning.forecast_error import forecast_text
+from simharness.planning.plan_result import names_text, people_text, size_text
 from simharness.planning.rehearsal_scene import RehearsalSetup
 from simharness.planning.simulated_scenes import SceneResult
 from simharness.planning.tolerance import CLIFF, FaultTolerance
@@ -170,7 +172,7 @@ class Rehearsal:
             "tolerance": {each.fault.key: _tolerance(each) for each in self.tolerances},
             "layer_seconds": self.seconds.get("layer"),
         }
-        return {key: _plain(value) for key, value in content.items()}
+        return {key: json_value(value, decimals=4) for key, value in content.items()}
 
 
 def _estimated(each: Estimated) -> dict[str, Any]:
@@ -217,45 +219,18 @@ def _tolerance(each: FaultTolerance) -> dict[str, Any]:
     }
 
 
-def _plain(value: Any) -> Any:
-    """Return values as JSON: numbers with four decimals, NaN as null, arrays as lists, intervals with their scenes."""
-    if isinstance(value, Interval):
-        return {"mean": _plain(value.mean), "low": _plain(value.low), "high": _plain(value.high), "scenes": value.n}
-    if isinstance(value, dict):
-        return {key: _plain(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, float):
-        return round(float(value), 4) if np.isfinite(value) else None
-    return value
-
-
 _CROWDED = 90.0  # PCP, percent: with fewer the method is of little use
 
 
 def sentences(rehearsal: Rehearsal) -> tuple[str, ...]:
     """Return the result in plain sentences, the most important first."""
-    return tuple(
-        filter(
-            None,
-            (
-                _verdict(rehearsal),
-                _numbers(rehearsal),
-                _cameras(rehearsal),
-                _one_more(rehearsal),
-                _crowd_sentence(rehearsal),
-                _tolerance_sentence(rehearsal),
-                _matching(rehearsal),
-            ),
-        )
-    )
+    of = (_verdict, _numbers, _cameras, _one_more, _crowd_sentence, _tolerance_sentence, _matching)
+    return tuple(text for each in of if (text := each(rehearsal)))
 
 
 def _verdict(rehearsal: Rehearsal) -> str:
     setup, count, whole = rehearsal.setup, len(rehearsal.rig), rehearsal.whole
-    people, size = _people(setup.people), _size(*setup.volume.size)
+    people, size = people_text(setup.people), size_text(*setup.volume.size)
     target = f"PCP {setup.target.pcp:g} and {setup.target.error:g} mm"
     surely = whole.pcp.low >= setup.target.pcp and whole.mpjpe_mm.high <= setup.target.error
     never = whole.pcp.high < setup.target.pcp or whole.mpjpe_mm.low > setup.target.error
@@ -266,7 +241,7 @@ def _verdict(rehearsal: Rehearsal) -> str:
     if rectangle is None:
         short = "are not" if never else "may not be"
         return f"{count} cameras {short} enough for {people} in {size}: nowhere are {target} met."
-    inner = _size(*(rectangle[1] - rectangle[0]))
+    inner = size_text(*(rectangle[1] - rectangle[0]))
     return (
         f"{count} cameras {enough} for {people} within {inner}; {100 * rehearsal.good_share:.0f} % of the volume of "
         f"{size} meets the target, {target}."
@@ -300,13 +275,14 @@ def _cameras(rehearsal: Rehearsal) -> str:
         )
     if redundant:
         names = [each.camera.name for each in redundant]
-        which = "any camera" if len(names) == len(worths) else "any of " + _listed(names)
+        which = "any camera" if len(names) == len(worths) else "any of " + names_text(names)
         which = f"camera {names[0]}" if len(names) == 1 else which
         alone = " alone, not several at once" if len(names) > 1 else ""
         parts.append(f"{which} could be spared{alone}: its failure costs less than {LITTLE:g} points of PCP")
     if len(needed) == len(worths):
         parts.append("no camera can be spared")
-    return _sentence("; ".join(parts))
+    text = "; ".join(parts)
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _one_more(rehearsal: Rehearsal) -> str:
@@ -334,9 +310,9 @@ def _crowd_sentence(rehearsal: Rehearsal) -> str:
     if not perhaps:
         return f"PCP is below {_CROWDED:g} with any number of people; {last}."
     if surely == perhaps:
-        return f"PCP stays at {_CROWDED:g} or above up to {_people(surely)}; {last}."
-    first = f"for certain up to {_people(surely)}, perhaps" if surely else "perhaps"
-    return f"PCP stays at {_CROWDED:g} or above {first} up to {_people(perhaps)}; {last}."
+        return f"PCP stays at {_CROWDED:g} or above up to {people_text(surely)}; {last}."
+    first = f"for certain up to {people_text(surely)}, perhaps" if surely else "perhaps"
+    return f"PCP stays at {_CROWDED:g} or above {first} up to {people_text(perhaps)}; {last}."
 
 
 def _tolerance_sentence(rehearsal: Rehearsal) -> str:
@@ -353,19 +329,3 @@ def _matching(rehearsal: Rehearsal) -> str:
     if not np.isfinite(rehearsal.mixed.mean) or rehearsal.mixed.mean < 1.0:
         return ""
     return f"In {rehearsal.mixed.mean:.0f} % of the matches two people are taken for one."
-
-
-def _size(x: float, y: float) -> str:
-    return f"{x:.1f} by {y:.1f} m"
-
-
-def _people(count: int) -> str:
-    return "1 person" if count == 1 else f"{count} people"
-
-
-def _listed(names: list[str]) -> str:
-    return ", ".join(names[:-1]) + f" and {names[-1]}"
-
-
-def _sentence(text: str) -> str:
-    return text[0].upper() + text[1:] + "."

@@ -21,6 +21,7 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.frame_scores import RULES, HeadRule
 from simharness.types.floor import Volume
 from simharness.world.humans.accessories import take_off
+from simharness.world.motion.paths import rotation_2d
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.scene.build import Scene, build, compile_model
 from simharness.world.scene.objects.geoms import Box
@@ -187,14 +188,14 @@ class SceneFrame:
 
     @classmethod
     def _at(cls, points: Floats, bearing: float) -> "SceneFrame":
-        local = points @ _turn(bearing)
+        local = points @ rotation_2d(bearing)
         low, high = local.min(axis=0), local.max(axis=0)
-        return cls(_turn(bearing) @ ((low + high) / 2), bearing, (high - low) / 2)
+        return cls(rotation_2d(bearing) @ ((low + high) / 2), bearing, (high - low) / 2)
 
     @property
     def axes(self) -> Floats:
         """Axes of the rectangle in the world as columns, (2, 2)."""
-        return _turn(self.bearing)
+        return rotation_2d(self.bearing)
 
     def to_world(self, places: Floats) -> Floats:
         """Return places (..., 2) of the scene in the world, metres."""
@@ -292,8 +293,3 @@ def _solid(obstacle: Box, frame: SceneFrame, number: int) -> Solid:
     x, y = frame.to_scene(np.array(obstacle.center[:2])).tolist()
     box = Box((x, y, obstacle.center[2]), obstacle.half, obstacle.yaw - frame.bearing)
     return Solid("clutter", f"obstacle{number}", box_mesh([box], [_OBSTACLE]), (box,), box)
-
-
-def _turn(bearing: float) -> Floats:
-    c, s = np.cos(bearing), np.sin(bearing)
-    return np.array([[c, -s], [s, c]])

@@ -1,14 +1,13 @@
 """Rehearsal of a rig: the fast layer for maps and comparisons, then scenes of the simulator where it matters."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import TypeVar
 
 import numpy as np
 
 from mvpose import Camera, Rig
-from mvpose.commands.progress import Reporter, Silence
+from mvpose.commands.progress import Reporter, Silence, counted
 from simharness.planning.fast_layer import CameraTerms, FastLayer, Prediction
 from simharness.planning.floor_coverage import coverage
 from simharness.planning.forecast_error import ForecastErrors
@@ -28,13 +27,12 @@ from simharness.planning.simulated_scenes import (
     SceneResult,
     interval_of,
     loss_of,
+    nan_mean,
     simulate_scenes,
 )
 from simharness.planning.tolerance import fault_conditions, tolerances
 from simharness.reality.validation.variant_comparison import camera_subsets
 from simharness.world.rigs.extra_camera import cameras_on_walls
-
-T = TypeVar("T")
 
 _SPACING = 0.5  # metres between the places of the maps
 _COARSE = 1.0  # metres between places where sets of cameras are compared
@@ -175,7 +173,7 @@ class _Rehearsing:
         rig = self.rig
         with self.reporter.stage("maps", len(rig) + 1) as advance:
             layer = self._layer(people=self.setup.people, coarse=False)
-            terms = [_advanced(layer.terms(camera), advance) for camera in rig]
+            terms = [layer.terms(camera) for camera in counted(rig, advance)]
             if not any(each.seen.any() for each in terms):
                 raise ValueError(
                     "nothing is visible: no camera has anybody in the volume in its picture; check the volume, the "
@@ -202,20 +200,16 @@ class _Rehearsing:
             layer = self._layer(people=setup.people, coarse=True)
             terms = [layer.terms(camera) for camera in rig]
             predicted = {
-                each: _advanced(layer.predict([terms[k] for k in each], variant=_VARIANT), advance)
-                for each in sets
+                each: layer.predict([terms[k] for k in each], variant=_VARIANT)
+                for each in counted(sets, advance)
                 if len(each) > 1
             }
             extra = None
-            for camera in candidates:
+            for camera in counted(candidates, advance):
                 prediction = layer.predict([*terms, layer.terms(camera)], variant=_VARIANT)
                 if extra is None or _better(prediction, extra[1]):
                     extra = (camera, prediction, len(candidates))
-                advance(1)
-            crowds = {}
-            for number in numbers:
-                crowds[number] = self._with_people(number, layer, terms)
-                advance(1)
+            crowds = {number: self._with_people(number, layer, terms) for number in counted(numbers, advance)}
         return _Compared(predicted, extra, crowds)
 
     def _with_people(self, number: int, layer: FastLayer, terms: Sequence[CameraTerms]) -> Prediction:
@@ -299,7 +293,7 @@ class _Rehearsing:
             summary, scenes = prediction.summary(), simulated.get(number)
             pcp, mixed = (None if scenes is None else interval_of(scenes, whole, key) for key in ("pcp", "mixed"))
             pcp = None if pcp is None else self.errors.of_pcp(pcp)
-            risk = _mean(prediction.risk)
+            risk = nan_mean(prediction.risk)
             crowds.append(Crowd(number, summary["pcp"].mean, summary["mpjpe_mm"].mean, risk, pcp, mixed))
         return tuple(crowds)
 
@@ -309,13 +303,3 @@ def _better(one: Prediction, other: Prediction) -> bool:
     here, there = one.summary(), other.summary()
     key = (round(here["pcp"].mean, 1), -here["mpjpe_mm"].mean)
     return key > (round(there["pcp"].mean, 1), -there["mpjpe_mm"].mean)
-
-
-def _mean(values: np.ndarray) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else float("nan")
-
-
-def _advanced(value: T, advance: Callable[[int], None]) -> T:
-    advance(1)
-    return value

@@ -18,7 +18,7 @@ import numpy as np
 from mvpose import Camera
 from mvpose.arrays import Floats
 from mvpose.kernels import njit
-from simharness.detector.viewing_conditions import oks_units
+from simharness.planning.camera_terms import keypoint_deviation
 from simharness.planning.candidates import Candidate
 from simharness.planning.fast_layer import FastLayer
 from simharness.planning.planned_room import Room
@@ -45,8 +45,6 @@ _EVERY = 3  # of so many people one is looked at for that value: it needs no mor
 _FALSE = 0.1  # metres across the ray: farther keypoints are false, as are guesses at hidden joints
 _BINS = np.array([0.25, 0.5, 0.75, 0.95])  # of the share of a person's joints that the camera sees
 _PRIOR = 4.0  # sightings: weight of the odds over all bins, and over all joints, where there are few
-_LEAST = 0.5  # pixels: least standard deviation of a keypoint
-
 
 ERROR = 2.0
 """Points off the objective for an error as large as the target, and in proportion for smaller ones."""
@@ -91,12 +89,9 @@ class SightingOdds:
     def in_camera(self, views: Views, camera: Camera) -> tuple[Floats, Floats, Floats]:
         """Return the odds of right and of false reports, and the deviation of right ones, pixels, all (S, Q, 17)."""
         state, bins, joints = views.visibility[:, 0], _bins(views), np.arange(17)
-        keypoints = self.detector.keypoints
-        usual = np.array(keypoints.scatter.by_joint()) * oks_units(views.boxes[:, 0])
-        deviation = np.maximum(usual * np.where(state == 0, 1.0, keypoints.scatter_hidden.by_joint()), _LEAST)
         pictured = views.boxes[:, 0, :, 2:].min(axis=-1, keepdims=True) > 0  # nobody else is ever reported
         right, false = (np.where(pictured, odds[joints, state, bins], 0.0) for odds in (self.right, self.false))
-        return right, false, deviation
+        return right, false, keypoint_deviation(self.detector, views)
 
 
 @dataclass(frozen=True)
@@ -270,14 +265,10 @@ def _bins(views: Views) -> np.ndarray:
 
 def _shrunk(hits: Floats, trials: Floats) -> Floats:
     """Return shares of hits by cell, (17, V, B), drawn towards those of all joints where there are few trials."""
-    over_joints = (hits.sum(axis=0) + _PRIOR * _share(hits.sum(axis=(0, 2)), trials.sum(axis=(0, 2)))[:, None]) / (
-        trials.sum(axis=0) + _PRIOR
-    )
+    hit, tried = hits.sum(axis=(0, 2)), trials.sum(axis=(0, 2))
+    share = np.divide(hit, tried, out=np.zeros(hit.shape), where=tried > 0)
+    over_joints = (hits.sum(axis=0) + _PRIOR * share[:, None]) / (trials.sum(axis=0) + _PRIOR)
     return (hits + _PRIOR * over_joints) / (trials + _PRIOR)
-
-
-def _share(hits: Floats, trials: Floats) -> Floats:
-    return np.divide(hits, trials, out=np.zeros(hits.shape), where=trials > 0)
 
 
 def _sigmoid(x: Floats) -> Floats:

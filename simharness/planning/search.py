@@ -70,13 +70,10 @@ class Ledger:
         """
         if name not in self._steps:
             self._steps[name] = json.loads(json.dumps(work()))
-            self._write()
+            if self._path is not None:
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+                write_atomic(self._path, json.dumps({"identity": self._identity, "steps": self._steps}).encode())
         return self._steps[name]
-
-    def _write(self) -> None:
-        if self._path is not None:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            write_atomic(self._path, json.dumps({"identity": self._identity, "steps": self._steps}).encode())
 
 
 class Value(Protocol[Terms]):

@@ -9,7 +9,7 @@ Their results are scores by condition, means over scenes, and paired losses.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +29,10 @@ from simharness.planning.rehearsal_scene import (
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.runtime.frame_pool import map_jobs
 from simharness.scenario.sections.cameras_section import FaultsSection
-from simharness.scoring.frame_scores import score_frames
+from simharness.scoring.frame_scores import FrameScores, score_frames
 from simharness.scoring.matching import count_groups
 from simharness.scoring.pcp import Part
+from simharness.scoring.score_registry import finite_mean
 from simharness.statistics.intervals import Interval, mean_interval
 from simharness.trial.conditioned_trial import ConditionedTrial, estimate_frames
 from simharness.trial.stages.build_trial import Trial, exposures_of
@@ -63,6 +64,20 @@ class SceneScores:
     """Mean error of the people found, mm."""
     mixed: float
     """Percent of the matched groups of detections that hold two people."""
+
+    @classmethod
+    def inside(cls, scores: FrameScores, inside: Bools, groups: Integers) -> Self:
+        """Return the scores of the people inside the volume, (F, P), given the numbers of groups and mixed ones, (2,).
+
+        Without groups no share of them is mixed.
+        """
+        count, mixed = groups.tolist()
+        return cls(
+            pcp=100.0 * nan_mean(_share_correct(scores.parts)[inside]),
+            recall=100.0 * nan_mean(scores.found[inside].astype(float)),
+            mpjpe_mm=1000.0 * nan_mean(scores.error[inside]),
+            mixed=100.0 * mixed / count if count else float("nan"),
+        )
 
 
 @dataclass(frozen=True)
@@ -158,75 +173,38 @@ class _Scenes:
     jobs: tuple[tuple[SceneBatch, int], ...]
 
     def __call__(self, frames: range, /) -> SceneResult | str:
-        """Return the result of the scene, or the reason why it cannot be built."""
+        """Return the result of the scene under all conditions, or the reason why it cannot be built."""
         batch, seed = self.jobs[frames.start]
-        return _run(batch.settings, batch.conditions, seed)
+        settings, takes = batch.settings, _TAKES
+        frame = SceneFrame.around(settings.setup.volume.outline)
+        if has_objects(settings.setup.clutter):  # it stands where no people of the scene are, so they cannot be moved
+            takes, settings = 1, replace(settings, frames=_TAKES * settings.frames)
+            frame = replace(frame, half=np.full(2, frame.half.max()))
+        rig = frame.rig(settings.rig)
+        whole = Condition(settings.whole or tuple(range(len(rig))))
+        conditions = tuple(dict.fromkeys((whole, *batch.conditions)))  # the maps are those of all cameras
+        try:
+            built = build_scene(scenario_of(settings, frame, seed), rig)
+        except ValueError as error:
+            return str(error)
+        parts = [
+            _take(settings, frame, spread_over_volume(built, settings, frame, take), conditions, seed * _TAKES + take)
+            for take in range(takes)
+        ]
+        places = np.concatenate([each.places for each in parts])
+        inside = settings.setup.volume.contains(places)
+        scored = {each: FrameScores.joined(part.scores[each] for part in parts) for each in conditions}
+        groups = {each: np.sum([part.groups[each] for part in parts], axis=0) for each in conditions}
+        scores = {each: SceneScores.inside(scored[each], inside, groups[each]) for each in conditions}
+        return SceneResult(seed, places, inside, _share_correct(scored[whole].parts), scored[whole].error, scores)
 
 
-def _run(settings: SceneSettings, conditions: Sequence[Condition], seed: int) -> SceneResult | str:
-    """Simulate one scene and score it under all conditions; return the reason where it cannot be built."""
-    frame = SceneFrame.around(settings.setup.volume.outline)
-    takes = _TAKES
-    if has_objects(settings.setup.clutter):  # it stands where the people of the scene are not, so they cannot be moved
-        takes, settings = 1, replace(settings, frames=_TAKES * settings.frames)
-        frame = replace(frame, half=np.full(2, frame.half.max()))
-    rig = frame.rig(settings.rig)
-    whole = Condition(settings.whole or tuple(range(len(rig))))
-    conditions = tuple(dict.fromkeys((whole, *conditions)))  # the maps are those of all cameras
-    scenario = scenario_of(settings, frame, seed)
-    try:
-        built = build_scene(scenario, rig)
-    except ValueError as error:
-        return str(error)
-    parts = [
-        _take(settings, frame, spread_over_volume(built, settings, frame, take), conditions, seed * _TAKES + take)
-        for take in range(takes)
-    ]
-    places = np.concatenate([each.places for each in parts])
-    inside = settings.setup.volume.contains(places)
-    scored = {each: _Scored.joined([part.scored[each] for part in parts]) for each in conditions}
-    shown = scored[whole]
-    return SceneResult(
-        seed, places, inside, shown.correct, shown.error, {key: each.scores(inside) for key, each in scored.items()}
-    )
-
-
-class _Scored(NamedTuple):
-    """Scores of F frames under one condition."""
-
-    correct: Floats
-    """Share of correct parts of each person, (F, P); NaN where undefined."""
-    error: Floats
-    """Mean joint error of each person found, (F, P), metres."""
-    found: Bools
-    """Who is found, (F, P)."""
-    groups: Integers
-    """Number of matched groups, (F,)."""
-    mixed: Integers
-    """Number of them that hold two people, (F,)."""
-
-    @classmethod
-    def joined(cls, parts: "Sequence[_Scored]") -> "_Scored":
-        """Return the scores of the frames of several parts."""
-        return cls(*(np.concatenate(each) for each in zip(*parts, strict=True)))
-
-    def scores(self, inside: Bools) -> SceneScores:
-        """Return the scores of the people inside the volume, (F, P)."""
-        groups = int(self.groups.sum())
-        return SceneScores(
-            pcp=100.0 * _average(self.correct[inside]),
-            recall=100.0 * _average(self.found[inside].astype(float)),
-            mpjpe_mm=1000.0 * _average(self.error[inside]),
-            mixed=100.0 * int(self.mixed.sum()) / groups if groups else float("nan"),
-        )
-
-
-@dataclass(frozen=True)
-class _Take:
-    """One take of a scene: where people are, (F, P, 2), metres, and the scores by condition."""
+class _Take(NamedTuple):
+    """One take of a scene: where people are, (F, P, 2), metres, and scores and numbers of groups by condition."""
 
     places: Floats
-    scored: Mapping[Condition, _Scored]
+    scores: Mapping[Condition, FrameScores]
+    groups: Mapping[Condition, Integers]
 
 
 def _take(
@@ -238,36 +216,34 @@ def _take(
     draws = ConditionedTrial(Trial(scenario, scene, exposures, {}, None))
     truth = coco17_to_shelf14(draws.sequence.joints, head=settings.head.mapping)
     pipeline, rule = preset(settings.variant), settings.head
-    scored: dict[Condition, _Scored] = {}
+    scored, groups = {}, {}
     for condition in sorted(conditions, key=lambda each: (each.fault == "clock_offset", each.level)):
         faults = FaultsSection.model_validate({condition.fault: condition.level} if condition.fault else {})
         detected = draws.detected(scenario.model_copy(update={"faults": faults}))
-        estimates, groups, mixed = _estimates(pipeline, detected, condition.cameras)
-        scores = score_frames(truth, estimates, head=rule.mapping, filled=rule.filled)
-        scored[condition] = _Scored(_share_correct(scores.parts), scores.error, scores.found, groups, mixed)
+        estimates, groups[condition] = _estimates(pipeline, detected, condition.cameras)
+        scored[condition] = score_frames(truth, estimates, head=rule.mapping, filled=rule.filled)
     hips = draws.sequence.joints[:, :, (11, 12), :2].mean(axis=2)
-    return _Take(frame.to_world(hips), scored)
+    return _Take(frame.to_world(hips), scored, groups)
 
 
 def _estimates(
     pipeline: Estimator, detected: DetectedSequence, cameras: tuple[int, ...]
-) -> tuple[list[Floats], Integers, Integers]:
-    """Return the joints of F frames by some cameras, F x (n, 17, 3), and the numbers of groups and mixed ones, (F,).
+) -> tuple[list[Floats], Integers]:
+    """Return the joints of F frames by some cameras, F x (n, 17, 3), and the numbers of groups and mixed ones, (2,).
 
     One camera alone gives no joints in space.
     """
-    size = len(detected.frames)
-    groups, mixed = np.zeros(size, np.int64), np.zeros(size, np.int64)
+    size, groups = len(detected.frames), np.zeros(2, np.int64)
     if len(cameras) < 2:
-        return [np.zeros((0, 17, 3)) for _ in detected.frames], groups, mixed
+        return [np.zeros((0, 17, 3)) for _ in detected.frames], groups
     given = tuple(each.detections for each in detected.frames)
     recording = AnnotatedRecording(detected.rig, np.zeros((size, 0, 14, 3)), given, np.arange(size)).subset(cameras)
     estimates = estimate_frames(pipeline, recording.rig, recording.detections)
     for frame, (detections, estimate) in enumerate(zip(recording.detections, estimates, strict=True)):
         person = detected.frames[frame].truth.person[np.isin(given[frame].view, cameras)]
         counts = count_groups(detections.view, estimate.matching.labels_of(len(detections)), person)
-        groups[frame], mixed[frame] = len(estimate.joints), counts.merged
-    return [each.joints for each in estimates], groups, mixed
+        groups += len(estimate.joints), counts.merged
+    return [each.joints for each in estimates], groups
 
 
 def _share_correct(parts: NDArray[np.int8]) -> Floats:
@@ -276,13 +252,7 @@ def _share_correct(parts: NDArray[np.int8]) -> Floats:
     return np.where(defined > 0, (parts == Part.CORRECT).sum(axis=-1) / np.maximum(defined, 1), np.nan)
 
 
-def _mean(values: Floats) -> Floats:
-    """Return the mean over the last axis without NaN; NaN where there is nothing else."""
-    known = np.isfinite(values)
-    return np.where(
-        known.any(axis=-1), np.where(known, values, 0.0).sum(axis=-1) / np.maximum(known.sum(axis=-1), 1), np.nan
-    )
-
-
-def _average(values: Floats) -> float:
-    return float(_mean(values.ravel()[None])[0])
+def nan_mean(values: Floats) -> float:
+    """Return the mean of the finite values; NaN without any."""
+    mean = finite_mean(values)
+    return float("nan") if mean is None else mean

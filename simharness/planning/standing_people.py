@@ -121,7 +121,8 @@ def _pose_pool(activities: tuple[str, ...]) -> PosePool:
         caster.place(state)
         for person, body in enumerate(scene.bodies):
             ends, radius = caster.capsules_of(person)
-            here, turn = _frame(state.joints[person])
+            joints = state.joints[person]
+            here, turn = np.append(joints[11:13, :2].mean(axis=0), 0.0), _turns(bearings_of(joints))
             landmarks.append((state.landmarks[person] - here) @ turn)
             capsules.append((ends - here) @ turn)
             radii.append(radius)
@@ -145,12 +146,6 @@ def _pose_pool(activities: tuple[str, ...]) -> PosePool:
 def _joined(parts: Sequence[NDArray]) -> tuple[NDArray, Integers]:
     """Return arrays as one, and the first row of each, and the end."""
     return np.concatenate(parts), np.cumsum([0, *map(len, parts)])
-
-
-def _frame(joints: Floats) -> tuple[Floats, Floats]:
-    """Return the origin (3,) of a person on the floor, under the hips, and the axes ahead, left, up as columns."""
-    here = np.append(joints[11:13, :2].mean(axis=0), 0.0)
-    return here, _turns(bearings_of(joints))
 
 
 def bearings_of(joints: Floats) -> Floats:

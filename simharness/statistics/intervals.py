@@ -33,6 +33,10 @@ class Interval:
     high: float
     n: int
 
+    def to_json(self) -> dict[str, float]:
+        """Return mean, ends and number of scenes by their names in JSON."""
+        return {"mean": self.mean, "low": self.low, "high": self.high, "scenes": self.n}
+
 
 @dataclass(frozen=True)
 class Scale:
