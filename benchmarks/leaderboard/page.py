@@ -13,7 +13,6 @@ from benchmarks.leaderboard.figures import ALL, DIFFERENCE, OVERALL, SIGNIFICANT
 from benchmarks.leaderboard.views_plot import views_plot
 from mvpose.report.documents import fill_template, program_version
 from mvpose.report.tables import NOTHING, Cell, Table
-from simharness.outputs.study.tables import ends, number
 from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval
@@ -104,7 +103,7 @@ def cell_of(figure: Figure | None) -> Cell:
         outside = figure.low > 0 or figure.high < 0 if math.isnan(figure.p) else figure.p < SIGNIFICANT
         return Cell(texts[0], f"{texts[1]} to {texts[2]}", strong=outside)
     info = SCORES[figure.score]
-    return Cell(number(figure.value, info), ends(_interval(figure), info))
+    return Cell(*_interval(figure).texts(info.digits))
 
 
 def _interval(figure: Figure) -> Interval:

@@ -95,9 +95,9 @@ class Wanted:
         check_writable(self.out, ESTIMATE)
         formats_of(self.formats)
         options_of(self.files_up, together=self.together)
-        from mvpose.cli.estimation import check_method
+        from mvpose.cli.estimation import estimator
 
-        check_method(self.method, lag=self.lag)
+        estimator(self.method, lag=self.lag, period=1.0)  # refuses unknown names and lags
 
 
 @grouped()
@@ -218,8 +218,6 @@ def _without_effect(wanted: Wanted, choices: Choices, inputs: "Inputs", *, track
         ("files_up", bool(usual - {wanted.files_up}), f"it is for {open_axes}, where another axis is usual"),
         ("joints", choices.joints == "body" or inputs.skeleton != COCO17, "the detections have the joints of the body"),
     ]
-    return [f"{_option(name)} has no effect: {why}" for name, effect, why in rules if given(name) and not effect]
-
-
-def _option(name: str) -> str:
-    return _FLAGS.get(name, f"--{name.replace('_', '-')}")
+    without = {name: why for name, effect, why in rules if given(name) and not effect}
+    flags = {name: _FLAGS.get(name, f"--{name.replace('_', '-')}") for name in without}
+    return [f"{flags[name]} has no effect: {why}" for name, why in without.items()]

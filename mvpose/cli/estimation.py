@@ -53,7 +53,8 @@ def examine(inputs: Inputs) -> Diagnosis | None:
     except Exception as error:
         note(f"the calibration was not examined ({type(error).__name__}: {error}); `mvpose doctor` examines it alone")
         return None
-    verdict = f"calibration, by {len(rows)} of {len(inputs.frames)} frames: {_verdict(diagnosis)}"
+    mend = " `mvpose doctor` says what mends it" if diagnosis.alarms else ""
+    verdict = f"calibration, by {len(rows)} of {len(inputs.frames)} frames: {sentence(diagnosis)}{mend}"
     note(verdict, usual=not diagnosis.alarms)
     return diagnosis
 
@@ -75,11 +76,6 @@ def examined_frames(frames: Sequence[Detections], *, period: float) -> tuple[np.
     return rows[first : first + width], step
 
 
-def _verdict(diagnosis: Diagnosis) -> str:
-    """Return the verdict as one line."""
-    return sentence(diagnosis) + (" `mvpose doctor` says what mends it" if diagnosis.alarms else "")
-
-
 GOOD = 0.57
 """Residual below which a keypoint is good, in standard deviations of annotators: OKS 0.85 (Ronchi, ICCV 2017)."""
 
@@ -96,15 +92,6 @@ _MOST = 0.75  # share of people who stand or face wrongly from which the axis is
 _APART = 0.05  # share of a camera's detections in people below which it sees other people than the others
 _BODIES = (0.4, 2.2)  # metres from shoulder to ankle, along the bones: from a baby to beyond the tallest
 _LONG = ((5, 11), (11, 13), (13, 15), (6, 12), (12, 14), (14, 16))  # trunk, thigh and shank of both sides in COCO-17
-
-
-def check_method(method: str, *, lag: float) -> None:
-    """Check the name of a method and the lag.
-
-    Raises:
-        ValueError: as :func:`estimator`.
-    """
-    estimator(method, lag=lag, period=1.0)
 
 
 def estimator(method: str, *, lag: float, period: float) -> Estimator:

@@ -70,9 +70,17 @@ def _escaped(match: re.Match[str]) -> str:
 
 
 @contextmanager
-def prefixed(place: object, hint: str = "") -> Iterator[None]:
-    """Put a place, such as a path, before the message of any ValueError of a block, and a hint behind it."""
+def prefixed(place: object, hint: str = "", *, damage: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+    """Put a place, such as a path, before the message of any ValueError of a block, and a hint behind it.
+
+    Args:
+        place: the place.
+        hint: text behind the message.
+        damage: other errors that values of a damaged file raise; they become a ValueError with their type.
+    """
     try:
         yield
     except ValueError as error:
         raise ValueError(f"{place}: {error}{hint}") from None
+    except damage as error:
+        raise ValueError(one_line(f"{place}: {type(error).__name__}: {error}{hint}")) from None

@@ -180,8 +180,7 @@ def _losses(results: "Results", score: str) -> "ScoreTable":
     """Return what every factor costs: the score at its best and worst value, and where five points are lost."""
     from simharness.cli.score_tables import ScoreTable
     from simharness.outputs.study.curves import losses
-    from simharness.outputs.study.plots import short
-    from simharness.runtime.number_text import fixed
+    from simharness.runtime.number_text import fixed, short
     from simharness.scoring.catalogue import SCORES
     from simharness.study.factors import LOST, factors_by_case
 
@@ -206,18 +205,19 @@ def _losses(results: "Results", score: str) -> "ScoreTable":
 
 def _lost_at(loss: "Loss", values: Sequence[Any]) -> str:
     """Return where points are lost, with its interval."""
-    from simharness.outputs.study.curves import short
+    from simharness.runtime.number_text import short
 
     point = loss.point
     if point is None:
         return "–"
-    low, high = (None if end is None else short(end) for end in (point.low, point.high))
+    low, high = (None if end is None else short(end, 3) for end in (point.low, point.high))
+    least, most = (short(end, 3) for end in (values[0], values[-1]))
     if point.value is None:
-        nowhere = f"not from {short(values[0])} to {short(values[-1])}"
+        nowhere = f"not from {least} to {most}"
         near = low if loss.rising else high
         return f"{nowhere}\n({'from' if loss.rising else 'up to'} {near})" if near else nowhere
-    where = f"{'above' if loss.rising else 'below'} {short(point.value)}"
-    return f"{where} ({low or f'≤{short(values[0])}'} to {high or f'≥{short(values[-1])}'})"
+    where = f"{'above' if loss.rising else 'below'} {short(point.value, 3)}"
+    return f"{where} ({low or f'≤{least}'} to {high or f'≥{most}'})"
 
 
 def _without_repeats(rows: Sequence[Sequence[str]], labels: int) -> list[list[str]]:

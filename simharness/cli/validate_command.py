@@ -124,7 +124,7 @@ def _print_skill(validation: "Validation", name: str, console: Console) -> None:
     table = plain_table(title, ("forecasts",), ("error", *rivals), pad_edge=False)
     for each in validation.skills:
         figures = [(each.error, 1), *((each.rivals[name][1], 2) if name in each.rivals else None for name in rivals)]
-        texts = [tables.with_interval(*figure) if figure else (tables.NOTHING, "") for figure in figures]
+        texts = [figure[0].texts(figure[1]) if figure else (tables.NOTHING, "") for figure in figures]
         forecasts = f"{tables.SKILL_GROUPS[each.what]}, {each.variant}"
         table.add_row(forecasts, *(f"{text}\n[dim]{ends}[/]" for text, ends in texts))
     if validation.skills:

@@ -21,7 +21,7 @@ from simharness.gate.baseline import DETECTED, FRAMES, TIME, Measurement, read_b
 from simharness.gate.compare import Comparison, FailedCase, GateResult, compare
 from simharness.gate.frame_times import relative_times
 from simharness.gate.score_tests import require_seeds
-from simharness.gate.trial_command import TrialKey, command_of, setting_name, settings_at_seeds
+from simharness.gate.trial_command import TrialKey, command_of, setting_name
 from simharness.runtime.version import code_version
 from simharness.scenario.document import find_scenario
 from simharness.scenario.load import Study
@@ -264,7 +264,8 @@ def _describe_differences(baseline: Measurement, study: Study) -> str:
     """Return in a few words how the trials of a suite and a baseline differ."""
     now = {
         TrialKey(setting_name(setting, study), seed, name)
-        for setting, seed in settings_at_seeds(study)
+        for setting in study.settings
+        for seed in study.seeds
         for name in study.variants
     }
     gone, new = sorted(baseline.scores.keys() - now), sorted(now - baseline.scores.keys())

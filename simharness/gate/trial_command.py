@@ -3,7 +3,6 @@
 import json
 import re
 import shlex
-from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from simharness.scenario.document import read_document
@@ -30,13 +29,6 @@ class TrialKey(NamedTuple):
         return f"{self.case}, seed {self.seed}, {self.variant}"
 
 
-def settings_at_seeds(study: Study) -> Iterator[tuple[Setting, int]]:
-    """Yield every setting at every seed, seed by seed."""
-    for seed in study.seeds:
-        for setting in study.settings:
-            yield setting, seed
-
-
 def setting_name(setting: Setting, study: Study) -> str:
     """Return the name of a setting: its case and its factors; the name of the study where it has neither."""
     factors = ", ".join(f"{key} = {json.dumps(value)}" for key, value in setting.factors.items())
@@ -60,20 +52,11 @@ def overrides(study: Study, setting: Setting) -> list[str]:
     """Return the ``--set`` overrides of a study's file that give one of its settings alone."""
     data = read_document(study.path).data
     alone = {key: value for key, value in _ALONE.items() if key in data}
-    changes = dict(_values(data["cases"][setting.case])) if setting.case else {}
+    found = leaves(data["cases"][setting.case]) if setting.case else ()
+    changes = {".".join(key): value for key, value in found if value != {}}  # an empty section sets nothing
     factors = {key: value for key, value in setting.factors.items() if value is not None}  # None: no single value
     texts = {key: _toml_text(value) for key, value in {**changes, **factors}.items()}
     return [f"{key}={value}" for key, value in {**alone, **texts}.items()]
-
-
-def _values(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield values by dotted key."""
-    for key in leaves(data):
-        value: Any = data
-        for part in key:
-            value = value[part]
-        if not isinstance(value, Mapping):  # an empty section sets nothing
-            yield ".".join(key), value
 
 
 def _toml_text(value: Any) -> str:

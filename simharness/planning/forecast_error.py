@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm, t
 
-from simharness.runtime.number_text import fixed
 from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.statistics.intervals import LEVEL as SCENES
 from simharness.statistics.intervals import Interval
@@ -101,5 +100,5 @@ MEASURED = ForecastErrors(ForecastError(0.59, 0.28, 9), ForecastError(0.21, 0.41
 
 def forecast_text(forecast: Interval, *, digits: int = 1) -> str:
     """Return a figure and its interval as text: "96.4 (94.0 to 98.1)"; alone where it has none."""
-    mean, low, high = (fixed(each, digits) for each in (forecast.mean, forecast.low, forecast.high))
-    return f"{mean} ({low} to {high})" if np.isfinite(forecast.low) else mean
+    mean, ends = forecast.texts(digits)
+    return f"{mean} ({ends})" if ends else mean

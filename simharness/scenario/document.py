@@ -89,7 +89,7 @@ def read_document(path: Path | str, *, overrides: Sequence[str] = (), folder: Pa
         locate_files(keys, file.parent if folder is None or file is not path else folder)
         short = "variants" in keys
         _move_variants(keys, file)
-        for key in leaves(keys):
+        for key, _ in leaves(keys):
             set_origin(origins, key, str(file))
         if short:  # messages name the key as it is written
             set_origin(origins, ("variants",), str(file))

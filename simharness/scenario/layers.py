@@ -99,13 +99,13 @@ def nested(key: Key, value: Any) -> dict[str, Any]:
     return value
 
 
-def leaves(data: Mapping[str, Any], above: Key = ()) -> Iterator[Key]:
-    """Yield the keys that have a value, in all sections."""
+def leaves(data: Mapping[str, Any], above: Key = ()) -> Iterator[tuple[Key, Any]]:
+    """Yield the keys of all sections, each with its value; a section is a value where it is empty."""
     for name, value in data.items():
         if isinstance(value, Mapping) and value:
             yield from leaves(value, (*above, name))
         else:
-            yield (*above, name)
+            yield (*above, name), value
 
 
 def set_origin(origins: Origins, key: Key, origin: str) -> None:

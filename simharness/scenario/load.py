@@ -401,14 +401,11 @@ def _without_descriptors(scenario: Scenario, plan: ScenarioPlan) -> list[str]:
     affected = [name for name in scenario.method.variants if without_repair(name) in NEED_DESCRIPTORS]
     if not affected or scenario.appearance.source != "none":
         return []
+    origin = origin_of(("method", "variants"), plan.document.origins, str(plan.document.path))
     return [
-        f"{_origin_of_variants(plan)}: variants: {', '.join(affected)} needs descriptors, which the detections lack; "
+        f"{origin}: variants: {', '.join(affected)} needs descriptors, which the detections lack; "
         'choose appearance.source = "pictures" or "drawn", or another variant'
     ]
-
-
-def _origin_of_variants(plan: ScenarioPlan) -> str:
-    return origin_of(("method", "variants"), plan.document.origins, str(plan.document.path))
 
 
 def fingerprint(scenario: Scenario) -> str:

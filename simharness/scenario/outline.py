@@ -80,13 +80,7 @@ def _axis(axis: Axis) -> list[tuple[str, str]]:
 
 
 def _changes(changes: Mapping[str, Any]) -> str:
-    assignments = []
-    for key in leaves(changes):
-        value: Any = changes
-        for part in key:
-            value = value[part]
-        assignments.append(f"{'.'.join(key)} = {_shown(value)}")
-    return ", ".join(assignments) or "the base"
+    return ", ".join(f"{'.'.join(key)} = {_shown(value)}" for key, value in leaves(changes)) or "the base"
 
 
 def _some(values: Sequence[str]) -> str:

@@ -232,7 +232,7 @@ class SweepReader:
     ) -> tuple[dict[str, Any], layers.Origins]:
         """Return the keys of the file with the changes of a case, and the origins of all keys."""
         origins = dict(self.origins)
-        for key in layers.leaves(changes):
+        for key, _ in layers.leaves(changes):
             layers.set_origin(origins, key, self.origin(("cases", name, *key)))
         return layers.merge_with_presets(data, changes), origins
 

@@ -68,7 +68,7 @@ def explain(
     if mistake["type"] == "missing":
         return f"{origin}: {key} is missing and has no default; give it a value"
     expected, hint = _expected(mistake, location, key, root), _nearest(mistake, location, root)
-    field = _field(location, root)
+    field = field_at(location, root)
     about = f" ({field.description})" if field is not None and field.description else ""
     return f"{origin}: {key}{about}: expected {expected}, got {shown(mistake['input'])}{hint}"
 
@@ -158,7 +158,7 @@ def _wrong_length(
     kind = _list_at(location, root)
     if kind is None or not kind.fixed:
         return ""
-    given, field = mistake["input"], _field(location, root)
+    given, field = mistake["input"], field_at(location, root)
     whole = field is not None and not isinstance(location[-1], int)
     about = (field.description if whole and field is not None else None) or ", ".join(kind.names)
     return (
@@ -258,7 +258,7 @@ def _keys(section: type[BaseModel], prefix: str = "") -> Iterator[str]:
             yield from _keys(nested, f"{prefix}{name}.")
 
 
-def _field(location: Sequence[str | int], root: type[BaseModel]) -> FieldInfo | None:
+def field_at(location: Sequence[str | int], root: type[BaseModel]) -> FieldInfo | None:
     """Return the field at a location, or at the longest part of it that names one."""
     section: type[BaseModel] | None = root
     field = None

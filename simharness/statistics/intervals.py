@@ -3,12 +3,15 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import BeforeValidator
 from scipy.special import gammainccinv, gammaincinv
 
 from mvpose.arrays import Floats
+from simharness.runtime.number_text import NOTHING, fixed, span
 from simharness.statistics.studentized import mean_ends
 
 LEVEL = 0.95
@@ -16,6 +19,9 @@ LEVEL = 0.95
 
 RARE = 5
 """Largest number of scenes with an event for which events are rare, if other scenes have none."""
+
+
+_Number = Annotated[float, BeforeValidator(lambda value: np.nan if value is None else value)]  # NaN is null in JSON
 
 
 @dataclass(frozen=True)
@@ -28,10 +34,16 @@ class Interval:
         n: number of scenes to which the score applies.
     """
 
-    mean: float
-    low: float
-    high: float
+    mean: _Number
+    low: _Number
+    high: _Number
     n: int
+
+    def texts(self, digits: int, factor: float = 1.0) -> tuple[str, str]:
+        """Return the mean times ``factor`` with so many decimals, and the ends, as text: "96.4", "94.0 to 98.1"."""
+        if not np.isfinite(self.mean):
+            return NOTHING, ""
+        return fixed(factor * self.mean, digits), span(factor * self.low, factor * self.high, digits)
 
     def to_json(self) -> dict[str, float]:
         """Return mean, ends and number of scenes by their names in JSON."""

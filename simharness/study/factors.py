@@ -92,16 +92,13 @@ def factors(results: Results, case: str | None = None) -> list[Factor]:
         swept.append(Factor(key, tuple(sorted(values) if numeric else values), numeric, rows, along))
     pooled = {"case": cases_of(results)} if case is None and len(cases_of(results)) > 1 else {}
     grid_of = {} if results.info["one_at_a_time"] else {each.key: each.values for each in swept}
-    return [replace(each, over={**_without(grid_of, each.key), **pooled}) for each in swept]
+    others = {each.key: {key: values for key, values in grid_of.items() if key != each.key} for each in swept}
+    return [replace(each, over={**others[each.key], **pooled}) for each in swept]
 
 
 def factors_by_case(results: Results) -> dict[str, list[Factor]]:
     """Return the factors of each case separately; the factors of a study without cases are under ``""``."""
     return {case: factors(results, case) for case in cases_of(results) or ("",)}
-
-
-def _without(values: Mapping[str, tuple[Any, ...]], key: str) -> dict[str, tuple[Any, ...]]:
-    return {other: each for other, each in values.items() if other != key}
 
 
 def _together(rows: pl.DataFrame, key: str, other: str) -> bool:

@@ -219,13 +219,15 @@ def _run_on_cluster(
     If a worker dies, each of its units may be the cause. These units are therefore run last, one at a time: then the
     cause is certain, and a unit that needs much memory has the machine to itself.
     """
+    from distributed import as_completed
+
     waiting, suspects, alone = iter(units), deque[Unit](), False
     parts = deque[Unit]()  # of units that were split; they run before the waiting units
     together: dict[str, TrialFailure] = {}  # failure of all variants together, by trial
     finished: dict[str, list[TrialSuccess | TrialFailure]] = {}  # results of the parts so far, by trial
     failed: Counter[tuple[str, tuple[str, ...]]] = Counter()
     running: dict[Future[Any], Unit] = {}
-    completed = _completed()
+    completed: Any = as_completed()
 
     def submit(unit: Unit) -> None:
         # A new key each time, because Dask does not run a failed key again.
@@ -267,12 +269,6 @@ def _run_on_cluster(
         finished[unit.trial].append(result)
         if len(finished[unit.trial]) == len(whole.unit.variants):
             yield _join_parts(whole, finished.pop(unit.trial))
-
-
-def _completed() -> Any:
-    from distributed import as_completed
-
-    return as_completed()
 
 
 def _result(future: "Future[Any]", unit: Unit) -> TrialSuccess | TrialFailure:

@@ -87,18 +87,6 @@ class Tables:
     """Tables of a study; their columns are listed in the docstring of this module."""
 
     trials: pl.DataFrame
-    frames: pl.DataFrame
-    people: pl.DataFrame
-    failures: pl.DataFrame
-
-
-@dataclass(frozen=True)
-class Results:
-    """Results of a study."""
-
-    info: Mapping[str, Any]
-    """Content of ``study.json``."""
-    trials: pl.DataFrame
     """a row for each trial and variant."""
     frames: pl.DataFrame
     """a row for each trial, variant and frame."""
@@ -106,6 +94,14 @@ class Results:
     """a row for each trial, variant, frame and true person."""
     failures: pl.DataFrame
     """a row for each failure."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Results(Tables):
+    """Results of a study."""
+
+    info: Mapping[str, Any]
+    """Content of ``study.json``."""
     folder: Path
     """The result folder."""
 
@@ -158,7 +154,7 @@ def read_study(folder: Path | str) -> Results:
     with prefixed(f"{folder}: cannot be read", "; run the study again to write the folder again"):
         info = read_json_object(files[0], what="the description of a study")
         tables = dict(zip(TABLES, map(_read_table, files[1:]), strict=True))
-    return Results(info, folder=folder, **tables)
+    return Results(info=info, folder=folder, **tables)
 
 
 def document(study: Study) -> str:
@@ -180,7 +176,7 @@ def _read_table(file: Path) -> pl.DataFrame:
         return table_of(content)
 
 
-_FIRST = ("trial", "case", "varied", "seed", "variant")
+_FIRST = {"trial": pl.String, "case": pl.String, "varied": pl.String, "seed": pl.Int64, "variant": pl.String}
 
 
 def tables(rows: Sequence[tuple[PlannedTrial, Entry]], factors: Sequence[str]) -> Tables:
@@ -200,19 +196,8 @@ def _trials(rows: Sequence[tuple[PlannedTrial, Entry]], factors: Sequence[str]) 
     texts: dict[str, str] = {}
     for planned, _ in rows:
         texts.setdefault(planned.trial, planned.scenario.model_dump_json())
-    columns: dict[str, pl.Series] = {}
-    for key in _FIRST:
-        values: list[Any] = [
-            {
-                "trial": planned.trial,
-                "case": planned.setting.case,
-                "varied": planned.setting.varied,
-                "seed": planned.seed,
-                "variant": entry.variant,
-            }[key]
-            for planned, entry in rows
-        ]
-        columns[key] = pl.Series(values, dtype=pl.Int64 if key == "seed" else pl.String)
+    head = [(each.trial, each.setting.case, each.setting.varied, each.seed, entry.variant) for each, entry in rows]
+    columns = pl.DataFrame(head, _FIRST, orient="row").to_dict()
     for factor in factors:
         columns[factor] = factor_column([planned.setting.factors[factor] for planned, _ in rows])
     for score in SCORES:

@@ -157,7 +157,7 @@ def _next_values(
     found = tables(rows, study.factors)
     info = {"factors": study.factors, "one_at_a_time": study.one_at_a_time, "variants": study.variants}
     left = {key: most - len(added.get(key, ())) for key in study.factors}
-    return refined_values(Results(info, found.trials, found.frames, found.people, found.failures, folder), left)
+    return refined_values(Results(**vars(found), info=info, folder=folder), left)
 
 
 def run_shard(

@@ -14,22 +14,8 @@ from mvpose.files.archives import arrays_of
 from simharness.detector.detect import Detected
 from simharness.detector.heatmaps import Peaks
 from simharness.scenario.sections.scenario import Scenario
-from simharness.trial.arrays import (
-    Arrays,
-    detection_arrays,
-    detections_of,
-    estimate_arrays,
-    estimates_of,
-    rig_arrays,
-    rig_of_arrays,
-    rows_of_frames,
-    timing_arrays,
-    timings_of,
-    truth_arrays,
-    truth_of,
-    whole_arrays,
-    whole_of,
-)
+from simharness.trial import arrays as plain
+from simharness.trial.arrays import Arrays
 from simharness.trial.stages.detected_sequence import DetectedSequence
 
 
@@ -53,12 +39,12 @@ def pack_detected(detected: DetectedSequence) -> bytes:
     if any(frame.detections.likelihoods is not None for frame in frames):
         return b""
     recording = detected.recording
-    arrays = _prefixed("rig", rig_arrays(detected.rig))
-    arrays |= _prefixed("detections", detection_arrays(recording.detections))
-    arrays |= _prefixed("truth", truth_arrays(detected.time, recording.truth))
+    arrays = _prefixed("rig", plain.rig_arrays(detected.rig))
+    arrays |= _prefixed("detections", plain.detection_arrays(recording.detections))
+    arrays |= _prefixed("truth", plain.truth_arrays(detected.time, recording.truth))
     if all(frame.peaks is not None for frame in frames):
         arrays["rivals"] = np.concatenate([frame.peaks.rivals for frame in frames if frame.peaks is not None])
-    arrays |= _prefixed("whole", whole_arrays([frame.whole for frame in frames]))
+    arrays |= _prefixed("whole", plain.whole_arrays([frame.whole for frame in frames]))
     return _packed(arrays)
 
 
@@ -69,32 +55,25 @@ def unpack_detected(content: bytes, scenario: Scenario) -> DetectedSequence:
         content: from :func:`pack_detected`, not empty.
         scenario: the scenario of the trial, for the parameters of its heat maps.
     """
-    arrays = _unpacked(content)
-    detection = _part("detections", arrays)
-    detections = detections_of(detection)
-    truth_part = _part("truth", arrays)
-    truth = truth_of(truth_part, detection["frame"])
+    arrays = arrays_of(content)
+    detection, truth_part = _part("detections", arrays), _part("truth", arrays)
+    detections = plain.detections_of(detection)
+    truth = plain.truth_of(truth_part, detection["frame"])
     frames = []
-    rows = rows_of_frames(detection["frame"], len(detections))
-    whole = whole_of(_part("whole", arrays), detections)
-    for frame_detections, frame_truth, row, frame_whole in zip(detections, truth, rows, whole, strict=True):
+    rows = plain.rows_of_frames(detection["frame"], len(detections))
+    whole = plain.whole_of(_part("whole", arrays), detections)
+    for found, seen, row, frame_whole in zip(detections, truth, rows, whole, strict=True):
         peaks = None
         if "rivals" in arrays:
-            rivals = arrays["rivals"][row]
-            peaks = Peaks(
-                frame_detections.boxes,
-                frame_detections.keypoints,
-                frame_detections.scores,
-                rivals,
-                scenario.detector.heatmaps,
-            )
-        frames.append(Detected(frame_detections, frame_truth, peaks, frame_whole))
-    return DetectedSequence(truth_part["time"], rig_of_arrays(_part("rig", arrays)), tuple(frames))
+            rivals, head = arrays["rivals"][row], scenario.detector.heatmaps
+            peaks = Peaks(found.boxes, found.keypoints, found.scores, rivals, head)
+        frames.append(Detected(found, seen, peaks, frame_whole))
+    return DetectedSequence(truth_part["time"], plain.rig_of_arrays(_part("rig", arrays)), tuple(frames))
 
 
 def pack_estimates(estimates: Sequence[Estimate]) -> bytes:
     """Pack the estimates of one variant with their timings; relaxed permutation matrices are left out."""
-    return _packed({**estimate_arrays(estimates), **timing_arrays(estimates)})
+    return _packed({**plain.estimate_arrays(estimates), **plain.timing_arrays(estimates)})
 
 
 def unpack_estimates(content: bytes, detected: DetectedSequence) -> tuple[Estimate, ...]:
@@ -104,20 +83,16 @@ def unpack_estimates(content: bytes, detected: DetectedSequence) -> tuple[Estima
         content: from :func:`pack_estimates`.
         detected: the detections from which they were made.
     """
-    arrays = _unpacked(content)
+    arrays = arrays_of(content)
     counts = [len(frame.detections) for frame in detected.frames]
     frame = np.repeat(np.arange(len(counts)), counts)
-    return tuple(estimates_of(arrays, frame, timings_of(arrays)))
+    return tuple(plain.estimates_of(arrays, frame, plain.timings_of(arrays)))
 
 
 def _packed(arrays: Arrays) -> bytes:
     buffer = io.BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, **arrays)
     return buffer.getvalue()
-
-
-def _unpacked(content: bytes) -> Arrays:
-    return arrays_of(content)
 
 
 def _prefixed(name: str, arrays: Arrays) -> Arrays:

@@ -25,6 +25,7 @@ _SKELETONS = {skeleton.name: skeleton for skeleton in (COCO17, SHELF14)}
 _OF_DETECTIONS = ("view", "keypoints", "scores", "boxes", "box_scores")
 _OF_FRAMES = ("joints", "pixels", "visibility", "boxes")
 _OF_ERRORS = ("person", "error")
+_OPTIONAL = ("covariance", "freedom", "ids")  # of estimates
 
 
 def rig_arrays(rig: Rig) -> Arrays:
@@ -72,20 +73,13 @@ def detection_arrays(detections: Sequence[Detections]) -> Arrays:
 
 def detections_of(arrays: Arrays) -> tuple[Detections, ...]:
     """Restore detections from :func:`detection_arrays`, one for each frame."""
-    skeleton = _SKELETONS[str(arrays["skeleton"])]
-    return tuple(
-        Detections(
-            arrays["view"][rows],
-            arrays["keypoints"][rows],
-            arrays["scores"][rows],
-            arrays["boxes"][rows],
-            arrays["box_scores"][rows],
-            skeleton,
-            arrays["descriptors"][rows] if "descriptors" in arrays else None,
-            time=arrays["time"][index] if "time" in arrays else None,
-        )
-        for index, rows in enumerate(rows_of_frames(arrays["frame"], int(arrays["frames"])))
-    )
+    skeleton, detections = _SKELETONS[str(arrays["skeleton"])], []
+    keys = [key for key in (*_OF_DETECTIONS, "descriptors") if key in arrays]
+    for index, rows in enumerate(rows_of_frames(arrays["frame"], int(arrays["frames"]))):
+        fields: dict[str, Any] = {key: arrays[key][rows] for key in keys}
+        time = arrays["time"][index] if "time" in arrays else None
+        detections.append(Detections(**fields, skeleton=skeleton, time=time))
+    return tuple(detections)
 
 
 def truth_arrays(time: NDArray[np.float64], truth: Sequence[Truth]) -> Arrays:
@@ -134,21 +128,12 @@ def whole_of(arrays: Arrays, detections: Sequence[Detections]) -> list[WholeFram
         return [None] * len(detections)
     skeleton = skeleton_by_name(str(arrays["skeleton"]))
     rows = rows_of_frames(_frame_index(map(len, detections)), len(detections))
-    return [
-        WholeFrame(
-            Detections(
-                body.view,
-                arrays["keypoints"][row],
-                arrays["scores"][row],
-                body.boxes,
-                body.box_scores,
-                skeleton,
-                time=body.time,
-            ),
-            joints,
-        )
-        for body, row, joints in zip(detections, rows, arrays["joints"], strict=True)
-    ]
+    whole: list[WholeFrame | None] = []
+    for body, row, joints in zip(detections, rows, arrays["joints"], strict=True):
+        keypoints, scores = arrays["keypoints"][row], arrays["scores"][row]
+        found = Detections(body.view, keypoints, scores, body.boxes, body.box_scores, skeleton, time=body.time)
+        whole.append(WholeFrame(found, joints))
+    return whole
 
 
 def estimate_arrays(estimates: Sequence[Estimate]) -> Arrays:
@@ -157,8 +142,7 @@ def estimate_arrays(estimates: Sequence[Estimate]) -> Arrays:
     known; ``labels`` (n,) of the detections; ``iterations``, ``residuals``, ``objective`` and ``converged`` of the
     matching of each frame.
     """
-    optional = ("covariance", "freedom", "ids")
-    known = [key for key in optional if all(getattr(estimate, key) is not None for estimate in estimates)]
+    known = [key for key in _OPTIONAL if all(getattr(estimate, key) is not None for estimate in estimates)]
     keys = ("joints", "scores", *known)
     matchings = [estimate.matching for estimate in estimates]
     return {
@@ -189,15 +173,12 @@ def estimates_of(
     counts = arrays.get("label_counts")
     labelled = detected if counts is None else np.repeat(np.arange(frames), counts)
     parts = zip(rows_of_frames(arrays["frame"], frames), rows_of_frames(labelled, frames), strict=True)
-    covariance, freedom, ids = arrays.get("covariance"), arrays.get("freedom"), arrays.get("ids")
+    keys = [key for key in ("joints", "scores", *_OPTIONAL) if key in arrays]
     time = arrays.get("time", np.full(frames, np.nan))
     for index, (people, labels) in enumerate(parts):
         primal, dual = arrays["residuals"][index]
         yield Estimate(
-            joints=arrays["joints"][people],
-            scores=arrays["scores"][people],
-            covariance=None if covariance is None else covariance[people],
-            freedom=None if freedom is None else freedom[people],
+            **{key: arrays[key][people] for key in keys},
             matching=Matching(
                 labels=arrays["labels"][labels],
                 iterations=int(arrays["iterations"][index]),
@@ -206,7 +187,6 @@ def estimates_of(
                 converged=bool(arrays["converged"][index]),
             ),
             timings=dict(timings[index]) if index < len(timings) else {},
-            ids=None if ids is None else ids[people],
             time=None if np.isnan(time[index]) else float(time[index]),
         )
 

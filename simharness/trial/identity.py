@@ -109,7 +109,8 @@ def code() -> Code:
     )
 
 
-def versions() -> dict[str, str]:
+@functools.cache
+def versions() -> Mapping[str, str]:
     """Return the version of each of :data:`PACKAGES`, "none" where it is not installed."""
     return {name: _version(name) for name in PACKAGES}
 
@@ -125,7 +126,8 @@ def trial_identity(scenario: Scenario) -> str:
     for *sections, key in FILE_KEYS:  # by content, below
         functools.reduce(dict.__getitem__, sections, values)[key] = ""
     content = {key: _content(files) for key, files in _files(scenario).items()}
-    return _digest({"scenario": values, "files": content, "code": code().simulation, "versions": _versions()})
+    made_by = {"code": code().simulation, "versions": list(versions().items())}
+    return _digest({"scenario": values, "files": content, **made_by})
 
 
 def entry_identity(trial: str, variant: str, estimator: str = "", *, lag: float | None = None) -> str:
@@ -226,14 +228,11 @@ def _beside(file: Path, *suffixes: str) -> list[Path]:
 
 def _content(files: list[Path]) -> dict[str, str | None]:
     """Return digests by name; None for a missing file."""
-    content: dict[str, str | None] = {}
-    for file in files:
-        if os.path.isfile(file):
-            stat = file.stat()
-            content[file.name] = _digest_of_file(file, stat.st_size, stat.st_mtime_ns)
-        else:
-            content[file.name] = None
-    return content
+    stats = {file: file.stat() if os.path.isfile(file) else None for file in files}
+    return {
+        file.name: None if stat is None else _digest_of_file(file, stat.st_size, stat.st_mtime_ns)
+        for file, stat in stats.items()
+    }
 
 
 @functools.lru_cache(maxsize=256)
@@ -245,11 +244,6 @@ def _digest_of_file(file: Path, size: int, changed: int) -> str:
 
 def _digest(value: Any) -> str:
     return hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=_SIZE).hexdigest()
-
-
-@functools.cache
-def _versions() -> tuple[tuple[str, str], ...]:
-    return tuple(versions().items())
 
 
 def _version(name: str) -> str:

@@ -59,17 +59,8 @@ from simharness.runtime.parquet_tables import table_of
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_files import dumps
-from simharness.trial.arrays import (
-    Arrays,
-    detection_arrays,
-    detections_of,
-    estimate_arrays,
-    estimates_of,
-    rig_arrays,
-    rig_of_arrays,
-    truth_arrays,
-    truth_of,
-)
+from simharness.trial import arrays as plain
+from simharness.trial.arrays import Arrays
 from simharness.types.truth import Truth
 
 _WHAT = "a file of a run"
@@ -110,9 +101,9 @@ def write_run(record: Record, folder: Path) -> None:
     """Write the files of a run into an existing folder."""
     (folder / "scenario.toml").write_text(dumps(record.scenario), encoding="utf-8")
     tables = {
-        "rig": rig_arrays(record.rig),
-        "detections": detection_arrays(record.detections),
-        "truth": truth_arrays(record.time, record.truth),
+        "rig": plain.rig_arrays(record.rig),
+        "detections": plain.detection_arrays(record.detections),
+        "truth": plain.truth_arrays(record.time, record.truth),
         "estimates": _estimate_arrays(record.estimates),
     }
     for name, arrays in tables.items():
@@ -145,10 +136,10 @@ def read_run(folder: Path | str) -> Record:
         scores, timings = table_of(contents["scores.parquet"]), table_of(contents["timings.parquet"])
         return Record(
             scenario=scenario,
-            rig=rig_of_arrays(rig),
+            rig=plain.rig_of_arrays(rig),
             time=true["time"],
-            detections=detections_of(detected),
-            truth=truth_of(true, detected["frame"]),
+            detections=plain.detections_of(detected),
+            truth=plain.truth_of(true, detected["frame"]),
             estimates=_estimates(estimated, detected["frame"], timings),
             scores=scores,
             summary=summary,
@@ -179,7 +170,8 @@ def timings_table(estimates: Mapping[str, Sequence[Estimate]]) -> pl.DataFrame:
 def _estimate_arrays(estimates: Mapping[str, Sequence[Estimate]]) -> Arrays:
     arrays: Arrays = {"variants": np.array(list(estimates))}
     for variant, each in estimates.items():
-        arrays |= {f"{variant}/{key}": value for key, value in estimate_arrays(each).items() if key != "label_counts"}
+        found = plain.estimate_arrays(each)
+        arrays |= {f"{variant}/{key}": value for key, value in found.items() if key != "label_counts"}
     return arrays
 
 
@@ -188,7 +180,7 @@ def _estimates(arrays: Arrays, detected: NDArray[np.int64], timings: pl.DataFram
     for variant in map(str, arrays["variants"]):
         fields = {key.removeprefix(f"{variant}/"): arrays[key] for key in arrays if key.startswith(f"{variant}/")}
         seconds = _seconds_by_frame(timings.filter(pl.col("variant") == variant))
-        estimates[variant] = tuple(estimates_of(fields, detected, seconds))
+        estimates[variant] = tuple(plain.estimates_of(fields, detected, seconds))
     return estimates
 
 

@@ -15,7 +15,7 @@ import polars as pl
 import threadpoolctl
 
 from mvpose import Estimate
-from mvpose.commands.progress import Reporter, Silence, Stages
+from mvpose.commands.progress import Reporter, Silence, Stages, counted
 from mvpose.estimators import Estimator
 from mvpose.presets import PRESETS
 from mvpose.wholebody import complete
@@ -210,13 +210,11 @@ def _with_feet_and_hands(result: TrialResult, stages: Stages) -> dict[str, tuple
     frames = [frame.whole for frame in result.detected.frames]
     if any(frame is None for frame in frames):
         return {}
-    whole = {}
+    whole, rig = {}, result.detected.rig
     with stages.stage("whole body", len(result.estimates)) as advance:
-        for variant, estimates in result.estimates.items():
+        for variant, estimates in counted(result.estimates.items(), advance):
             pairs = zip(frames, estimates, strict=True)
-            rig = result.detected.rig
             whole[variant] = tuple(complete(rig, frame.detections, body) for frame, body in pairs if frame is not None)
-            advance(1)
     return whole
 
 
@@ -234,12 +232,11 @@ def _whole_body(result: TrialResult, variant: str) -> WholeBodyInput | None:
 
 
 def _score(result: TrialResult, stages: Stages) -> dict[str, Assessment]:
-    assessments = {}
     with stages.stage("score", len(result.estimates)) as advance:
-        for variant, estimates in result.estimates.items():
-            assessments[variant] = assess(result.recording, estimates, whole=_whole_body(result, variant))
-            advance(1)
-    return assessments
+        return {
+            variant: assess(result.recording, estimates, whole=_whole_body(result, variant))
+            for variant, estimates in counted(result.estimates.items(), advance)
+        }
 
 
 def _find_failures(
@@ -251,7 +248,7 @@ def _find_failures(
 ) -> dict[str, pl.DataFrame]:
     tables = {}
     with stages.stage("blame" if blamed else "classify", len(result.estimates)) as advance:
-        for variant, estimates in result.estimates.items():
+        for variant, estimates in counted(result.estimates.items(), advance):
             if variant in known:
                 tables[variant] = known[variant]
             elif blamed:
@@ -262,5 +259,4 @@ def _find_failures(
                 tables[variant] = failure_table(blamed_failures)
             else:
                 tables[variant] = failure_table(find_failures(result.recording, estimates))
-            advance(1)
     return tables

@@ -3,6 +3,7 @@
 import json
 import shlex
 import time
+from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -231,14 +232,14 @@ class TestBadInput:
         """Write a baseline with made-up scores, without running the suite."""
         from simharness.gate.baseline import KEPT, Measurement, write_baseline
         from simharness.gate.suite import fingerprint
-        from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
+        from simharness.gate.trial_command import TrialKey, setting_name
         from simharness.scenario.load import load_study
 
         (tmp_path / "small.toml").write_text(SMALL)
         study = load_study(tmp_path / "small.toml")
         scores = {
             TrialKey(setting_name(setting, study), seed, "fast"): dict.fromkeys(KEPT, 1.0)
-            for setting, seed in settings_at_seeds(study)
+            for setting, seed in product(study.settings, study.seeds)
         }
         write_baseline(Measurement("small", fingerprint(study), "1", "zen", scores), tmp_path / "small.json")
         return tmp_path / "small.json"

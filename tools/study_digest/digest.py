@@ -17,11 +17,12 @@ from mvpose.commands.output_files import write_text
 from mvpose.commands.progress import duration
 from mvpose.report.documents import fill_template
 from mvpose.report.svg_plots import plot_sheet
+from simharness.outputs import texts_of
 from simharness.outputs.study import plots, tables
-from simharness.outputs.study.curves import axis_label, axis_names, panels
-from simharness.outputs.study.plots import mean_over, short
+from simharness.outputs.study.curves import axis_label, panels
+from simharness.outputs.study.plots import mean_over
 from simharness.outputs.study.tables import OVER_TIME
-from simharness.runtime.number_text import fixed
+from simharness.runtime.number_text import fixed, short
 from simharness.scoring.catalogue import AP_MM, SCORES
 from simharness.scoring.failure_classes import FailureKind
 from simharness.scoring.stage_blame import Stage
@@ -281,7 +282,7 @@ def _factor_parts(key: str, parts: Mapping[str, Mapping[str, Any]]) -> tuple[str
                 notes += [mean_over(factor["over"])] if factor["over"] else []
                 note = f" ({'; '.join(notes)})" if notes else ""
                 by_case[f"`{key}`{f', case {case}' if case else ''}{note}"] = factor
-    return f": {axis_label(key)}" if key in axis_names() else "", by_case
+    return f": {axis_label(key)}" if key in texts_of("axis_names") else "", by_case
 
 
 def _rate(failed: Mapping[str, Any], column: str, key: str) -> str:

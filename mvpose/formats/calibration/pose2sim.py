@@ -78,15 +78,11 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
     )
 
 
-def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
-    return read_calibration(path, only=only)
-
-
 FORMAT = CalibrationFormat(
     "Pose2Sim (TOML)",
     _EXPECTS,
     lambda file: any(isinstance(entry, dict) and "matrix" in entry for entry in (file.toml or {}).values()),
-    _read,
+    lambda path, *, size, only: read_calibration(path, only=only),
     write_calibration,
 )
 

@@ -4,7 +4,6 @@ Each camera has the pixels of its picture (``fov_video``), intrinsics in 64ths o
 model, its centre in millimetres, and a rotation whose rows are the camera's axes in the world: right, up and backwards.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from mvpose.files.input_files import CALIBRATION, read_bytes
-from mvpose.files.message_text import one_line
+from mvpose.files.message_text import one_line, prefixed
 from mvpose.formats.calibration.calibration_file import CalibrationFormat
 from mvpose.formats.calibration.camera_entry import camera
 
@@ -74,22 +73,14 @@ def _values(entry: ElementTree.Element, name: str, part: str, keys: tuple[str, .
     found = entry.find(part)
     if found is None:
         raise ValueError(f"camera {name!r} lacks <{part}>")
-    try:
+    with prefixed(f"camera {name!r}: <{part}>", damage=(KeyError,)):
         return [float(found.attrib[key]) for key in keys]
-    except KeyError as error:
-        raise ValueError(f"camera {name!r}: <{part}> lacks {error}") from None
-    except ValueError as error:
-        raise ValueError(f"camera {name!r}: <{part}>: {error}") from None
-
-
-def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
-    return read_calibration(path)
 
 
 FORMAT = CalibrationFormat(
     "Qualisys (XML)",
     _EXPECTS,
     lambda file: file.content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and b"<fov_video" in file.content,
-    _read,
+    lambda path, *, size, only: read_calibration(path),  # noqa: PLW0108  the file has sizes, and all cameras are read
     unit="mm",
 )

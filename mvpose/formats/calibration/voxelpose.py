@@ -15,7 +15,7 @@ from mvpose.checks import as_array
 from mvpose.files.input_files import CALIBRATION, read_json_object
 from mvpose.files.message_text import prefixed
 from mvpose.formats.calibration.calibration_file import CalibrationFormat
-from mvpose.formats.calibration.camera_entry import check_names
+from mvpose.formats.calibration.camera_entry import camera, check_names
 
 _KEYS = ("fx", "fy", "cx", "cy", "R", "T", "k", "p")
 _EXPECTS = "an object of cameras, each with " + ", ".join(_KEYS)
@@ -58,19 +58,17 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
     """
     check_names(rig)
     entries = {}
-    for camera in rig:
-        if camera.K[0, 1]:
-            raise ValueError(
-                f"camera {camera.name!r}: a VoxelPose calibration cannot hold a skew, got {camera.K[0, 1]:g}"
-            )
-        k1, k2, p1, p2, k3 = camera.distortion.tolist()
-        entries[camera.name] = {
-            "fx": camera.K[0, 0],
-            "fy": camera.K[1, 1],
-            "cx": camera.K[0, 2],
-            "cy": camera.K[1, 2],
-            "R": camera.R.tolist(),
-            "T": (1000.0 * camera.center)[:, None].tolist(),
+    for each in rig:
+        if each.K[0, 1]:
+            raise ValueError(f"camera {each.name!r}: a VoxelPose calibration cannot hold a skew, got {each.K[0, 1]:g}")
+        k1, k2, p1, p2, k3 = each.distortion.tolist()
+        entries[each.name] = {
+            "fx": each.K[0, 0],
+            "fy": each.K[1, 1],
+            "cx": each.K[0, 2],
+            "cy": each.K[1, 2],
+            "R": each.R.tolist(),
+            "T": (1000.0 * each.center)[:, None].tolist(),
             "k": [[k1], [k2], [k3]],
             "p": [[p1], [p2]],
         }
@@ -100,12 +98,6 @@ def _camera(name: str, entry: dict[str, Any], size: tuple[int, int]) -> Camera:
     fx, fy, cx, cy = (float(as_array(entry[key], (), f"camera {name!r}: {key}")) for key in ("fx", "fy", "cx", "cy"))
     k1, k2, k3 = as_array(np.ravel(entry["k"]), (3,), f"camera {name!r}: k")
     p1, p2 = as_array(np.ravel(entry["p"]), (2,), f"camera {name!r}: p")
-    R = as_array(entry["R"], (3, 3), f"camera {name!r}: R")
-    return Camera(
-        K=np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
-        R=R,
-        t=-R @ _center(name, entry) / 1000.0,
-        distortion=np.array([k1, k2, p1, p2, k3]),  # OpenCV's order
-        size=size,
-        name=name,
-    )
+    R, K = as_array(entry["R"], (3, 3), f"camera {name!r}: R"), [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
+    terms = (k1, k2, p1, p2, k3)  # OpenCV's order
+    return camera(name, K=K, R=R, t=-R @ _center(name, entry) / 1000.0, terms=terms, size=size)

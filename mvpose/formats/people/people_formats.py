@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import natural_order
@@ -51,36 +52,50 @@ class PeopleFormat:
     """Packages that it imports."""
     install: str = "mvpose[recordings]"
     """What ``pip install`` needs for these packages."""
+    parts: Literal["frames", "people", "none"] = "none"
+    """What can be written one after the other of a long recording: frames are appended, people have files; "none": all
+    must be in memory."""
+    covariance: bool = True
+    """Whether it uses covariances, which take most of the memory."""
 
 
 FORMATS: dict[str, PeopleFormat] = {
     "parquet": PeopleFormat(
-        "poses.parquet", people_tables.write_parquet, people_tables.read, "poses.parquet", requires=("polars",)
+        "poses.parquet",
+        people_tables.write_parquet,
+        people_tables.read,
+        "poses.parquet",
+        requires=("polars",),
+        parts="frames",
     ),
-    "json": PeopleFormat("people.json", people_json.write, people_json.read, "people.json"),
-    "npz": PeopleFormat("people.npz", people_npz.write, people_npz.read, "people.npz"),
-    "csv": PeopleFormat("poses.csv", people_tables.write_csv, people_tables.read, "poses.csv", requires=("polars",)),
+    "json": PeopleFormat("people.json", people_json.write, people_json.read, "people.json", parts="frames"),
+    "npz": PeopleFormat("people.npz", people_npz.write, people_npz.read, "people.npz", covariance=False),
+    "csv": PeopleFormat(
+        "poses.csv", people_tables.write_csv, people_tables.read, "poses.csv", requires=("polars",), parts="frames"
+    ),
     "panoptic": PeopleFormat(
-        "hdPose3d/body3DScene_FRAME.json", panoptic_poses.write, panoptic_poses.read, "body3DScene_*.json", True
+        "hdPose3d/body3DScene_FRAME.json",
+        panoptic_poses.write,
+        panoptic_poses.read,
+        "body3DScene_*.json",
+        True,
+        parts="frames",
     ),
-    "trc": PeopleFormat("person_ID.trc", trc.write, trc.read, "*.trc"),
-    "c3d": PeopleFormat("person_ID.c3d, or people.c3d", c3d.write, c3d.read, "*.c3d", requires=("c3d",)),
+    "trc": PeopleFormat("person_ID.trc", trc.write, trc.read, "*.trc", parts="people", covariance=False),
+    "c3d": PeopleFormat(
+        "person_ID.c3d, or people.c3d", c3d.write, c3d.read, "*.c3d", requires=("c3d",), parts="people"
+    ),
     "actors-mat": PeopleFormat("actorsGT.mat", read=actors_mat.read, found="*.mat"),
-    "bvh": PeopleFormat("person_ID.bvh", bvh.write),
+    "bvh": PeopleFormat("person_ID.bvh", bvh.write, parts="people"),
     "gltf": PeopleFormat("people.glb", gltf.write),
     "opensim": PeopleFormat(
         "person_ID_scale.xml, person_ID_ik.xml, opensim_markers.xml", opensim.write_setup, requires=("jinja2",)
     ),
-    "mot": PeopleFormat("person_ID.mot", opensim.write_mot),
-    "angles": PeopleFormat("person_ID_angles.csv", opensim.write_angles),
-    "lengths": PeopleFormat("bone_lengths.csv", people_tables.write_lengths),
+    "mot": PeopleFormat("person_ID.mot", opensim.write_mot, parts="people"),
+    "angles": PeopleFormat("person_ID_angles.csv", opensim.write_angles, parts="people"),
+    "lengths": PeopleFormat("bone_lengths.csv", people_tables.write_lengths, parts="people"),
 }
 """Registered formats by name. Of a folder with files of several formats the first one is read."""
-
-# Written some frames after others, what follows is appended; one person after the other; others need all in memory.
-_BY_FRAMES = ("parquet", "json", "csv", "panoptic")
-_BY_PERSON = ("trc", "c3d", "bvh", "mot", "angles", "lengths")
-_WITHOUT_ERRORS = ("trc", "npz")  # formats that do not use covariances, which take most of the memory
 
 
 def register(name: str, added: PeopleFormat) -> None:
@@ -230,13 +245,13 @@ def write_parts(
         progress: called with the number of frames that were written since the last call.
     """
     for name in formats:
-        write, ids = FORMATS[name].write, parts.ids.tolist()
+        kind, ids = FORMATS[name], parts.ids.tolist()
+        write, covariance = kind.write, kind.covariance
         assert write is not None, "the names are checked"
-        covariance = name not in _WITHOUT_ERRORS
         given, count = parts.parts(), parts.count
-        if name in _BY_PERSON and not (name == "c3d" and options.together):
+        if kind.parts == "people" and not (name == "c3d" and options.together):
             given, count = (parts.whole([identity], covariance=covariance) for identity in ids), len(ids)
-        elif name not in _BY_FRAMES:
+        elif kind.parts != "frames":
             given, count = iter([parts.whole(covariance=covariance)]), 1
         pieces: list[Path] = []
         for row, people in enumerate(given):
@@ -246,6 +261,6 @@ def write_parts(
                 with path.open("ab") as opened:
                     opened.write(content)
                 pieces.append(path)
-            progress(people.frames if name in _BY_FRAMES else parts.frames // count)
+            progress(people.frames if kind.parts == "frames" else parts.frames // count)
         if name == "parquet":
             people_tables.join_parquet(pieces, folder / file)

@@ -14,7 +14,7 @@ import numpy as np
 
 from mvpose.checks import as_array
 from mvpose.files.input_files import read_json_object
-from mvpose.files.message_text import one_line
+from mvpose.files.message_text import prefixed
 from mvpose.formats.joint_names import JointNames, skeleton_of
 from mvpose.formats.people.people_files import AXES, Export, PeopleFiles
 from mvpose.recording import People
@@ -66,12 +66,8 @@ def read(files: PeopleFiles) -> People:
     """
     path = files.single()
     content = read_json_object(path, what=_WHAT)
-    try:
+    with prefixed(path, f"; expected {_WHAT}", damage=(KeyError, TypeError, IndexError, OverflowError)):
         return _people(content, files)
-    except (KeyError, TypeError, IndexError) as error:
-        raise ValueError(one_line(f"{path}: {type(error).__name__}: {error}; expected {_WHAT}")) from None
-    except (ValueError, OverflowError) as error:
-        raise ValueError(one_line(f"{path}: {error}; expected {_WHAT}")) from None
 
 
 def _people(content: dict[str, Any], files: PeopleFiles) -> People:

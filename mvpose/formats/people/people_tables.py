@@ -14,7 +14,7 @@ import numpy as np
 
 from mvpose.arrays import Floats, Integers
 from mvpose.files.input_files import TABLE, read_bytes, read_json_object
-from mvpose.files.message_text import listed, one_line
+from mvpose.files.message_text import listed, one_line, prefixed
 from mvpose.formats.joint_names import JointNames, skeleton_of
 from mvpose.formats.people.people_files import Export, PeopleFiles
 from mvpose.recording import PERIOD, People
@@ -142,10 +142,8 @@ def read(files: PeopleFiles) -> People:
         for name, (row, other) in _COVARIANCE.items():
             covariance[rows, who, joint, row, other] = covariance[rows, who, joint, other, row] = values[f"cov_{name}"]
         covariance = files.axes("z") @ covariance @ files.axes("z").T
-    try:
+    with prefixed(file):
         return People(_times(rows, values["time"], shape[0]), ids, joints, scores, covariance, skeleton)
-    except ValueError as error:
-        raise ValueError(one_line(f"{file}: {error}")) from None
 
 
 def _skeleton(file: Path, names: Sequence[str | None]) -> Skeleton:

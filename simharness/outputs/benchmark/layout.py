@@ -15,7 +15,6 @@ even where they are hidden; the dataset's mark of an undefined joint (0 0 0 -1) 
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +22,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
-from mvpose.files.input_files import parse_toml
 from mvpose.formats.joint_names import KNOWN
 from mvpose.skeleton import COCO17, PANOPTIC19
 from mvpose.wholebody import skeleton_by_name
+from simharness.outputs import texts_of
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.identity import provenance
 from simharness.trial.stages.build_trial import Trial
@@ -138,12 +137,6 @@ def confidences(visibility: ArrayLike) -> Floats:
     return np.select([seen >= 2, seen == 1], [two, one], np.where(person_seen, hidden, unseen))
 
 
-@cache
-def _described() -> dict[str, Any]:
-    """Return what a manifest says of its files: units, axes, contents."""
-    return parse_toml(Path(__file__).parents[1].joinpath("data", "manifest.toml").read_text(encoding="utf-8"))
-
-
 def manifest(
     trial: Trial,
     *,
@@ -185,8 +178,9 @@ def manifest(
             "truth": "truth.npz",
             "exact": "exact.npz",
         },
-        **{key: _described()[key] for key in ("units", "axes", "calibration", "bodies")},
-        "confidence": {"joint, by the number of pictures that show it": CONFIDENCES, **_described()["confidence"]},
+        **{key: texts_of("manifest")[key] for key in ("units", "axes", "calibration", "bodies")},
+        "confidence": {"joint, by the number of pictures that show it": CONFIDENCES}
+        | texts_of("manifest")["confidence"],
         "skeletons": {
             "joints19": PANOPTIC19.joints,
             "pose_keypoints_2d": KNOWN["body25"].joints,
@@ -202,7 +196,7 @@ def manifest(
 def _made(scenario: Scenario) -> str:
     """Say which joints of the detections were not detected, but made or missing."""
     names = () if scenario.detector.skeleton == COCO17.name else skeleton_by_name(scenario.detector.skeleton).joints
-    parts = [] if {"neck", "mid_hip"} <= set(names) else [_described()["made"]]
+    parts = [] if {"neck", "mid_hip"} <= set(names) else [texts_of("manifest")["made"]]
     return "; ".join([*parts, "feet are as detected" if "left_heel" in names else "feet are missing"])
 
 

@@ -10,7 +10,6 @@ from markupsafe import Markup
 from mvpose import Camera
 from mvpose.arrays import Floats
 from mvpose.report.documents import fill_template
-from mvpose.report.tables import NOTHING
 from simharness.outputs import TEMPLATES
 from simharness.outputs.planning.rehearsal_plots import (
     MapColors,
@@ -69,7 +68,7 @@ def render_rehearsal(rehearsal: Rehearsal, *, provenance: Mapping[str, Any]) -> 
         subset_curve=Markup(subset_curve(rehearsal, name="sets")) if every else None,
         fixed=fixed,
         signed=signed,
-        cell=_cell,
+        cell=Interval.texts,
         looks=_direction,
         command=provenance.get("command") or "",
         provenance=provenance_sentence(provenance),
@@ -111,11 +110,3 @@ def _direction(camera: Camera) -> str:
     down = float(np.degrees(np.arcsin(np.clip(-z, -1.0, 1.0))))
     tilt = f"{abs(down):.0f}° {'down' if down >= 0 else 'up'}"
     return tilt if np.hypot(x, y) < 1e-3 else f"{np.degrees(np.arctan2(y, x)) % 360:.0f}°, {tilt}"
-
-
-def _cell(value: Interval, digits: int) -> tuple[str, str]:
-    """Return a number and its interval in small print."""
-    if not np.isfinite(value.mean):
-        return NOTHING, ""
-    ends = f"{fixed(value.low, digits)} to {fixed(value.high, digits)}" if np.isfinite(value.low) else ""
-    return fixed(value.mean, digits), ends

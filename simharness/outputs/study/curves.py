@@ -7,19 +7,17 @@ a sentence, and by cause in the worst setting.
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import polars as pl
-from pydantic import BaseModel
 
 from mvpose.arrays import Floats
 from mvpose.commands.progress import Reporter
-from mvpose.files.input_files import parse_toml
-from simharness.runtime.number_text import fixed
+from simharness.outputs import texts_of
+from simharness.runtime.number_text import fixed, short
 from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.validation_messages import field_at
 from simharness.scoring.catalogue import SCORES, ScoreInfo
 from simharness.statistics.breaking_points import BreakingPoint
 from simharness.statistics.intervals import Interval, mean_interval
@@ -50,12 +48,6 @@ def grid(first: Factor, second: Factor, variant: str, score: str) -> Floats | No
     )
 
 
-@cache
-def axis_names() -> Mapping[str, str]:
-    """Return the names of the keys that the studies of this project sweep."""
-    return parse_toml((Path(__file__).parents[1] / "data" / "axis_names.toml").read_text(encoding="utf-8"))
-
-
 _UNITS = (  # patterns in descriptions of keys, and the unit of each; the first match counts
     (r"degrees per minute", "degrees per minute"),
     (r"metres per minute", "m per minute"),
@@ -71,30 +63,20 @@ _UNITS = (  # patterns in descriptions of keys, and the unit of each; the first 
 
 
 def axis_label(key: str) -> str:
-    """Return the axis label of a key: its name in :func:`axis_names`, else itself, with the unit of its values."""
+    """Return the axis label of a key: its name in ``data/axis_names.toml``, or itself, with the unit of its values."""
     unit = unit_of(key)
-    name = axis_names().get(key, key)
+    name = texts_of("axis_names").get(key, key)
     return f"{name}, {unit}" if unit else name
 
 
 def unit_of(key: str) -> str:
     """Return the unit in the scenario's description of a dotted key; empty where the description has none."""
-    description = _description(key)
+    field = field_at(key.split("."), Scenario)  # None for keys that are not in a scenario, such as a profile's name
+    description = "" if field is None else field.description or ""
     return next((unit for pattern, unit in _UNITS if re.search(rf"\b(?:{pattern})\b", description)), "")
 
 
-def _description(key: str) -> str:
-    """Return the description of a scenario key; empty for keys that are not in a scenario, such as a profile's name."""
-    section: object = Scenario
-    description = None
-    for part in key.split("."):
-        if not (isinstance(section, type) and issubclass(section, BaseModel)) or part not in section.model_fields:
-            return ""
-        field = section.model_fields[part]
-        section, description = field.annotation, field.description
-    return description or ""
-
-
+_DIGITS = 3  # of a value of a factor
 _ALIKE = 0.02  # relative difference of breaking points that one number describes
 
 
@@ -152,7 +134,7 @@ def finding(factor: Factor, variants: Sequence[str], score: str) -> str:
     points = {each.variant: each.point for each in found if each.point is not None and each.point.value is not None}
     if found[0].point is None or (found[0].at_best.mean == found[0].at_worst.mean and not points):
         return _ends(found[0], info)
-    low, high = short(factor.values[0]), short(factor.values[-1])
+    low, high = short(factor.values[0], _DIGITS), short(factor.values[-1], _DIGITS)
     if not points:
         who = "No variant loses" if len(found) > 1 else f"{found[0].variant} does not lose"
         return f"{who} {LOST:g} points of {info.title} between {low} and {high}"
@@ -160,8 +142,8 @@ def finding(factor: Factor, variants: Sequence[str], score: str) -> str:
     spared = [each.variant for each in found if each.variant not in points]
     head = f"{LOST:g} points of {info.title} are lost "
     if len(found) == 1:
-        (variant,) = points
-        return f"{variant} loses {LOST:g} points of {info.title} {side[variant]} {short(points[variant].value)}"
+        ((variant, point),) = points.items()
+        return f"{variant} loses {LOST:g} points of {info.title} {side[variant]} {short(point.value, _DIGITS)}"
     return head + _listed(points, side) + (f"; not by {', '.join(spared)}" if spared else "")
 
 
@@ -176,20 +158,14 @@ def _listed(points: Mapping[str, BreakingPoint], side: Mapping[str, str]) -> str
                 break
         else:
             groups.append((side[variant], value, [variant]))
-    return ", ".join(f"{where} {short(value)} ({', '.join(names)})" for where, value, names in groups)
+    return ", ".join(f"{where} {short(value, _DIGITS)} ({', '.join(names)})" for where, value, names in groups)
 
 
 def _ends(loss: Loss, info: ScoreInfo) -> str:
     unit = f" {info.unit}" if info.unit else ""
     one, other = (fixed(each.mean, info.digits) for each in (loss.at_best, loss.at_worst))
-    return f"{info.title} of {loss.variant}: {one}{unit} at {short(loss.best)}, {other}{unit} at {short(loss.worst)}"
-
-
-def short(value: Any) -> str:
-    """Return the text of a value of a factor with at most three digits."""
-    if value is None:
-        return "–"
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    best, worst = (short(each, _DIGITS) for each in (loss.best, loss.worst))
+    return f"{info.title} of {loss.variant}: {one}{unit} at {best}, {other}{unit} at {worst}"
 
 
 def blame_study(results: Results, *, seeds: int, workers: int = 1, reporter: Reporter | None = None) -> Blame:

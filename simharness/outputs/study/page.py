@@ -18,6 +18,7 @@ from simharness.outputs.study import plots, tables
 from simharness.outputs.study.curves import finding, grid, panels
 from simharness.outputs.study.tables import failure_rows
 from simharness.outputs.study.worst_frames import WorstFramePictures, show, worst_frames
+from simharness.runtime.number_text import short
 from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scoring.catalogue import SCORES
 from simharness.study.causes.blame_text import read_blame
@@ -202,7 +203,7 @@ def _curves(
             )
             each["plots"][score] = Markup(svg)
             each["numbers"][score] = [
-                (plots.short(value), [tables.cell(lines[case][variant][row], info) for variant in variants])
+                (short(value), [tables.cell(lines[case][variant][row], info) for variant in variants])
                 for row, value in enumerate(factor.values)
             ]
     return curves

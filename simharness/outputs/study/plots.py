@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter
 from mvpose.arrays import Floats
 from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, svg_plot
 from simharness.outputs.study.curves import axis_label
-from simharness.runtime.number_text import fixed
+from simharness.runtime.number_text import fixed, short
 from simharness.scoring.catalogue import ScoreInfo
 from simharness.statistics.intervals import Interval
 
@@ -251,13 +251,6 @@ def heat_map(
         axes.tick_params(length=0)
         axes.spines[:].set_visible(False)
     return written[0]
-
-
-def short(value: Any) -> str:
-    """Return the text of a value of a factor in plots and tables."""
-    if value is None:
-        return "–"
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def mean_over(over: Mapping[str, Sequence[Any]]) -> str:

@@ -55,21 +55,7 @@ def by_seed(rows: pl.DataFrame, score: str) -> dict[int, float]:
 
 def cell(interval: Interval, score: ScoreInfo) -> Cell:
     """Return the cell of a mean, with its interval in small letters."""
-    if not interval.n:
-        return Cell(NOTHING)
-    return Cell(number(interval.mean, score), ends(interval, score))
-
-
-def number(value: float, score: ScoreInfo) -> str:
-    """Return the text of a value of a score."""
-    return fixed(value, score.digits) if np.isfinite(value) else NOTHING
-
-
-def ends(interval: Interval, score: ScoreInfo) -> str:
-    """Return the text of the ends of an interval; empty without an interval."""
-    if not np.isfinite([interval.low, interval.high]).all():
-        return ""
-    return f"{fixed(interval.low, score.digits)} to {fixed(interval.high, score.digits)}"
+    return Cell(*interval.texts(score.digits))
 
 
 def headline(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Cell]]:
@@ -177,19 +163,15 @@ def breaking_cell(breaking: FactorBreakingPoint | None) -> Cell:
     side = "above" if breaking.rising else "below"
     small = ""
     if point.low is not None or point.high is not None:
-        least = f"{_short(low)} or less" if point.low is None else _short(point.low)
-        most = f"{_short(high)} or more" if point.high is None else _short(point.high)
+        least = f"{low:.3g} or less" if point.low is None else f"{point.low:.3g}"
+        most = f"{high:.3g} or more" if point.high is None else f"{point.high:.3g}"
         small = f"{least} to {most}"
     if point.why == "never":
-        return Cell(f"not between {_short(low)} and {_short(high)}", small)
+        return Cell(f"not between {low:.3g} and {high:.3g}", small)
     if point.why == "at once":
-        return Cell(f"already at {_short(low if breaking.rising else high)}", small)
+        return Cell(f"already at {low if breaking.rising else high:.3g}", small)
     assert point.value is not None  # the score crosses the threshold
-    return Cell(f"{side} {_short(point.value)}", small, strong=True)
-
-
-def _short(value: float) -> str:
-    return f"{value:.3g}"
+    return Cell(f"{side} {point.value:.3g}", small, strong=True)
 
 
 def failures_per_100_frames(

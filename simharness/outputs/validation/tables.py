@@ -3,23 +3,19 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 
-from mvpose.files.input_files import parse_toml
+from simharness.outputs import texts_of
 from simharness.reality.validation.corrected_forecast import CorrectionStudy
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.twin_distance import TwinDistance
 from simharness.reality.validation.validation import Validation
 from simharness.reality.validation.verdicts import BOUNDS, GROUPS, BoundVerdict, VerdictState
-from simharness.runtime.number_text import fixed, signed
+from simharness.runtime.number_text import NOTHING, fixed, signed, span
 from simharness.scoring.frame_scores import RULES
-from simharness.statistics.intervals import Interval
 
-NOTHING = "–"
 PUBLISHED = tuple(rule for rule in RULES if not rule.filled)
 """Rules for the head as published."""
 
@@ -93,7 +89,7 @@ def _numbers(verdict: BoundVerdict) -> tuple[tuple[str, str], ...]:
     """Return the cells real, simulated, difference and bound; the small print is the interval that is tested."""
     digits, factor, unit = _FORMATS.get(verdict.group, (1, 1.0, ""))
     after = f" {unit}" if unit else ""
-    ends = _span(factor * verdict.low, factor * verdict.high, digits)
+    ends = span(factor * verdict.low, factor * verdict.high, digits)
     if not np.isfinite(verdict.real):
         return (NOTHING, ""), (fixed(verdict.twin, digits), ends), (NOTHING, ""), (verdict.bound, "")
     real, twin = (fixed(factor * value, digits) + after for value in (verdict.real, verdict.twin))
@@ -110,20 +106,8 @@ def cells(figure: Compared, digits: int, factor: float) -> tuple[tuple[str, str]
     down, up = figure.uncertainty
     ends = (figure.difference - down, figure.difference + up)
     difference = signed(factor * figure.difference, digits) if np.isfinite(figure.difference) else NOTHING
-    span = _span(factor * ends[0], factor * ends[1], digits) if np.isfinite(figure.real.low) else ""
-    real, twin = (with_interval(each, digits, factor) for each in (figure.real, figure.twin))
-    return real, twin, (difference, span)
-
-
-def with_interval(value: Interval, digits: int, factor: float = 1.0) -> tuple[str, str]:
-    """Return a number times ``factor`` with so many decimals, and its interval."""
-    if not np.isfinite(value.mean):
-        return NOTHING, ""
-    return fixed(factor * value.mean, digits), _span(factor * value.low, factor * value.high, digits)
-
-
-def _span(low: float, high: float, digits: int) -> str:
-    return f"{fixed(low, digits)} to {fixed(high, digits)}" if np.isfinite(low) and np.isfinite(high) else ""
+    small = span(factor * ends[0], factor * ends[1], digits) if np.isfinite(figure.real.low) else ""
+    return figure.real.texts(digits, factor), figure.twin.texts(digits, factor), (difference, small)
 
 
 SKILL_GROUPS: Mapping[str, str] = {"losses": "losses by added errors", "subsets": "PCP with fewer cameras"}
@@ -175,15 +159,9 @@ def level_text(kind: str, level: float) -> str:
     return f"{100 * level:g} %" if unit == "share" else f"{level:g} {unit}"
 
 
-@cache
-def _titles() -> Mapping[str, str]:
-    """Return the titles of measurements by key; the others are named by :func:`measurement_title`."""
-    return parse_toml((Path(__file__).parents[1] / "data" / "measurements.toml").read_text(encoding="utf-8"))
-
-
 def measurement_title(key: str) -> str:
-    """Return the title of a measurement."""
-    titles = _titles()
+    """Return the title of a measurement: that of ``data/measurements.toml``, or one by its group."""
+    titles = texts_of("measurements")
     if key in titles:
         return titles[key]
     group, _, name = key.partition(".")

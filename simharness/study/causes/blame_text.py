@@ -79,9 +79,8 @@ def _value(blame: Blame, interval: Interval) -> str:
 
 
 def _ends(interval: Interval, digits: int) -> str:
-    if not np.isfinite([interval.low, interval.high]).all():
-        return ""
-    return f" ({_minus(fixed(interval.low, digits))} to {_minus(fixed(interval.high, digits))})"
+    ends = _minus(interval.texts(digits)[1])
+    return f" ({ends})" if ends else ""
 
 
 def _minus(number: str) -> str:

@@ -70,13 +70,10 @@ def _with_default(section: SectionT, key: str) -> SectionT:
     return section.model_copy(update={first: _with_default(getattr(section, first), rest) if rest else default})
 
 
-def _read_causes() -> tuple[Cause, ...]:
-    entries = parse_toml(Path(__file__).parent.with_name("data").joinpath("causes.toml").read_text(encoding="utf-8"))
-    shown = {name: Visibility[entry.pop("reveals")] for name, entry in entries.items() if "reveals" in entry}
-    return tuple(Cause(name, **entry, reveals=shown.get(name)) for name, entry in entries.items())
+_FILE = parse_toml(Path(__file__).parent.with_name("data").joinpath("causes.toml").read_text(encoding="utf-8"))
+_REVEALS = {name: Visibility[entry.pop("reveals")] for name, entry in _FILE.items() if "reveals" in entry}
 
-
-CAUSES: tuple[Cause, ...] = _read_causes()
+CAUSES: tuple[Cause, ...] = tuple(Cause(name, **entry, reveals=_REVEALS.get(name)) for name, entry in _FILE.items())
 """Causes in the order of tables."""
 
 _BY_NAME = {cause.name: cause for cause in CAUSES}

@@ -15,15 +15,18 @@ at every seed from :data:`ORDERS` random orders and are as exact as their interv
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, partial
+from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from mvpose.arrays import Floats
 from mvpose.commands.errors import RunError
 from mvpose.commands.progress import Reporter, Silence, Stages
+from mvpose.files.json_values import json_value
+from mvpose.files.message_text import prefixed
 from simharness.runtime.frame_pool import map_jobs
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.catalogue import SCORES
@@ -116,25 +119,9 @@ class Blame:
     """Names of the causes that the scenario does not have."""
 
     def json(self) -> dict[str, Any]:
-        """Return the result, JSON-ready; an interval has its mean, its ends and the number of seeds."""
-        shares = [
-            {"cause": each.cause, **{key: _ends(getattr(each, key)) for key in ("share", "alone", "last")}}
-            for each in self.shares
-        ]
-        mending = self.mending and {
-            "causes": list(self.mending.causes),
-            "score": _ends(self.mending.score),
-            "gain": _ends(self.mending.gain),
-            "restored": self.mending.restored,
-        }
-        return {
-            **{key: getattr(self, key) for key in ("scenario", "setting", "variant", "score")},
-            "seeds": list(self.seeds),
-            **{key: _ends(getattr(self, key)) for key in ("before", "after", "rest")},
-            "shares": shares,
-            "mending": mending,
-            "absent": list(self.absent),
-        }
+        """Return the fields, JSON-ready; an interval has its mean, its ends and the number of seeds."""
+        fields: dict[str, Any] = json_value(asdict(self))
+        return fields
 
     @classmethod
     def of_json(cls, data: Mapping[str, Any]) -> "Blame":
@@ -143,22 +130,10 @@ class Blame:
         Raises:
             ValueError: other keys or values.
         """
-        try:
-            shares = tuple(
-                Share(each["cause"], *(_interval(each[key]) for key in ("share", "alone", "last")))
-                for each in data["shares"]
-            )
-            found = data["mending"]
-            mending = found and Mending(
-                tuple(found["causes"]), _interval(found["score"]), _interval(found["gain"]), float(found["restored"])
-            )
-            causes_by_name([each.cause for each in shares] + [*(mending.causes if mending else ())])
-            scenario, setting, variant, score = (str(data[key]) for key in ("scenario", "setting", "variant", "score"))
-            before, after, rest = (_interval(data[key]) for key in ("before", "after", "rest"))
-            seeds, absent = tuple(data["seeds"]), tuple(data["absent"])
-        except (KeyError, TypeError) as error:
-            raise ValueError(f"not a result of simharness blame: {type(error).__name__}: {error}") from None
-        return cls(scenario, setting, variant, score, seeds, before, after, rest, shares, mending, absent)
+        with prefixed("not a result of simharness blame"):
+            found = TypeAdapter(cls).validate_python(data)
+        causes_by_name([*(each.cause for each in found.shares), *(found.mending.causes if found.mending else ())])
+        return found
 
 
 def blame(
@@ -289,7 +264,10 @@ class _Game:
     def _play(self, worth: Callable[[Collection[str]], float], seed: int) -> tuple[list[float], Floats]:
         count = len(self.names)
         every = (1 << count) - 1
-        by_mask = partial(_worth_of_mask, worth, self.names)
+
+        def by_mask(mask: int) -> float:
+            return worth(_of_mask(self.names, mask))
+
         single = [1 << k for k in range(count)]
         worths = [by_mask(mask) for mask in (0, every, *single, *(every ^ mask for mask in single))]
         if count <= EXACT:
@@ -313,10 +291,6 @@ def _of_mask(names: Sequence[str], mask: int) -> list[str]:
     return [name for k, name in enumerate(names) if mask >> k & 1]
 
 
-def _worth_of_mask(worth: Callable[[Collection[str]], float], names: Sequence[str], mask: int) -> float:
-    return worth(_of_mask(names, mask))
-
-
 def _mending(sets: Floats, sign: float, possible: Floats, names: Sequence[str], unit: str) -> Mending | None:
     """Return the fewest causes with :data:`RESTORED` of the possible gain.
 
@@ -334,13 +308,3 @@ def _mending(sets: Floats, sign: float, possible: Floats, names: Sequence[str], 
     mask = smallest_coalition(mean, RESTORED * whole)
     gain = difference_interval(gains[:, mask], unit)
     return Mending(tuple(_of_mask(names, mask)), mean_interval(sets[:, mask], unit=unit), gain, gain.mean / whole)
-
-
-def _ends(interval: Interval) -> dict[str, float | int | None]:
-    numbers = {key: getattr(interval, key) for key in ("mean", "low", "high")}
-    return {**{key: value if np.isfinite(value) else None for key, value in numbers.items()}, "n": interval.n}
-
-
-def _interval(data: Mapping[str, Any]) -> Interval:
-    mean, low, high = (np.nan if data[key] is None else float(data[key]) for key in ("mean", "low", "high"))
-    return Interval(mean, low, high, int(data["n"]))

@@ -1,12 +1,14 @@
 """Minimum number of seeds of a suite."""
 
+from itertools import product
+
 import pytest
 
 from simharness.gate.baseline import KEPT, Measurement, write_baseline
 from simharness.gate.compare import compare
 from simharness.gate.score_tests import least_corrected_p, least_seeds
 from simharness.gate.suite import baseline_of, fingerprint
-from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
+from simharness.gate.trial_command import TrialKey, setting_name
 from simharness.scenario.load import load_study
 from simharness.scenario.sections.gate_section import GateSection
 
@@ -51,7 +53,7 @@ def read(tmp_path):
         study = load_study(path)
         trials = [
             TrialKey(setting_name(setting, study), seed, name)
-            for setting, seed in settings_at_seeds(study)
+            for setting, seed in product(study.settings, study.seeds)
             for name in KEPT
         ]
         scores = {trial: dict.fromkeys(KEPT, 1.0) for trial in trials}

@@ -1,11 +1,12 @@
 """Names and commands of the trials of a suite."""
 
 import shlex
+from itertools import product
 from pathlib import Path
 
 import pytest
 
-from simharness.gate.trial_command import TrialKey, command_of, overrides, setting_name, settings_at_seeds
+from simharness.gate.trial_command import TrialKey, command_of, overrides, setting_name
 from simharness.scenario.load import load, load_study
 
 CI = Path(__file__).parents[3] / "scenarios" / "ci.toml"
@@ -41,7 +42,7 @@ def study(request, tmp_path):
 
 def test_the_command_of_a_trial_runs_its_scenario(study):
     assert len(study.settings) > 10
-    for setting, seed in settings_at_seeds(study):
+    for setting, seed in product(study.settings, study.seeds):
         if seed != study.seeds[-1]:
             continue
         program, run, path, *words = shlex.split(
@@ -63,7 +64,7 @@ def test_a_file_of_one_scenario_needs_no_overrides(tmp_path):
 def test_names_of_settings_differ(study):
     names = [setting_name(setting, study) for setting in study.settings]
     assert len(set(names)) == len(names)
-    scenes = list(settings_at_seeds(study))
+    scenes = list(product(study.settings, study.seeds))
     assert len(scenes) == study.trials
 
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from simharness.outputs.study.curves import axis_label, axis_names, unit_of
+from simharness.outputs import texts_of
+from simharness.outputs.study.curves import axis_label, unit_of
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 
@@ -28,7 +29,7 @@ def swept():
 
 @pytest.mark.parametrize("key", sorted(swept()))
 def test_what_a_study_sweeps_has_a_name(key):
-    assert key in axis_names()
+    assert key in texts_of("axis_names")
 
 
 @pytest.mark.parametrize(
@@ -53,4 +54,4 @@ def test_what_a_study_sweeps_has_a_name(key):
 )
 def test_the_unit_is_the_one_of_the_description(key, unit):
     assert unit_of(key) == unit
-    assert axis_label(key) == axis_names().get(key, key) + (f", {unit}" if unit else "")
+    assert axis_label(key) == texts_of("axis_names").get(key, key) + (f", {unit}" if unit else "")

@@ -90,7 +90,7 @@ def test_code_and_versions_count(quickstart, monkeypatch):
     assert trial_identity(quickstart) != trial
     monkeypatch.setattr(identity, "code", lambda: current)
     assert trial_identity(quickstart) == trial
-    monkeypatch.setattr(identity, "_versions", lambda: (("numpy", "1.0"),))
+    monkeypatch.setattr(identity, "versions", lambda: {"numpy": "1.0"})
     assert trial_identity(quickstart) != trial
 
 
