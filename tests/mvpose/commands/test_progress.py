@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from mvpose.commands import progress
-from mvpose.commands.progress import Lines, Pace, duration, reporter
+from mvpose.commands.progress import Lines, Pace, counted, duration, reporter
 
 
 class Clock:
@@ -76,3 +76,10 @@ def test_a_log_gets_a_line_every_ten_seconds_at_most(monkeypatch):
 def test_without_a_terminal_lines_are_printed():
     with reporter() as lines:
         assert isinstance(lines, Lines)
+
+
+def test_items_are_counted_when_they_are_done():
+    seen = []
+    for each in counted("ab", seen.append):
+        seen.append(each)
+    assert seen == ["a", 1, "b", 1]

@@ -1,5 +1,7 @@
 """Curves and breaking points of a synthetic study with known scores."""
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pytest
@@ -59,9 +61,7 @@ def test_a_mean_says_what_it_is_over(tmp_path):
 def test_a_case_has_its_own_curves(tmp_path):
     results = make_study(tmp_path, factors={"cameras.count": [2, 3, 5], "people.count": [1, 4]}, cases=("a", "b"))
     more = pl.when(pl.col("case") == "b").then(10.0).otherwise(0.0)
-    results = type(results)(
-        results.info, results.trials.with_columns(pcp=pl.col("pcp") + more), *(results.frames,) * 3, results.folder
-    )
+    results = replace(results, trials=results.trials.with_columns(pcp=pl.col("pcp") + more))
     by_case = factors_by_case(results)
     assert {key: list(each) for key, each in panels(by_case).items()} == {
         "cameras.count": ["a", "b"],
@@ -80,14 +80,7 @@ def test_a_case_has_its_own_curves(tmp_path):
 def test_keys_that_change_together_are_one_factor(tmp_path):
     results = make_study(tmp_path)
     trials = results.trials.with_columns((pl.col("cameras.count") * 0.5).alias("cameras.radius"))
-    paired = type(results)(
-        {**results.info, "factors": ["cameras.count", "cameras.radius"]},
-        trials,
-        results.frames,
-        results.people,
-        results.failures,
-        results.folder,
-    )
+    paired = replace(results, info={**results.info, "factors": ["cameras.count", "cameras.radius"]}, trials=trials)
     (factor,) = factors(paired)
     assert (factor.key, factor.along) == ("cameras.count", ("cameras.radius",))
 
@@ -96,7 +89,7 @@ def test_a_score_that_does_not_apply_is_left_out(tmp_path):
     results = make_study(tmp_path)
     lost = (pl.col("seed") == 2) & (pl.col("cameras.count") == 3)
     trials = results.trials.with_columns(pcp=pl.when(lost).then(None).otherwise(pl.col("pcp")))
-    (factor,) = factors(type(results)(results.info, trials, *(results.frames,) * 3, results.folder))
+    (factor,) = factors(replace(results, trials=trials))
     line = factor.line("full", "pcp")
     assert [each.n for each in line] == [4, 3, 4]
     assert line[1].mean == pytest.approx(60 + 15 + np.mean([0.0, 0.5, 0.0]))

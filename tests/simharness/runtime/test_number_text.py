@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.runtime.number_text import fixed, signed
+from simharness.runtime.number_text import NOTHING, fixed, short, signed, span
 
 NUMBERS = st.floats(-1e6, 1e6)
 
@@ -33,3 +33,14 @@ def test_a_difference_shows_its_sign(value, digits):
 def test_nan_and_infinity_stay():
     assert fixed(math.nan, 1) == "nan"
     assert signed(-math.inf, 1) == "-inf"
+
+
+def test_the_ends_of_an_interval():
+    assert span(94.04, 98.06, 1) == "94.0 to 98.1"
+    assert span(-0.01, 0.2, 1) == "0.0 to 0.2"
+    assert span(math.nan, 1.0, 1) == span(0.0, math.inf, 1) == ""
+
+
+def test_values_of_keys_are_short():
+    assert [short(each) for each in (0.1 + 0.2, 3, "none", None, True)] == ["0.3", "3", "none", NOTHING, "True"]
+    assert short(1234.5678, 3) == "1.23e+03"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, gamma, t
 
-from simharness.statistics.intervals import SCALES, mean_interval
+from simharness.statistics.intervals import SCALES, Interval, mean_interval
 
 
 def test_the_mean_is_over_the_scenes_to_which_the_score_applies():
@@ -118,3 +118,11 @@ def test_a_mirrored_percentage_has_a_mirrored_interval():
     values = np.array([0.0, 0.0, 3.0, 0.0, 7.0, 0.0, 0.0, 1.0])
     one, other = mean_interval(values, unit="%"), mean_interval(100 - values, unit="%")
     assert (other.low, other.high) == pytest.approx((100 - one.high, 100 - one.low))
+
+
+def test_an_interval_as_text_and_in_json():
+    found = Interval(0.964, 0.9404, 0.9806, 12)
+    assert found.texts(1, 100.0) == ("96.4", "94.0 to 98.1")
+    assert found.to_json() == {"mean": 0.964, "low": 0.9404, "high": 0.9806, "scenes": 12}
+    assert Interval(3.0, math.nan, math.nan, 1).texts(1) == ("3.0", "")
+    assert Interval(math.nan, math.nan, math.nan, 0).texts(1) == ("–", "")
