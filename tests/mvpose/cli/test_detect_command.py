@@ -154,6 +154,7 @@ class TestDetect:
 
 
 class TestRun:
+    @pytest.mark.slow
     def test_from_pictures_to_people(self, networks, tmp_path):
         """All joints of the known head are at one bright spot, so its people are points; they are where the spot is."""
         quarter = np.array([[0.25, 1, 0.25], [1, 0.25, 0.25], [1, 1, 1]])

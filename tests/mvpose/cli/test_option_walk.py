@@ -168,7 +168,14 @@ def test_every_option_of_every_command_has_a_row():
     assert found == known
 
 
-@pytest.mark.parametrize(("command", "name"), [(command, name) for command, rows in ROWS.items() for name in rows])
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [
+        pytest.param(command, name, marks=[pytest.mark.slow] if command == "calibrate" and name != "stature" else [])
+        for command, rows in ROWS.items()
+        for name in rows
+    ],
+)
 def test_an_option_changes_the_result_or_is_refused(walk, command, name, monkeypatch):
     opened = []
     monkeypatch.setattr(webbrowser, "open", lambda url: print(f"opened {opened.append(url)}"))

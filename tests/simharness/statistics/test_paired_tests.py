@@ -85,7 +85,7 @@ SKEWED = {
 
 
 @pytest.mark.parametrize("distribution", sorted(SKEWED))
-@pytest.mark.parametrize("pairs", [8, 12, 20, 60])
+@pytest.mark.parametrize("pairs", [8, 20, *(pytest.param(many, marks=pytest.mark.slow) for many in (12, 60))])
 def test_skewed_differences_without_a_mean_are_seldom_significant(distribution, pairs):
     """Sign flips and Student's t alone reject 10 to 25 % of these, below the mean."""
     changes = SKEWED[distribution](np.random.default_rng(pairs), (400, pairs))

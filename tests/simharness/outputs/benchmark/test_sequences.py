@@ -47,6 +47,7 @@ def contents(folder):
     return {each.relative_to(folder).as_posix(): each.read_bytes() for each in files}
 
 
+@pytest.mark.slow
 def test_a_sequence_is_that_of_its_seed_alone(benchmark, scenario, tmp_path):
     alone = export_sequence(scenario.model_copy(update={"seed": 8}), PLAN(tmp_path / "alone"))
     assert contents(alone) == contents(benchmark / "quickstart_0008")

@@ -163,7 +163,7 @@ def test_a_brim_hides_eyes_from_above_and_a_beanie_does_not():
         assert (seen(body, looking_at(aim, 0, 55))[[1, 2]] == label).all()
 
 
-@pytest.mark.parametrize("person", [1, "child"])
+@pytest.mark.parametrize("person", [pytest.param(1, marks=pytest.mark.slow), "child"])
 @pytest.mark.parametrize("kind", HATS[1:])
 @pytest.mark.parametrize("hair_style", HAIR_STYLES)
 def test_neither_skin_nor_hair_comes_through_a_hat(person, kind, hair_style):

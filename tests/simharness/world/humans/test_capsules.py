@@ -129,7 +129,7 @@ def from_the_capsules(name):
 
 @pytest.mark.parametrize("distances", [from_the_skin, from_the_capsules])
 def test_skin_and_capsules_differ_little(name, distances):
-    """Required: mean 1 cm, 95 % within 2.5 cm; more for skirts and long hair, which are not shaped like capsules."""
+    """Mean within 1 cm, 95 % within 2 cm; more for skirts and long hair, which are not shaped like capsules."""
     assert distances(name).mean() < 0.01
     assert np.quantile(distances(name), 0.95) < (0.018 if name in SHAPES else 0.035)
     assert distances(name).max() < 0.11
