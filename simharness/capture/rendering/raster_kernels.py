@@ -60,63 +60,79 @@ def rasterise(
     for turn in range(none):
         for t in range(first, len(faces)):
             if turn_of[t - first] == turn:
-                _draw(t, q[faces[t, 0]], q[faces[t, 1]], q[faces[t, 2]], near, edge, inverse_depth, triangle)
+                _draw(t, faces[t], q, seen, near, edge, inverse_depth, triangle)
 
 
 @njit(cache=True, borrows=True, error_model="numpy")
 def _draw(
     t: int,
-    a: np.ndarray,
-    b: np.ndarray,
-    c: np.ndarray,
+    face: np.ndarray,
+    q: np.ndarray,
+    seen: np.ndarray,
     near: float,
     edge: np.ndarray,
     inverse_depth: np.ndarray,
     triangle: np.ndarray,
 ) -> None:
-    """Write triangle ``t`` with corners (3,) at the pixels where it is the nearest; ``edge`` is memory, (4, 3)."""
+    """Write triangle ``t`` at the pixels where it is the nearest; ``edge`` is memory, (4, 3)."""
+    a, b, c = q[face[0]], q[face[1]], q[face[2]]
     height, width = triangle.shape
     least, most = min(a[2], b[2], c[2]), max(a[2], b[2], c[2])
     if most < near:
         return
     # Pixel box of the part beyond the near plane.
-    left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf
-    for k, (one, two) in enumerate(((b, c), (c, a), (a, b))):
-        if one[2] >= near:
-            x, y = one[0] / one[2], one[1] / one[2]
+    left, right, top, bottom, whole = np.inf, -np.inf, np.inf, -np.inf, least >= near
+    for k in range(3):
+        i, j = face[k], face[(k + 1) % 3]
+        if q[i, 2] >= near:
+            x, y = seen[i, 0], seen[i, 1]
             left, right, top, bottom = min(left, x), max(right, x), min(top, y), max(bottom, y)
-        if (one[2] >= near) != (two[2] >= near):
-            share = (near - one[2]) / (two[2] - one[2])
-            x, y = (one[0] + share * (two[0] - one[0])) / near, (one[1] + share * (two[1] - one[1])) / near
+        if not whole and (q[i, 2] >= near) != (q[j, 2] >= near):
+            share = (near - q[i, 2]) / (q[j, 2] - q[i, 2])
+            x, y = (q[i, 0] + share * (q[j, 0] - q[i, 0])) / near, (q[i, 1] + share * (q[j, 1] - q[i, 1])) / near
             left, right, top, bottom = min(left, x), max(right, x), min(top, y), max(bottom, y)
+    left, right = max(np.ceil(left - _SLACK), 0.0), min(np.floor(right + _SLACK), width - 1.0)
+    top, bottom = max(np.ceil(top - _SLACK), 0.0), min(np.floor(bottom + _SLACK), height - 1.0)
+    if left > right or top > bottom:
+        return
+    # Rounding must not move a thin triangle out of its range of depth.
+    low, high = np.float32(1.0 / most), np.float32(1.0 / max(least, near))
+    if _hidden(inverse_depth[int(top) : int(bottom) + 1, int(left) : int(right) + 1], high):
+        return
+    for k in range(3):
+        one, two = q[face[(k + 1) % 3]], q[face[(k + 2) % 3]]
         edge[k, 0] = one[1] * two[2] - one[2] * two[1]
         edge[k, 1] = one[2] * two[0] - one[0] * two[2]
         edge[k, 2] = one[0] * two[1] - one[1] * two[0]
-    left, right = max(np.ceil(left - _SLACK), 0.0), min(np.floor(right + _SLACK), width - 1.0)
-    top, bottom = max(np.ceil(top - _SLACK), 0.0), min(np.floor(bottom + _SLACK), height - 1.0)
     determinant = a[0] * edge[0, 0] + a[1] * edge[0, 1] + a[2] * edge[0, 2]
-    if left > right or top > bottom or determinant == 0.0:  # outside, or seen edge-on
+    if determinant == 0.0:  # seen edge-on
         return
     scale = 1.0 / determinant
     px = (edge[0, 0] + edge[1, 0] + edge[2, 0]) * scale
     py = (edge[0, 1] + edge[1, 1] + edge[2, 1]) * scale
     pz = (edge[0, 2] + edge[1, 2] + edge[2, 2]) * scale
-    sign = -1.0 if determinant < 0 else 1.0
+    sign, label = -1.0 if determinant < 0 else 1.0, np.int32(t)
     edge[3, 0], edge[3, 1], edge[3, 2] = -sign * px, -sign * py, sign * (1.0 / near - pz)  # the near plane
-    # Rounding must not move a thin triangle out of its range of depth.
-    low, high = np.float32(1.0 / most), np.float32(1.0 / max(least, near))
+    e, f, g, h = sign * edge[0, 0], sign * edge[1, 0], sign * edge[2, 0], sign * edge[3, 0]
     for row in range(int(top), int(bottom) + 1):
-        e, f, g, h = sign * edge[0, 0], sign * edge[1, 0], sign * edge[2, 0], sign * edge[3, 0]
         from_e, from_f = sign * (edge[0, 1] * row + edge[0, 2]), sign * (edge[1, 1] * row + edge[1, 2])
         from_g, from_h = sign * (edge[2, 1] * row + edge[2, 2]), sign * (edge[3, 1] * row + edge[3, 2])
-        base = py * row + pz
-        for x in range(int(left), int(right) + 1):
-            if (
-                e * x + from_e >= 0
-                and f * x + from_f >= 0
-                and g * x + from_g >= 0
-                and (least >= near or h * x + from_h >= 0)
-            ):
-                w = min(max(np.float32(px * x + base), low), high)
-                if w > inverse_depth[row, x]:
-                    inverse_depth[row, x], triangle[row, x] = w, t
+        base, first = py * row + pz, np.int32(left)
+        depths, triangles = inverse_depth[row, first : int(right) + 1], triangle[row, first : int(right) + 1]
+        for i in range(len(depths)):  # without branches, so that the compiler vectorises it
+            x, before, other = np.float64(first + np.int32(i)), depths[i], triangles[i]
+            w = np.float32(px * x + base)
+            w = low if w < low else (high if w > high else w)
+            inside = (e * x + from_e >= 0) & (f * x + from_f >= 0) & (g * x + from_g >= 0)
+            nearer = inside & (whole | (h * x + from_h >= 0)) & (w > before)
+            depths[i], triangles[i] = w if nearer else before, label if nearer else other
+
+
+@njit(cache=True, borrows=True, error_model="numpy")
+def _hidden(inverse_depth: np.ndarray, nearest: np.float32) -> bool:
+    """Return whether all pixels of a box show what is not farther than an inverse depth."""
+    for row in range(inverse_depth.shape[0]):
+        for x in range(inverse_depth.shape[1]):
+            if nearest > inverse_depth[row, x]:
+                return False
+    return True
