@@ -109,7 +109,8 @@ def _picture(scene: _Scene, camera: Camera, color: bool, lighting: Lighting, par
                 shade(new, drawn, geometry.faces, view, light, (maps.still, maps.moving), rgb)
     with np.errstate(divide="ignore"):
         depth = np.reciprocal(inverse_depth)  # infinite without a surface
-    return Image(rgb=rgb, depth=depth, ids=topology.mesh[triangle], parts=topology.parts[triangle] if parts else None)
+    ids = np.take(topology.mesh, triangle, mode="wrap")  # the last is none's
+    return Image(rgb=rgb, depth=depth, ids=ids, parts=topology.parts[triangle] if parts else None)
 
 
 def _background(scene: _Scene, camera: Camera) -> Background:
