@@ -1,14 +1,16 @@
-"""Matplotlib plots as SVG: inline in a page, in the page's own colours, or arranged in one standalone file."""
+"""Matplotlib plots as SVG: inline in a page, in the page's own colours, or arranged in one standalone file; or as PDF."""
 
 import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
@@ -16,11 +18,10 @@ from matplotlib.textpath import text_to_path
 
 Color = str
 
-# Placeholder colours that matplotlib writes into the SVG; each becomes a colour of the page, light or dark.
-INK, FAINT, LINE = "#010203", "#010204", "#010205"
+# Colours on paper, which nothing else in a plot has: in a page each becomes a colour of the page, light or dark.
+INK, FAINT, LINE = "#1b1d21", "#666b75", "#dedfe0"
 _PAGE_COLORS = {INK: "currentColor", FAINT: "var(--faint)", LINE: "var(--line)"}
-_STANDALONE_COLORS = {"currentColor": "#1b1d21", "var(--faint)": "#666b75", "var(--line)": "#dedfe0"}
-_STANDALONE_PAPER = "#ffffff"
+_PAPER = "#ffffff"
 
 SIZE = (5.2, 3.1)  # inches of 72 px: small, so that the letters stay readable on a phone
 _LEGEND_SIZES = (8.5, 8.0, 7.5)  # points, from the usual to the smallest
@@ -38,6 +39,18 @@ VARIANT_COLORS: tuple[Color, ...] = ("#3b82c4", "#d9643a", "#2e9e6b", "#8a63c9",
 
 STYLE = mpl.rc_params_from_file(Path(__file__).parent / "templates" / "plots.mplstyle", use_default_template=False)
 """Settings of Matplotlib for all plots."""
+
+_PDF_FOLDER: ContextVar[Path | None] = ContextVar("pdf_folder", default=None)
+
+
+@contextmanager
+def plots_as_pdf(folder: Path) -> Iterator[None]:
+    """Write the plots that are made in this context also as NAME.pdf into a folder, in the colours of paper."""
+    before = _PDF_FOLDER.set(folder)
+    try:
+        yield
+    finally:
+        _PDF_FOLDER.reset(before)
 
 
 @contextmanager
@@ -58,6 +71,9 @@ def svg_plot(name: str, *, size: tuple[float, float] = SIZE) -> Iterator[tuple[A
         FigureCanvasSVG(figure).print_svg(
             buffer, metadata={"Date": None, "Creator": None, "Format": None, "Type": None}
         )
+        if (folder := _PDF_FOLDER.get()) is not None:
+            file = re.sub(r"[^\w.-]+", "_", name)
+            FigureCanvasPdf(figure).print_pdf(folder / f"{file}.pdf", metadata={"CreationDate": None})
     figure.clear()
     written.append(_inline(buffer.getvalue()))
 
@@ -150,12 +166,12 @@ def plot_sheet(rows: Sequence[Sequence[str]]) -> str:
         top += max((height for _, height in sizes), default=0.0) + _SHEET_GAP
         widest = max(widest, left)
     plots = "\n".join(placed)
-    for page_color, color in _STANDALONE_COLORS.items():
+    for color, page_color in _PAGE_COLORS.items():
         plots = plots.replace(page_color, color)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
         f'width="{_SHEET_SCALE * widest:g}" height="{_SHEET_SCALE * top:g}" viewBox="0 0 {widest:g} {top:g}">\n'
-        f'<rect width="100%" height="100%" fill="{_STANDALONE_PAPER}"/>\n{plots}\n</svg>\n'
+        f'<rect width="100%" height="100%" fill="{_PAPER}"/>\n{plots}\n</svg>\n'
     )
 
 

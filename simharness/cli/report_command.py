@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from mvpose.commands.option_groups import grouped, option
-from mvpose.commands.output_files import HTML, check_place
+from mvpose.commands.output_files import HTML, check_place, check_writable
 from mvpose.commands.programs import note
 from mvpose.commands.progress import reporter
 from simharness.cli.program import PROGRAM, BlameSeeds
@@ -25,6 +25,9 @@ def report(
         metavar="SCORE=VALUE",
     ),
     blame: BlameSeeds = 0,
+    figures: Path | None = option(
+        None, "Also write its plots as PDF, and the points of its curves as CSV.", metavar="FOLDER", file_okay=False
+    ),
 ) -> None:
     """Write the report of a finished study again: scores, curves, failures, the worst frames.
 
@@ -32,6 +35,8 @@ def report(
     """
     with PROGRAM.exit_on_error():
         check_place(out, option="--out", mark=HTML)
+        if figures:
+            check_writable(figures, "simharness report", option="--figures")
         thresholds = _thresholds(threshold or [])
         from simharness.study.study_folder import read_study
         from simharness.trial.run_folder import is_run
@@ -52,8 +57,8 @@ def report(
 
             blame_results(results, seeds=blame)
         with reporter() as bars, bars.stage("worst frames", SHOWN) as advance:
-            page = write_report(results, out, thresholds=thresholds or THRESHOLDS, progress=advance)
-    typer.echo(f"report: {page}")
+            page = write_report(results, out, thresholds=thresholds or THRESHOLDS, progress=advance, figures=figures)
+    typer.echo(f"report: {page}" + (f"\nfigures: {figures}" if figures else ""))
 
 
 def _thresholds(given: list[str]) -> dict[str, float]:

@@ -149,6 +149,7 @@ ROWS = {
         "out": Row("--out {out}/page.html"),
         "threshold": Row("--threshold pcp=80"),
         "blame": Row("--blame 2"),
+        "figures": Row("--figures {out}/figures"),
     },
     "study": WORKERS
     | {

@@ -46,6 +46,7 @@ FOLDERS = {
     "simharness export FOLDER": ("simharness export quickstart {}", "quickstart"),
     "simharness mjcf --out": ("simharness mjcf quickstart --out {}", "quickstart"),
     "simharness study --out": ("simharness study quickstart --out {}", "quickstart"),
+    "simharness report --figures": ("simharness report study --figures {}", ""),
     "simharness study --store": ("simharness study quickstart --out new --store {}", ""),
     "simharness merge --into": ("simharness merge store --into {}", ""),
     "simharness plan --out": ("simharness plan lab --out {}", "lab"),

@@ -48,6 +48,24 @@ def grid(first: Factor, second: Factor, variant: str, score: str) -> Floats | No
     )
 
 
+def curve_table(by_case: Mapping[str, Sequence[Factor]], variants: Sequence[str]) -> pl.DataFrame:
+    """Return the points of all curves: a row for each case, factor, value, variant and score that applies there."""
+    return pl.DataFrame(
+        [
+            (case, factor.key, str(value), variant, score, point.mean, point.low, point.high, point.n)
+            for case, swept in by_case.items()
+            for factor in swept
+            for variant in variants
+            for score in SCORES
+            if score in factor.rows.columns
+            for value, point in zip(factor.values, factor.line(variant, score), strict=True)
+            if point.n
+        ],
+        schema=["case", "factor", "value", "variant", "score", "mean", "low", "high", "seeds"],
+        orient="row",
+    )
+
+
 _UNITS = (  # patterns in descriptions of keys, and the unit of each; the first match counts
     (r"degrees per minute", "degrees per minute"),
     (r"metres per minute", "m per minute"),

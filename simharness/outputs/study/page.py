@@ -1,5 +1,6 @@
-"""Report of a study as one self-contained HTML file."""
+"""Report of a study as one self-contained HTML file, and its plots and curves as files."""
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,13 +10,14 @@ import polars as pl
 from markupsafe import Markup
 
 from mvpose.commands.progress import duration
-from mvpose.files.atomic_files import write_atomic
+from mvpose.files.atomic_files import atomic_folder, write_atomic
 from mvpose.report.documents import fill_template
+from mvpose.report.svg_plots import plots_as_pdf
 from simharness.outputs import TEMPLATES
 from simharness.outputs.blame_section import blame_section
 from simharness.outputs.run.plots import stage_times
 from simharness.outputs.study import plots, tables
-from simharness.outputs.study.curves import finding, grid, panels
+from simharness.outputs.study.curves import curve_table, finding, grid, panels
 from simharness.outputs.study.tables import failure_rows
 from simharness.outputs.study.worst_frames import WorstFramePictures, show, worst_frames
 from simharness.runtime.number_text import short
@@ -38,6 +40,7 @@ def write_report(
     *,
     thresholds: Mapping[str, float] = THRESHOLDS,
     progress: Callable[[int], None] = lambda frames: None,
+    figures: Path | None = None,
 ) -> Path:
     """Write the page of a study. The trials of its worst frames are run again for the pictures.
 
@@ -46,6 +49,7 @@ def write_report(
         out: path of the page; by default ``report.html`` in the folder of the study. It is written in one step.
         thresholds: see :func:`render_study`.
         progress: called with 1 after each of the worst frames.
+        figures: folder for its plots as PDF and the points of its curves as ``curves.csv``; None writes none.
 
     Returns:
         Path of the page.
@@ -59,7 +63,12 @@ def write_report(
         raise ValueError(f"{out}: cannot be written: there is no folder {out.parent}")
     found = read_blame(results.folder)
     shown = [picture for picture, _ in show(results, worst_frames(results), progress=progress)]
-    page = render_study(results, shown=shown, thresholds=thresholds, found=found)
+    with contextlib.ExitStack() as stack:
+        if figures is not None:
+            folder = stack.enter_context(atomic_folder(figures, "simharness report"))
+            stack.enter_context(plots_as_pdf(folder))
+            curve_table(factors_by_case(results), results.info["variants"]).write_csv(folder / "curves.csv")
+        page = render_study(results, shown=shown, thresholds=thresholds, found=found)
     try:
         write_atomic(out, page.encode())
     except OSError as error:

@@ -70,6 +70,22 @@ def test_the_headline_is_the_mean_over_everything(tmp_path):
         assert cells_of(page, variant)[0] == f"{expected:.1f}"
 
 
+def test_figures_are_the_plots_of_the_page_and_the_points_of_its_curves(tmp_path):
+    results = make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}, cases=("crowd", "empty"))
+    results = dataclasses.replace(results, failures=results.failures.clear())  # no frame is shown
+    page = write_report(results, figures=tmp_path / "figures").read_text()
+    plots = sorted((tmp_path / "figures").glob("*.pdf"))
+    assert len(plots) == page.count("<svg") > 8
+    assert all(each.read_bytes().startswith(b"%PDF") for each in plots)
+    table = pl.read_csv(tmp_path / "figures" / "curves.csv")
+    rows = table.filter(score="pcp", factor="cameras.count", case="empty", variant="fast")
+    expected = [np.mean([pcp_of("fast", {"cameras.count": n}, seed) for seed in range(4)]) for n in (2, 3, 5)]
+    assert rows["value"].to_list() == [2, 3, 5]
+    np.testing.assert_allclose(rows["mean"], expected)
+    assert (rows["low"] < rows["mean"]).all() and (rows["mean"] < rows["high"]).all()
+    assert (rows["seeds"] == 4).all()
+
+
 def test_every_score_that_applies_has_its_mean(tmp_path):
     results = make_study(tmp_path, factors={"cameras.count": [2, 3]}, variants=("full", "track"))
     trials = results.trials.with_columns(pl.lit(None, pl.Float64).alias("phantoms_pruned"))
