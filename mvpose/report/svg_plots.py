@@ -1,4 +1,4 @@
-"""Matplotlib plots as SVG: inline in a page, in the page's own colours, or arranged in one standalone file; or as PDF."""
+"""Matplotlib plots as SVG: inline in a page, in its own colours, or arranged in one standalone file; or as PDF."""
 
 import io
 import re
