@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mvpose.arrays import Floats, Integers
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.calibration.consistency import ViewRays, best_evidence, normalised
 from mvpose.calibration.findings import camera_names
 from mvpose.calibration.sufficiency import RECORD
@@ -66,6 +66,11 @@ class _Poses(NamedTuple):
     spread: Floats
     """Covariance of all coordinates, (2, 2)."""
 
+    def select(self, which: Bools | slice) -> "_Poses":
+        """Return some poses."""
+        row, tracklet, points, errors, spread = self
+        return _Poses(row[which], tracklet[which], points[which], errors[which], spread)
+
 
 def find_starts(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) -> Starts:
     """Return when cameras began to record, from people who move in front of several of them.
@@ -105,10 +110,9 @@ def _curves(rig: Rig, tracklets: Tracklets) -> tuple[Floats, Floats, float]:
     first = _busiest(np.concatenate([each.row for each in views]), round(_LONGEST / step))
     windows = round(_LONGEST / _WINDOW)
     evidence, ideal = np.zeros((2, len(rig), len(rig), len(shifts)))
-    placed = [[_placed(each, first - shift, window, windows) for shift in shifts] for each in views[1:]]
+    placed = [[_placed(each, first - shift, window, windows) for shift in shifts.tolist()] for each in views[1:]]
     for a, b in combinations(range(len(rig)), 2):
-        kept = views[a].row % every == 0
-        sparse = _Poses(*(each[kept] for each in views[a][:4]), views[a].spread)
+        sparse = views[a].select(views[a].row % every == 0)
         one, spreads = _placed(sparse, first, window, windows), np.stack([views[a].spread, views[b].spread])
         pair = spreads, rig.packed[[a, b]]
         others = placed[b - 1]
@@ -152,7 +156,7 @@ def _placed(poses: _Poses, first: int, window: int, windows: int) -> ViewRays:
 
 def _joined(evidence: Floats, ideal: Floats, step: float) -> Starts:
     """Return offsets of views, joined by groups, given the curves of all pairs."""
-    views, most = len(evidence), evidence.shape[2] // 2
+    views = len(evidence)
     groups, margins = [{view: 0} for view in range(views)], np.full(views, np.inf)
     while len(groups) > 1:
         joints = {pair: _best(evidence, ideal, groups[pair[0]], groups[pair[1]], step) for pair in _pairs(groups)}

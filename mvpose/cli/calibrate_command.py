@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mvpose.calibration.from_people import PeopleCalibration
 
 
-@grouped(without=["joints", "up", "unit"])
+@grouped(without=["joints", "up", "unit", "sync", "rates"])
 def calibrate(
     detections: DetectionPaths,
     intrinsics: Annotated[

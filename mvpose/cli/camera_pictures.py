@@ -3,9 +3,11 @@
 import math
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from mvpose.camera import Camera
+from mvpose.cli.inputs import Choices
 from mvpose.commands.programs import note
 from mvpose.files.message_text import listed
 from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
@@ -46,6 +48,24 @@ def common_rate(sources: Sequence[PictureSource]) -> float | None:
     return next(iter(rates.values()), None)
 
 
+def with_rates(choices: Choices, sources: Sequence[PictureSource]) -> Choices:
+    """Return options with the rate of the pictures, or those of each camera, where nothing else states them.
+
+    Args:
+        choices: options about the recording.
+        sources: pictures of each camera, in the order of the calibration.
+
+    Raises:
+        ValueError: different rates of cameras that began at one moment.
+    """
+    if choices.fps or choices.rates:
+        return choices
+    rates = [source.fps for source in sources]
+    if choices.sync and all(map(math.isfinite, rates)):
+        return replace(choices, rates=",".join(f"{rate:.9g}" for rate in rates))
+    return replace(choices, fps=common_rate(sources))
+
+
 def assigned(cameras: Sequence[Camera], sources: Sequence[PictureSource]) -> list[PictureSource]:
     """Return the pictures of each camera, found by the names of the cameras.
 
@@ -59,7 +79,7 @@ def assigned(cameras: Sequence[Camera], sources: Sequence[PictureSource]) -> lis
 
 
 def for_frames(
-    cameras: Sequence[Camera], sources: Sequence[PictureSource], numbers: Sequence[int], *, whole: bool
+    cameras: Sequence[Camera], sources: Sequence[PictureSource], numbers: Sequence[Sequence[int]], *, whole: bool
 ) -> list[PictureSource]:
     """Return pictures for the frames of detections that another program made of them.
 
@@ -68,14 +88,14 @@ def for_frames(
     Args:
         cameras: the cameras.
         sources: pictures of each camera.
-        numbers: numbers of the frames.
+        numbers: numbers of each camera's pictures in the frames.
         whole: whether these are all frames of the detections.
 
     Raises:
         ValueError: too few pictures, or pictures of another shape than the camera's.
     """
     found = []
-    for camera, source in zip(cameras, sources, strict=True):
+    for camera, source, own in zip(cameras, sources, numbers, strict=True):
         across, down = (has / calibrated for has, calibrated in zip(source.size, camera.size, strict=True))
         cut = is_cut(source.size, camera.size)
         if cut:
@@ -87,12 +107,12 @@ def for_frames(
             )
         if source.size != camera.size and not cut:
             note(f"{source.path}: pictures of {_text(source.size)} pixels are scaled to {_text(camera.size)}")
-        matched, remark = source.numbered_for(numbers)
+        matched, remark = source.numbered_for(own)
         if remark:
             note(remark)
-        elif whole and source.count > numbers[-1] - numbers[0] + 1 + _slack(source.count):
+        elif whole and source.count > own[-1] - own[0] + 1 + _slack(source.count):
             note(
-                f"{source.path}: has {source.count} pictures for frames {numbers[0]} to {numbers[-1]}; check that they "
+                f"{source.path}: has {source.count} pictures for frames {own[0]} to {own[-1]}; check that they "
                 "are of this recording"
             )
         found.append(matched)

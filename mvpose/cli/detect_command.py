@@ -102,7 +102,7 @@ def run_into(calibration: Path, videos: Sequence[Path], choices: Choices, wanted
         wanted: options about the results.
         networks: what detects.
     """
-    from mvpose.cli.camera_pictures import assigned, check_lengths, check_sizes, common_rate, open_videos
+    from mvpose.cli.camera_pictures import assigned, check_lengths, check_sizes, open_videos, with_rates
     from mvpose.formats.calibration.calibration_formats import read_calibration
     from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
 
@@ -116,13 +116,13 @@ def run_into(calibration: Path, videos: Sequence[Path], choices: Choices, wanted
     check_sizes(rig.cameras, sources)
     if (stated := picture_size(choices.size)) is not None and any(source.size != stated for source in sources):
         raise ValueError(f"--size {choices.size}: the videos have pictures of another size; leave --size out")
-    if choices.frames is None:
+    if choices.frames is None and not choices.sync:
         check_lengths(sources)
     skeleton = _detect(sources, detections, networks)
     note(f"detections are kept in {detections}: another run does not detect again", usual=True)
     sizes = {source.size for source in sources}
     size = choices.size or ("x".join(map(str, sizes.pop())) if len(sizes) == 1 else None)
-    choices = replace(choices, fps=choices.fps or common_rate(sources), size=size, skeleton=skeleton)
+    choices = replace(with_rates(choices, sources), size=size, skeleton=skeleton)
     files = [detections / f"{source.name}.json" for source in sources]
     estimate_into(calibration, files, choices, wanted, sources=sources)
 

@@ -80,13 +80,16 @@ def repair_line(
     """
     from mvpose.calibration.findings import NEW_TIMES
 
+    if choices.sync:  # finds the clocks by itself
+        options = tuple(word for word in options if word not in (NEW_TIMES, "TIMES"))
     if not options:
         return ""
     words = ["mvpose", "repair", str(calibration), *map(str, detections)]
     for field in fields(choices):
         value = getattr(choices, field.name)
-        if field.name != "joints" and value is not None:
-            words += [f"--{field.name}", f"{value:g}" if isinstance(value, float) else str(value)]
+        if field.name != "joints" and value not in (None, False):
+            text = [] if value is True else [f"{value:g}" if isinstance(value, float) else str(value)]
+            words += [f"--{field.name}", *text]
     place, number = Path(folder), 1
     while place.exists():
         number += 1

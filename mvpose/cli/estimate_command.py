@@ -147,7 +147,12 @@ def estimate_into(
     inputs = read_inputs(calibration, detections, choices)
     views = None if sources is None else assigned(inputs.rig.cameras, sources)
     if views is not None and own:  # detections of another program, perhaps of other pictures
-        views = for_frames(inputs.rig.cameras, views, inputs.numbers.tolist(), whole=inputs.whole)
+        views = for_frames(
+            inputs.rig.cameras,
+            views,
+            [inputs.pictures(view).tolist() for view in range(len(inputs.rig))],
+            whole=inputs.whole and inputs.synchronised is None,
+        )
     method = estimator(wanted.method, lag=wanted.lag, period=inputs.period)
     tracks = isinstance(method, SequenceEstimator)
     for each in _without_effect(wanted, choices, inputs, tracks=tracks, pictures=sources is not None):
@@ -182,13 +187,13 @@ def estimate_into(
 
 def _of_pictures(choices: Choices, calibration: Path, sources: "Sequence[PictureSource]") -> Choices:
     """Return options with the rate, and the size, of the pictures, where nothing else states them."""
-    from mvpose.cli.camera_pictures import common_rate
+    from mvpose.cli.camera_pictures import assigned, with_rates
     from mvpose.formats.calibration.calibration_formats import read_calibration
     from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
 
-    if choices.times is None:
-        choices = replace(choices, fps=choices.fps or common_rate(sources))
     rig = read_calibration(calibration, size=UNKNOWN_SIZE, only=choices.only, key="--cameras", unit=choices.unit)
+    if choices.times is None:
+        choices = with_rates(choices, assigned(rig.cameras, sources))
     sizes = {source.size for source in sources}
     if choices.size is None and len(sizes) == 1 and UNKNOWN_SIZE in {camera.size for camera in rig}:
         choices = replace(choices, size="x".join(map(str, sizes.pop())))

@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     import mvpose
     from mvpose import Detections, Rig
+    from mvpose.cli.synchronisation import Synchronised
     from mvpose.formats.joint_names import JointNames
     from mvpose.formats.pose2sim_project import ProjectSettings
 
@@ -57,8 +58,20 @@ class Inputs:
     """Why the given upward axis may be wrong; "" where nothing speaks against it."""
     whole: bool = True
     """Whether these are all frames of the detections."""
+    synchronised: "Synchronised | None" = None
+    """Starts of cameras that began to record at different moments; None: frames of one number are of one moment."""
     digest: str = ""
     """Text that changes with anything in cameras, detections and times."""
+
+    def pictures(self, view: int) -> "NDArray[np.int64]":
+        """Return the number of the picture of a camera in each frame, (T,)."""
+        return self.numbers if self.synchronised is None else self.synchronised.pictures[:, view]
+
+    def select(self, rows: "NDArray[np.int64]") -> "Inputs":
+        """Return some frames."""
+        found = self.synchronised and replace(self.synchronised, pictures=self.synchronised.pictures[rows])
+        frames = [self.frames[row] for row in rows.tolist()]
+        return replace(self, frames=frames, numbers=self.numbers[rows], synchronised=found)
 
     @property
     def long(self) -> bool:
@@ -84,6 +97,14 @@ class Choices:
         None,
         "Times of the pictures in seconds: a line for each frame, with one number, or one for each camera.",
         metavar="FILE",
+    )
+    sync: bool = option(
+        False,
+        "The cameras began to record at different moments: find these from the people, up to 10 s apart.",
+        "--sync",
+    )
+    rates: str | None = option(
+        None, "Frames per second of each camera, where they differ; with --sync.", metavar="N,N,..."
     )
     size: str | None = option(
         None, "Size of the pictures in pixels, for calibrations that do not state it.", metavar="WxH"
@@ -119,6 +140,25 @@ class Choices:
         """Names of the cameras to use; empty for all."""
         return tuple(name.strip() for name in self.cameras.split(",")) if self.cameras else ()
 
+    def check(self) -> None:
+        """Check what does not depend on files.
+
+        Raises:
+            ValueError: an option that cannot be, or two that exclude each other.
+        """
+        if self.fps is not None and self.times is not None:
+            raise ValueError("--fps and --times: give one of them")
+        if self.sync and self.times is not None:
+            raise ValueError("--sync and --times: give one of them; --sync finds the times of the pictures")
+        if self.rates is not None and not self.sync:
+            raise ValueError("--rates: give --sync as well; without it, all cameras take a picture in every frame")
+        if self.rates is not None and self.fps is not None:
+            raise ValueError("--fps and --rates: give one of them")
+        if self.joints not in ("body", "all"):
+            raise ValueError(f"--joints must be body or all, got {self.joints!r}")
+        if self.fps is not None and not 0.0 < self.fps < 1e6:
+            raise ValueError(f"--fps must be above 0, got {self.fps}")
+
 
 def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices, *, examined: bool = False) -> Inputs:
     """Read a calibration and detections, and check that they can belong together. Notes are printed on stderr.
@@ -136,12 +176,7 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     from mvpose.formats.detections import plausibility
     from mvpose.formats.detections.recorded_frames import read_recording
 
-    if choices.fps is not None and choices.times is not None:
-        raise ValueError("--fps and --times: give one of them")
-    if choices.joints not in ("body", "all"):
-        raise ValueError(f"--joints must be body or all, got {choices.joints!r}")
-    if choices.fps is not None and not 0.0 < choices.fps < 1e6:
-        raise ValueError(f"--fps must be above 0, got {choices.fps}")
+    choices.check()
     frames, size = _frames(choices.frames), picture_size(choices.size)
     skeleton, origin, project = _skeleton(choices.skeleton) if choices.skeleton else None, "", _project(detections)
     if skeleton is None:
@@ -161,7 +196,8 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
             skeleton=skeleton,
             origin=origin,
             all_joints=choices.joints == "all",
-            frames=frames,
+            frames=None if choices.sync else frames,
+            apart=choices.sync,
             progress=advance,
         )
     note(recorded.assignment.text(names), usual=recorded.assignment.by_name)
@@ -181,10 +217,21 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
         if doubt:
             note(doubt)
         rig = plausibility.turned_up(rig, choices.up)
-    times, period = _times(choices, recorded.numbers, names, project)
+    found, numbers = None, recorded.numbers
+    if choices.sync:
+        from mvpose.cli.synchronisation import rates_of, synchronised
+
+        period = 1.0 if choices.rates is not None else _times(choices, numbers, names, project)[1]
+        found = synchronised(rig, recorded, rates_of(choices.rates, names, 1.0 / period), frames)
+        recorded, times, period = found.recorded, found.times, found.period
+        note(found.text(names))
+    else:
+        times, period = _times(choices, numbers, names, project)
     paths = tuple(source.path for source in recorded.assignment.sources)
     digest = recorded.digest(rig.packed, times)
-    return Inputs(rig, recorded.detections(times), recorded.numbers, period, paths, doubt, frames is None, digest)
+    return Inputs(
+        rig, recorded.detections(times), recorded.numbers, period, paths, doubt, frames is None, found, digest
+    )
 
 
 def doubt_about(rig: "Rig", up: str) -> str:

@@ -67,6 +67,11 @@ def repair(
             check_new(out)
         elif free is not None or mend:
             raise ValueError("--mend and --free change the calibration: give --out")
+        if new_times is not None and choices.sync:
+            raise ValueError(
+                "--sync and --new-times: files that count from different moments have no times in common; give --sync "
+                "to the other commands as well"
+            )
         if new_times is not None:
             check_new(new_times, option="--new-times")
         mends = [Mend.parsed(text) for text in mend or []]

@@ -4,7 +4,6 @@ import contextlib
 import json
 import shutil
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -126,9 +125,13 @@ def write_results(
             people = parts.whole()
             write_people(people, partial, formats=ALWAYS)  # in the axes of the cameras, which pages and commands expect
             write_people(people, partial, formats=others, options=options)
+        starts = inputs.synchronised
         about = {
             "command": PROGRAM.command_line(),
-            "cameras": [{"name": camera.name, "size": list(camera.size)} for camera in inputs.rig],
+            "cameras": [
+                {"name": camera.name, "size": list(camera.size)} | (starts.record(k) if starts else {})
+                for k, camera in enumerate(inputs.rig)
+            ],
             "fps": round(parts.rate, 6),
             "numbers": inputs.numbers.tolist(),  # of the frames in the files of detections; ours count from 0
             "people": parts.spans,  # TRC, C3D and BVH files begin at the first frame, which counts from 0
@@ -140,7 +143,7 @@ def write_results(
             if inputs.long:
                 rows = compared_frames(parts.frames)
                 people, name = parts.whole(rows=rows), f"{name}, one in {rows[1]} frames"
-                inputs = replace(inputs, frames=[inputs.frames[row] for row in rows], numbers=inputs.numbers[rows])
+                inputs = inputs.select(rows)
             _write_page(partial, name, people, inputs, views, films=films, diagnosis=diagnosis, left_out=left_out)
 
 
@@ -163,11 +166,11 @@ def _write_page(
     missing = [0] * len(inputs.rig)
 
     def picture(frame: int, view: int) -> Any:
-        found = None if views is None else views[view].picture(int(inputs.numbers[frame]))
+        found = None if views is None else views[view].picture(int(inputs.pictures(view)[frame]))
         return None if found is None else uncut(found, inputs.rig[view].size)
 
     def moving(view: int, frames: Any) -> Iterator[Any]:
-        for each in () if views is None else views[view].some(inputs.numbers[frames].tolist()):
+        for each in () if views is None else views[view].some(inputs.pictures(view)[frames].tolist()):
             missing[view] += each is None
             yield None if each is None else uncut(each, inputs.rig[view].size)
 

@@ -8,7 +8,7 @@ import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -97,6 +97,14 @@ class RecordedFrames:
         frames = _FramesOnDisk(self, times)
         return list(frames) if len(frames) <= IN_MEMORY else frames
 
+    def regrouped(self, numbers: Integers, pictures: Integers) -> Self:
+        """Return frames with new numbers, (T,), given the number of the picture of each camera in them, (T, V)."""
+        stores = []
+        for own, column in zip(self.pictures, pictures.T.tolist(), strict=True):
+            there = {old: new for old, new in zip(column, numbers.tolist(), strict=True) if old in own}
+            stores.append(own.renumbered(there))
+        return replace(self, numbers=numbers, pictures=tuple(stores))
+
     def frame(self, row: int, times: Floats | None) -> Detections:
         """Return the detections of one frame, given the time of each picture, (V,)."""
         number, nobody = int(self.numbers[row]), PicturePeople.nobody(len(self.skeleton))
@@ -132,6 +140,7 @@ def read_recording(
     origin: str = "",
     all_joints: bool = False,
     frames: tuple[int, int] | None = None,
+    apart: bool = False,
     progress: Callable[[int], None] = lambda _: None,
 ) -> RecordedFrames:
     """Read the detections of all cameras.
@@ -143,6 +152,7 @@ def read_recording(
         origin: where the skeleton is stated if not by the user, for messages; it is used if it has as many joints.
         all_joints: keep the joints beyond COCO-17, on a skeleton of :mod:`mvpose.wholebody`.
         frames: first and last frame to take, by the numbers in the files; None: all.
+        apart: the cameras began to record at different moments: frames of one number have nothing in common.
         progress: called with the number of cameras that were read since the last call.
 
     Raises:
@@ -156,7 +166,7 @@ def read_recording(
         progress(1)
     choice = choose_skeletons(_all_pictures(views), declared=skeleton, origin=origin)
     views = [_converted(view, choice, all_joints=all_joints) for view in views]
-    numbers = _frame_numbers(cameras, views, frames)
+    numbers = _frame_numbers(cameras, views, frames, apart=apart)
     joints = _joints(cameras, views)
     pictures = tuple(view.pictures for view in views)
     shown = [any(len(each[number]) for number in numbers.tolist() if number in each) for each in pictures]
@@ -370,7 +380,9 @@ def _joints(cameras: Sequence[str], views: Sequence[ViewPeople]) -> Skeleton:
     return COCO17 if name == COCO17.name else skeleton_by_name(name)
 
 
-def _frame_numbers(cameras: Sequence[str], views: Sequence[ViewPeople], frames: tuple[int, int] | None) -> Integers:
+def _frame_numbers(
+    cameras: Sequence[str], views: Sequence[ViewPeople], frames: tuple[int, int] | None, *, apart: bool
+) -> Integers:
     """Return the numbers of the frames of a recording, (T,), increasing."""
     some = [k for k, view in enumerate(views) if view.pictures]
     if not some:  # lists of results without any
@@ -378,11 +390,11 @@ def _frame_numbers(cameras: Sequence[str], views: Sequence[ViewPeople], frames: 
     cameras, views = [cameras[k] for k in some], [views[k] for k in some]
     spans = np.array([(min(view.pictures), max(view.pictures)) for view in views])
     whole = [k for k, view in enumerate(views) if view.complete]
-    if frames is None and whole and len(np.unique(spans[whole], axis=0)) > 1:
+    if not apart and frames is None and whole and len(np.unique(spans[whole], axis=0)) > 1:
         first, last = spans[whole, 0].max(), spans[whole, 1].min()
         has = listed([f"{cameras[k]} {spans[k, 0]} to {spans[k, 1]}" for k in whole])
         mend = (
-            f"give the frames that all have, --frames {first}:{last}, or let all numbers begin at the same moment"
+            f"give the frames that all have, --frames {first}:{last}, or find their starts from the people, --sync"
             if first <= last
             else "number the pictures alike, from the same moment on"
         )
