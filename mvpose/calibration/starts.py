@@ -37,6 +37,8 @@ _COARSE = 16  # steps between shifts at which the most evidence is computed: it 
 _SHORTEST = 0.1  # of the greatest overlap, below which a shift is not looked at
 _DOUBT = 4.0  # standard deviation of a share, times the root of the evidence in nats: few poses agree by chance
 _PEAK = 0.4  # s around the best shift that are the same answer: half a step of a person who walks
+_LEAST_AGREEMENT = 0.8  # of two groups at the best shift: .88 and more for right ones of simulated cameras
+_USUAL = 0.1  # of how far the best shift is ahead of the median one, as a margin: people who stand still have no other
 _LEAST_MARGIN = 0.012
 """Least margin of a result: wrong ones of simulated recordings (one person, or steps on the spot that repeat) have .006
 at most."""
@@ -47,7 +49,7 @@ class Starts:
     """Starts of V cameras."""
 
     offsets: Floats
-    """True time minus given time of each camera, (V,), seconds, against the first one; to half a frame or so."""
+    """True time minus given time of each camera, (V,), seconds, against the first one; to a frame."""
     margins: Floats
     """How far the offset of each camera is ahead of any other one, (V,): difference of the shares of evidence."""
 
@@ -102,7 +104,8 @@ def find_starts(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04)
 
 def _curves(rig: Rig, tracklets: Tracklets) -> tuple[Floats, Floats, float]:
     """Return the evidence of each pair of views at each shift of the second, its most, (V, V, S), and the step, s."""
-    step = max(_STEP, float(np.nanmin(np.nanmedian(np.diff(tracklets.times, axis=0), axis=0))))
+    delivered = [column[np.isfinite(column)] for column in tracklets.times.T]
+    step = max(_STEP, min(float(np.median(np.diff(each))) for each in delivered if len(each) > 1))
     most, window, every = round(LARGEST / step), round(_WINDOW / step), max(1, round(_SPACING / step))
     shifts = np.arange(-most, most + 1)
     some = np.unique(np.append(shifts[::_COARSE], most))
@@ -187,5 +190,8 @@ def _best(
     known = np.maximum(whole, 1.0)
     share = np.where(whole >= _SHORTEST * whole.max(), total / known - _DOUBT / np.sqrt(known), -np.inf)
     best = int(share.argmax())
+    if total[best] < _LEAST_AGREEMENT * whole[best]:
+        return 0.0, int(shifts[best])
     rest = share[np.abs(shifts - shifts[best]) > _PEAK / step]
-    return float(share[best] - rest.max()), int(shifts[best])
+    usual = np.median(share[np.isfinite(share)])
+    return float(min(share[best] - rest.max(), _USUAL * (share[best] - usual))), int(shifts[best])

@@ -105,6 +105,7 @@ CI = ".ci/run"
 PYTEST = ('pytest -m "not slow"', "pytest tests/simharness/detector")
 MVPOSE = (  # run by tests/mvpose/cli
     "mvpose estimate CALIBRATION DETECTIONS --out results",
+    "mvpose estimate CALIBRATION DETECTIONS --sync --out results",
     "mvpose estimate CALIBRATION DETECTIONS --format trc,opensim,mot,angles --out results",
     "opensim-cmd run-tool person_3_scale.xml",  # tests/mvpose/formats/test_opensim_files.py
     "opensim-cmd run-tool person_3_ik.xml",

@@ -35,6 +35,8 @@ READ = {
     "size": Row("--size 1282x962", base="{lab}/unsized.json {lab}/openpose"),
     "cameras": Row("--cameras cam0,cam1,cam3"),
     "frames": Row("--frames 2:10"),
+    "sync": Row("--sync"),
+    "rates": Row("--rates 25,25,25,50"),
     "skeleton": Row("--skeleton body25b"),
     "unit": Row("--unit cm"),
     "up": Row("--up y"),
@@ -104,7 +106,9 @@ ROWS = {
     "view": {"browser": Row("--browser")},
     "batch": {"out": Row("--out {out}")},
 }
-ROWS["run"] = ROWS["detect"] | {key: READ[key] for key in ("cameras", "frames", "up")} | {"fps": Row("--fps 50")}
+ROWS["run"] = (
+    ROWS["detect"] | {key: READ[key] for key in ("cameras", "frames", "up", "sync", "rates")} | {"fps": Row("--fps 50")}
+)
 ROWS["run"] |= {"page": RESULTS["page"], "films": RESULTS["films"], "formats": RESULTS["formats"]}
 """Options by command and name of the parameter; ``threads`` and ``package`` have tests of their own."""
 

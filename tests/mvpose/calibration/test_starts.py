@@ -1,0 +1,82 @@
+"""Starts of cameras seconds apart: found, independent of what files count from, and refused where nothing tells."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moving_people import disturbed, film, walk
+from people import ring
+
+from mvpose import Detections
+from mvpose.calibration.starts import find_starts
+
+RIG = ring(4)
+PERIOD = 0.08
+STARTS = np.array([0, 25, -31, 12])  # frames
+JOINTS = walk(2, frames=210, period=PERIOD, seed=4)
+
+
+def apart(frames, starts, *, length=140, first=35):
+    """Frames of cameras that begin so many frames after one of them; all count from 0."""
+    result = []
+    for k in range(length):
+        parts = [
+            frames[first + start + k].select(frames[first + start + k].view == v) for v, start in enumerate(starts)
+        ]
+        columns = [np.concatenate([getattr(each, key) for each in parts]) for key in ("view", "keypoints", "scores")]
+        result.append(replace(Detections.from_keypoints(*columns), time=np.full(len(starts), k * PERIOD)))
+    return result
+
+
+@pytest.fixture(scope="module")
+def frames():
+    return apart(film(RIG, JOINTS)[0], STARTS)
+
+
+@pytest.fixture(scope="module")
+def found(frames):
+    return find_starts(RIG, frames)
+
+
+def test_starts_are_found_within_a_frame(found):
+    np.testing.assert_allclose(found.offsets, PERIOD * STARTS, atol=PERIOD / 2)
+
+
+def test_a_clock_that_is_set_anew_moves_its_start_alone(found, frames):
+    again = find_starts(RIG, [replace(each, time=each.time + [0.0, 0.0, 4.0, 0.0]) for each in frames])
+    np.testing.assert_allclose(again.offsets - found.offsets, [0.0, 0.0, -4.0, 0.0], atol=1e-9)
+
+
+def test_cameras_that_are_off_by_half_a_degree_change_nothing(frames):
+    moved = find_starts(disturbed(RIG, 0.5, 0.02, seed=1), frames)
+    np.testing.assert_allclose(moved.offsets, PERIOD * STARTS, atol=PERIOD)
+
+
+def test_lost_pictures_cost_a_frame_at_most(frames):
+    lost = [each.select(each.view != k % 7) for k, each in enumerate(frames)]
+    times = [np.where(np.arange(4) == k % 7, np.nan, each.time) for k, each in enumerate(frames)]
+    some = [replace(each, time=time) for each, time in zip(lost, times, strict=True)]
+    np.testing.assert_allclose(find_starts(RIG, some).offsets, PERIOD * STARTS, atol=1.01 * PERIOD)
+
+
+def test_people_who_stand_still_are_refused():
+    still = apart(film(RIG, walk(2, frames=210, period=PERIOD, still=True))[0], STARTS)
+    with pytest.raises(ValueError, match="cannot tell when camera"):
+        find_starts(RIG, still)
+
+
+@pytest.mark.parametrize("other", [3, 0])
+def test_a_camera_that_films_other_people_is_refused(frames, other):
+    strangers = apart(film(RIG, walk(2, frames=210, period=PERIOD, seed=11, radius=0.5))[0], STARTS)
+    mixed = []
+    for a, b in zip(frames, strangers, strict=True):
+        parts = a.select(a.view != other), b.select(b.view == other)
+        columns = (np.concatenate([getattr(each, key) for each in parts]) for key in ("view", "keypoints", "scores"))
+        mixed.append(Detections.from_keypoints(*columns))
+    with pytest.raises(ValueError, match=f"camera .*{other}"):
+        find_starts(RIG, mixed, period=PERIOD)
+
+
+def test_a_camera_that_sees_nobody_is_named(frames):
+    with pytest.raises(ValueError, match=r"camera .*2 began .* sees nobody"):
+        find_starts(RIG, [each.select(each.view != 2) for each in frames])
