@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mvpose.arrays import Bools, Floats, Integers
-from mvpose.calibration.consistency import ViewRays, best_evidence, normalised
+from mvpose.calibration.consistency import ViewRays, evidence_and_most, normalised
 from mvpose.calibration.findings import camera_names
 from mvpose.calibration.sufficiency import RECORD
 from mvpose.calibration.tracklets import Tracklets, link
@@ -30,10 +30,9 @@ LARGEST = 10.0
 
 _STEP = 0.04  # s between shifts that are compared, or a frame of the fastest camera: people walk 5 cm in it
 _WINDOW = 2.0  # s over which people are matched as a whole, as in :mod:`.pieces`
-_SPACING = 0.16  # s between poses that are compared: errors of detectors last longer
+_SPACING = 0.24  # s between poses that are compared: errors of detectors last longer
 _LONGEST = 30.0  # s of a recording that are looked at
 _TOLERANCE = 0.01  # of normalised coordinates: errors of the calibration, and of half a step
-_COARSE = 16  # steps between shifts at which the most evidence is computed: it changes with the overlap alone
 _SHORTEST = 0.1  # of the greatest overlap, below which a shift is not looked at
 _DOUBT = 4.0  # standard deviation of a share, times the root of the evidence in nats: few poses agree by chance
 _PEAK = 0.4  # s around the best shift that are the same answer: half a step of a person who walks
@@ -108,7 +107,6 @@ def _curves(rig: Rig, tracklets: Tracklets) -> tuple[Floats, Floats, float]:
     step = max(_STEP, min(float(np.median(np.diff(each))) for each in delivered if len(each) > 1))
     most, window, every = round(LARGEST / step), round(_WINDOW / step), max(1, round(_SPACING / step))
     shifts = np.arange(-most, most + 1)
-    some = np.unique(np.append(shifts[::_COARSE], most))
     views = [_poses(rig, tracklets, view, step) for view in range(len(rig))]
     first = _busiest(np.concatenate([each.row for each in views]), round(_LONGEST / step))
     windows = round(_LONGEST / _WINDOW)
@@ -118,10 +116,8 @@ def _curves(rig: Rig, tracklets: Tracklets) -> tuple[Floats, Floats, float]:
         sparse = views[a].select(views[a].row % every == 0)
         one, spreads = _placed(sparse, first, window, windows), np.stack([views[a].spread, views[b].spread])
         pair = spreads, rig.packed[[a, b]]
-        others = placed[b - 1]
-        evidence[a, b] = [best_evidence(one, others[k], *pair, False).sum() for k in range(len(shifts))]
-        at = [best_evidence(one, others[k + most], *pair, True).sum() for k in some.tolist()]
-        ideal[a, b] = np.interp(shifts, some, at)
+        found = np.array([evidence_and_most(one, other, *pair) for other in placed[b - 1]])
+        evidence[a, b], ideal[a, b] = found.T
         evidence[b, a], ideal[b, a] = evidence[a, b, ::-1], ideal[a, b, ::-1]
     return evidence, ideal, step
 
