@@ -3,11 +3,9 @@
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from mvpose.camera import Camera
-from mvpose.cli.inputs import Choices
 from mvpose.commands.programs import note
 from mvpose.files.message_text import listed
 from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
@@ -46,24 +44,6 @@ def common_rate(sources: Sequence[PictureSource]) -> float | None:
             "frame k of all is of one moment"
         )
     return next(iter(rates.values()), None)
-
-
-def with_rates(choices: Choices, sources: Sequence[PictureSource]) -> Choices:
-    """Return options with the rate of the pictures, or those of each camera, where nothing else states them.
-
-    Args:
-        choices: options about the recording.
-        sources: pictures of each camera, in the order of the calibration.
-
-    Raises:
-        ValueError: different rates of cameras that began at one moment.
-    """
-    if choices.fps or choices.rates:
-        return choices
-    rates = [source.fps for source in sources]
-    if choices.sync and all(map(math.isfinite, rates)):
-        return replace(choices, rates=",".join(f"{rate:.9g}" for rate in rates))
-    return replace(choices, fps=common_rate(sources))
 
 
 def assigned(cameras: Sequence[Camera], sources: Sequence[PictureSource]) -> list[PictureSource]:

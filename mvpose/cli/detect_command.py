@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from mvpose.cli.estimate_command import Wanted, estimate_into
-from mvpose.cli.inputs import Calibration, Choices, picture_size
+from mvpose.cli.inputs import Calibration, Choices, picture_size, with_rates
 from mvpose.cli.program import PROGRAM
 from mvpose.commands.option_groups import grouped, option
 from mvpose.commands.programs import note
@@ -102,7 +102,7 @@ def run_into(calibration: Path, videos: Sequence[Path], choices: Choices, wanted
         wanted: options about the results.
         networks: what detects.
     """
-    from mvpose.cli.camera_pictures import assigned, check_lengths, check_sizes, open_videos, with_rates
+    from mvpose.cli.camera_pictures import assigned, check_lengths, check_sizes, open_videos
     from mvpose.formats.calibration.calibration_formats import read_calibration
     from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
 

@@ -187,7 +187,8 @@ def estimate_into(
 
 def _of_pictures(choices: Choices, calibration: Path, sources: "Sequence[PictureSource]") -> Choices:
     """Return options with the rate, and the size, of the pictures, where nothing else states them."""
-    from mvpose.cli.camera_pictures import assigned, with_rates
+    from mvpose.cli.camera_pictures import assigned
+    from mvpose.cli.inputs import with_rates
     from mvpose.formats.calibration.calibration_formats import read_calibration
     from mvpose.formats.detections.plausibility import UNKNOWN_SIZE
 

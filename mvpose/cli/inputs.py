@@ -1,6 +1,7 @@
 """Calibration and detections of a recording, read and checked: the first step of every command about one."""
 
 import contextlib
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from mvpose import Detections, Rig
     from mvpose.cli.synchronisation import Synchronised
     from mvpose.formats.joint_names import JointNames
+    from mvpose.formats.pictures import PictureSource
     from mvpose.formats.pose2sim_project import ProjectSettings
 
 Calibration = Annotated[
@@ -158,6 +160,26 @@ class Choices:
             raise ValueError(f"--joints must be body or all, got {self.joints!r}")
         if self.fps is not None and not 0.0 < self.fps < 1e6:
             raise ValueError(f"--fps must be above 0, got {self.fps}")
+
+
+def with_rates(choices: Choices, sources: "Sequence[PictureSource]") -> Choices:
+    """Return options with the rate of the pictures, or those of each camera, where nothing else states them.
+
+    Args:
+        choices: options about the recording.
+        sources: pictures of each camera, in the order of the calibration.
+
+    Raises:
+        ValueError: different rates of cameras that began at one moment.
+    """
+    from mvpose.cli.camera_pictures import common_rate
+
+    if choices.fps or choices.rates:
+        return choices
+    rates = [source.fps for source in sources]
+    if choices.sync and all(map(math.isfinite, rates)):
+        return replace(choices, rates=",".join(f"{rate:.9g}" for rate in rates))
+    return replace(choices, fps=common_rate(sources))
 
 
 def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices, *, examined: bool = False) -> Inputs:
