@@ -52,7 +52,7 @@ def coarse_offsets(rig: Rig, tracks: ImageTracks) -> Floats:
     for a, b in itertools.combinations(range(views), 2):
         curve = _curve(rays[:, a], rays[:, b], rig.centers[b] - rig.centers[a], most, every)
         costs[a, b], costs[b, a] = curve, curve[::-1]
-    return tracks.period * _joint_shifts(costs, most)
+    return -tracks.period * joint_shifts(costs).astype(np.float64)
 
 
 def _rays(rig: Rig, points: Floats) -> Floats:
@@ -84,20 +84,25 @@ def _curve(a: Floats, b: Floats, baseline: Floats, most: int, every: int) -> Flo
     return counts.max() * mean
 
 
-def _joint_shifts(costs: Floats, most: int) -> Floats:
-    """Return shifts (V,) in frames of least total cost, view by view until none changes, from the best of V starts."""
-    best, least = np.zeros(len(costs), int), np.inf
+def joint_shifts(costs: Floats) -> Integers:
+    """Return shifts (V,) of least total cost, view by view until none changes, from the best of V starts.
+
+    Args:
+        costs: of each pair of views, (V, V, 2 M + 1), at shifts of the second against the first from -M to M.
+    """
+    most = costs.shape[2] // 2
+    best, least = np.zeros(len(costs), np.int64), np.inf
     for start in range(len(costs)):
         shifts = _improved(costs, most, _grown(costs, most, start))
         total = _total(costs, most, shifts)
         if total < least - 1e-9:
             best, least = shifts, total
-    return -(best - np.round(np.median(best)))
+    return best - int(np.round(np.median(best)))
 
 
-def _grown(costs: Floats, most: int, start: int) -> Floats:
+def _grown(costs: Floats, most: int, start: int) -> Integers:
     """Return shifts that are found one view after the other, beginning at one."""
-    shifts, done = np.zeros(len(costs), int), [start]
+    shifts, done = np.zeros(len(costs), np.int64), [start]
     while len(done) < len(costs):
         rest = [view for view in range(len(costs)) if view not in done]
         curves = {view: _conditional(costs, most, shifts, view, done) for view in rest}
@@ -107,7 +112,7 @@ def _grown(costs: Floats, most: int, start: int) -> Floats:
     return shifts
 
 
-def _improved(costs: Floats, most: int, shifts: Floats) -> Floats:
+def _improved(costs: Floats, most: int, shifts: Integers) -> Integers:
     for _ in range(_ROUNDS):
         before = shifts.copy()
         for view in range(len(costs)):
@@ -118,7 +123,7 @@ def _improved(costs: Floats, most: int, shifts: Floats) -> Floats:
     return shifts
 
 
-def _conditional(costs: Floats, most: int, shifts: Floats, view: int, others: list[int]) -> Floats:
+def _conditional(costs: Floats, most: int, shifts: Integers, view: int, others: list[int]) -> Floats:
     """Return the cost of each shift of a view, (2 most + 1,), beside other views with known shifts."""
     total, wanted = np.zeros(2 * most + 1), np.arange(-most, most + 1)
     for other in others:
@@ -128,7 +133,7 @@ def _conditional(costs: Floats, most: int, shifts: Floats, view: int, others: li
     return total
 
 
-def _total(costs: Floats, most: int, shifts: Floats) -> float:
+def _total(costs: Floats, most: int, shifts: Integers) -> float:
     pairs = itertools.combinations(range(len(costs)), 2)
     apart = [(a, b, int(shifts[b] - shifts[a])) for a, b in pairs]
     return float(sum(costs[a, b, s + most] if abs(s) <= most else costs[a, b].max() for a, b, s in apart))

@@ -250,14 +250,13 @@ def best_evidence(first, second, spreads, cameras, ideal):
 
 @njit(cache=True)
 def evidence_and_most(first, second, spreads, cameras):
-    """Return the sum of :func:`best_evidence` over all windows, and of its most, (2,); the arguments are the same."""
-    total = np.zeros(2)
+    """Return :func:`best_evidence`, and its most, of each window, (W, 2); the arguments are the same."""
+    result = np.zeros((len(first[1]), 2))
     for w in range(len(first[1])):
         if first[1][w] and second[1][w]:
             sums = window_sums(first, second, spreads, cameras, w, False)
-            total[0] += _assign(sums)
-            total[1] += _ideal(sums, window_sums(first, second, spreads, cameras, w, True))
-    return total
+            result[w] = _assign(sums), _ideal(sums, window_sums(first, second, spreads, cameras, w, True))
+    return result
 
 
 @njit(cache=True)

@@ -18,7 +18,7 @@ from mvpose.detections import Detections
 from mvpose.formats.detections.recorded_frames import RecordedFrames
 from mvpose.wholebody import body_part
 
-_LOOKED_AT = 60.0  # s of a longer recording in which starts are looked for, where most is detected
+_LOOKED_AT = 40.0  # s of a longer recording in which starts are looked for, where most is detected
 _NEAR = 0.2  # s, beyond which clocks that start where the people say do not refine this
 _LEAST_FRAMES = 2
 
@@ -58,7 +58,7 @@ class Synchronised:
             f"starts of the cameras, from the people: {', '.join(of)}; all have {len(self.times)} frames, with the "
             f"numbers of {names[int(self.rates.argmin())]}; pictures of a frame are up to {apart:.0f} ms apart"
         )
-        return text + (f"; known to a frame only: {', '.join(vague)}" if vague else "")
+        return text + (f"; known to a tenth of a second only: {', '.join(vague)}" if vague else "")
 
 
 def rates_of(given: str | None, names: Sequence[str], rate: float) -> Floats:
@@ -90,9 +90,9 @@ def synchronised(rig: Rig, recorded: RecordedFrames, rates: Floats, frames: tupl
     """
     views, first = len(rig), int(rates.argmin())
     apart = _grouped(recorded, rates, np.zeros(views), np.zeros(views, np.bool_), shared=False)
-    starts = find_starts(rig, _busiest(apart)).offsets
+    starts = find_starts(rig, _busiest(apart))
     starts = starts - starts[first]
-    found = _grouped(recorded, rates, starts, np.zeros(views, np.bool_))
+    found = _grouped(recorded, rates, starts, np.zeros(views, np.bool_), shared=False)
     clocks = estimate_clocks(rig, _busiest(found))
     changes = clocks.offsets - clocks.offsets[first]
     refined = clocks.determined & clocks.determined[first] & (np.abs(changes) < _NEAR)
@@ -128,7 +128,7 @@ def _grouped(
 
 
 def _busiest(found: Synchronised) -> list[Detections]:
-    """Return the frames in a row, a minute at most, in which most is detected."""
+    """Return the frames in a row, forty seconds at most, in which most is detected."""
     frames = found.recorded.detections(found.times)
     length = round(_LOOKED_AT / found.period)
     if len(frames) <= length:

@@ -131,6 +131,7 @@ MODULES = tuple(
         "benchmarks.method",
         "benchmarks.pictures",
         "benchmarks.simulator",
+        "benchmarks.starts",
         "benchmarks.tracking",
         "benchmarks.planted_bugs",
         "benchmarks.mutation",

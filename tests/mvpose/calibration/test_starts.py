@@ -39,30 +39,36 @@ def found(frames):
 
 
 def test_starts_are_found_within_a_frame(found):
-    np.testing.assert_allclose(found.offsets, PERIOD * STARTS, atol=PERIOD / 2)
+    np.testing.assert_allclose(found, PERIOD * STARTS, atol=PERIOD)
 
 
 def test_a_clock_that_is_set_anew_moves_its_start_alone(found, frames):
     again = find_starts(RIG, [replace(each, time=each.time + [0.0, 0.0, 4.0, 0.0]) for each in frames])
-    np.testing.assert_allclose(again.offsets - found.offsets, [0.0, 0.0, -4.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(again - found, [0.0, 0.0, -4.0, 0.0], atol=1e-9)
 
 
 def test_cameras_that_are_off_by_half_a_degree_change_nothing(frames):
     moved = find_starts(disturbed(RIG, 0.5, 0.02, seed=1), frames)
-    np.testing.assert_allclose(moved.offsets, PERIOD * STARTS, atol=PERIOD)
+    np.testing.assert_allclose(moved, PERIOD * STARTS, atol=PERIOD)
 
 
 def test_lost_pictures_cost_a_frame_at_most(frames):
     lost = [each.select(each.view != k % 7) for k, each in enumerate(frames)]
     times = [np.where(np.arange(4) == k % 7, np.nan, each.time) for k, each in enumerate(frames)]
     some = [replace(each, time=time) for each, time in zip(lost, times, strict=True)]
-    np.testing.assert_allclose(find_starts(RIG, some).offsets, PERIOD * STARTS, atol=1.01 * PERIOD)
+    np.testing.assert_allclose(find_starts(RIG, some), PERIOD * STARTS, atol=1.01 * PERIOD)
 
 
 def test_people_who_stand_still_are_refused():
     still = apart(film(RIG, walk(2, frames=210, period=PERIOD, still=True))[0], STARTS)
     with pytest.raises(ValueError, match="cannot tell when camera"):
         find_starts(RIG, still)
+
+
+def test_people_who_do_the_same_again_are_refused():
+    again = np.concatenate([JOINTS[:60]] * 4)
+    with pytest.raises(ValueError, match="or always alike"):
+        find_starts(RIG, apart(film(RIG, again)[0], STARTS))
 
 
 @pytest.mark.parametrize("other", [3, 0])
@@ -73,7 +79,7 @@ def test_a_camera_that_films_other_people_is_refused(frames, other):
         parts = a.select(a.view != other), b.select(b.view == other)
         columns = (np.concatenate([getattr(each, key) for each in parts]) for key in ("view", "keypoints", "scores"))
         mixed.append(Detections.from_keypoints(*columns))
-    with pytest.raises(ValueError, match=f"camera .*{other}"):
+    with pytest.raises(ValueError, match=f"camera \\S*{other} began"):
         find_starts(RIG, mixed, period=PERIOD)
 
 
