@@ -15,6 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import simharness
 from mvpose import Detections, Rig
@@ -80,6 +81,15 @@ def _film(number: int, seed: int, apart: float) -> _Film:
     return _Film(recording.rig, pictures, rates, first / _RATE)
 
 
+def turned(rig: Rig, degrees: float, seed: int) -> Rig:
+    """Return the rig with each camera turned about its centre, by so many degrees about a random axis."""
+    axes = np.random.default_rng([seed, 1]).standard_normal((len(rig), 3))
+    axes *= np.radians(degrees) / np.linalg.norm(axes, axis=1, keepdims=True)
+    matrices = Rotation.from_rotvec(axes).as_matrix()
+    cameras = zip(rig, matrices, rig.centers, strict=True)
+    return Rig([replace(each, R=turn @ each.R, t=-turn @ each.R @ center) for each, turn, center in cameras])
+
+
 def _found(film: _Film) -> tuple[str, Floats | None]:
     """Return what the command says, and the starts that it finds, (V,), seconds; None where it refuses."""
     with TemporaryDirectory() as place, contextlib.redirect_stderr(io.StringIO()):
@@ -107,6 +117,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=93000, metavar="N", help="of the first recording")
     parser.add_argument("--apart", type=float, default=5.0, metavar="S", help="most seconds between two starts")
     parser.add_argument("--strangers", action="store_true", help="one camera shows other people")
+    parser.add_argument("--turned", type=float, default=0.0, metavar="DEG", help="error of each camera's rotation")
     options = parser.parse_args()
     within = answered = 0
     before: _Film | None = None
@@ -117,7 +128,7 @@ def main() -> None:
             other = [replace(each, view=np.zeros_like(each.view)) for each in before.pictures[0]]
             shown = replace(film, pictures=[other, *film.pictures[1:]], rates=[before.rates[0], *film.rates[1:]])
         before = film
-        words, starts = _found(shown)
+        words, starts = _found(replace(shown, rig=turned(film.rig, options.turned, options.seed + number)))
         answer = words
         if starts is not None:
             error = np.ptp(starts - film.starts)
@@ -127,4 +138,5 @@ def main() -> None:
     print(f"{within} of {options.count} within a frame, {answered - within} wrong, {options.count - answered} refused")
 
 
-main()
+if __name__ == "__main__":
+    main()
