@@ -15,6 +15,7 @@ from mvpose.calibration import estimate_clocks
 from mvpose.calibration.starts import find_starts
 from mvpose.camera import Rig
 from mvpose.detections import Detections
+from mvpose.files.message_text import prefixed
 from mvpose.formats.detections.recorded_frames import RecordedFrames
 from mvpose.wholebody import body_part
 
@@ -90,7 +91,8 @@ def synchronised(rig: Rig, recorded: RecordedFrames, rates: Floats, frames: tupl
     """
     views, first = len(rig), int(rates.argmin())
     apart = _grouped(recorded, rates, np.zeros(views), np.zeros(views, np.bool_), shared=False)
-    starts = find_starts(rig, _busiest(apart))
+    with prefixed("--sync"):
+        starts = find_starts(rig, _busiest(apart))
     starts = starts - starts[first]
     found = _grouped(recorded, rates, starts, np.zeros(views, np.bool_), shared=False)
     clocks = estimate_clocks(rig, _busiest(found))
