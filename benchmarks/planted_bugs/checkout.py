@@ -12,9 +12,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from benchmarks.planted_bugs.catalogue import Bug
 
@@ -89,25 +90,29 @@ class Checkout:
             path.write_text(text, encoding="utf-8")
             yield copy
 
-    def run(self, arguments: Sequence[str], *, limit: float) -> Finished:
+    def run(
+        self, arguments: Sequence[str], *, limit: float, environment: Mapping[str, str] = MappingProxyType({})
+    ) -> Finished:
         """Run Python in the copy.
 
         Args:
             arguments: arguments of the interpreter, for example ``["-m", "pytest"]``.
             limit: seconds after which the program and its children are stopped.
+            environment: more environment variables.
         """
-        environment = os.environ | {
+        variables = os.environ | {
             "PYTHONPATH": str(self.root),
             "NUMBA_CACHE_DIR": "",  # beside the modules
             "OMP_NUM_THREADS": "1",
             "PYTHONDONTWRITEBYTECODE": "1",  # no compiled module of a planted file stays behind
             "COLUMNS": "500",
+            **environment,
         }
         start = time.perf_counter()
         process = subprocess.Popen(
             [sys.executable, *arguments],
             cwd=self.root,
-            env=environment,
+            env=variables,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             stdin=subprocess.DEVNULL,

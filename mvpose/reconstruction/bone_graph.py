@@ -5,9 +5,13 @@ prior, a pose would change when left and right are renamed. So the log-prior is 
 tree in the mirror: a bone whose mirror image is in the tree as well has its whole weight, and any other shares it with
 its image. The nose is then held by both shoulders, each with half of the weight.
 
-The bones then form a graph with short cycles (both shoulders and the nose). Inference stays exact: joints are
-eliminated one after another, and each is joined to at most two of those that remain (tree-width 2; Bertele & Brioschi,
-"Nonserial Dynamic Programming", 1972). On a tree this is the usual passing of messages from the leaves to the root.
+Both hips hang from their shoulders, and no bone of the tree says how far they are from each other: a hip that only one
+view sees could lie a metre beside the other one. So the distance of the hips is one more bone.
+
+The bones then form a graph with short cycles (both shoulders, and the nose or the hips). Inference stays exact: joints
+are eliminated one after another, and each is joined to at most two of those that remain (tree-width 2; Bertele &
+Brioschi, "Nonserial Dynamic Programming", 1972). On a tree this is the usual passing of messages from the leaves to the
+root.
 """
 
 from collections.abc import Sequence
@@ -19,6 +23,7 @@ import numpy as np
 from mvpose.arrays import Floats, Integers
 from mvpose.skeleton import Skeleton
 
+_SPANS = frozenset({"hip"})  # parts whose two sides keep their distance, beside those that the tree joins
 _WIDTH = 2  # most joints that remain when a joint is eliminated and that it is joined to
 
 
@@ -26,7 +31,7 @@ class BoneGraph(NamedTuple):
     """Bones of a skeleton of J joints as arrays for the kernels.
 
     The first J of the B bones join each joint to its parent (the root has none: its bone joins nothing), and the rest
-    are mirror images.
+    are mirror images and the distance of the hips.
     """
 
     parents: Integers
@@ -61,10 +66,10 @@ def bone_graph(skeleton: Skeleton) -> BoneGraph:
     Where the mirror images would make cycles too wide for exact inference, the graph is the tree alone.
     """
     tree = [(parent, child) for child, parent in enumerate(skeleton.parents)]
-    images = mirror_images(skeleton)
-    if elimination(len(skeleton), [*skeleton.edges, *images]) is None:
-        return _graph(skeleton, tree, [], tuple(range(len(skeleton))))
-    return _graph(skeleton, tree, images, skeleton.mirror)
+    images, across = mirror_images(skeleton), spans(skeleton)
+    if elimination(len(skeleton), [*skeleton.edges, *images, *across]) is None:
+        return _graph(skeleton, tree, [], [], tuple(range(len(skeleton))))
+    return _graph(skeleton, tree, images, across, skeleton.mirror)
 
 
 def mirror_images(skeleton: Skeleton) -> list[tuple[int, int]]:
@@ -74,16 +79,31 @@ def mirror_images(skeleton: Skeleton) -> list[tuple[int, int]]:
     return [image for image in images if frozenset(image) not in known]
 
 
+def spans(skeleton: Skeleton) -> list[tuple[int, int]]:
+    """Return the two sides of parts that keep their distance and hang from different joints of the tree."""
+    return [
+        (joint, other)
+        for joint, other in enumerate(skeleton.mirror)
+        if joint < other
+        and skeleton.parts[joint] in _SPANS
+        and len({skeleton.parents[joint], skeleton.parents[other], joint, other}) == 4
+    ]
+
+
 def _graph(
-    skeleton: Skeleton, tree: list[tuple[int, int]], images: list[tuple[int, int]], mirror: Sequence[int]
+    skeleton: Skeleton,
+    tree: list[tuple[int, int]],
+    images: list[tuple[int, int]],
+    across: list[tuple[int, int]],
+    mirror: Sequence[int],
 ) -> BoneGraph:
-    joints, bones = len(skeleton), [*tree, *images]
+    joints, bones = len(skeleton), [*tree, *images, *across]
     known = {frozenset(bone): index for index, bone in enumerate(bones) if bone[0] >= 0}
     whole = [
         parent < 0 or not images or frozenset((mirror[parent], mirror[child])) in map(frozenset, tree)
         for parent, child in tree
     ]
-    share = np.where([*whole, *(False for _ in images)], 1.0, 0.5)
+    share = np.where([*whole, *(False for _ in images), *(True for _ in across)], 1.0, 0.5)
     ends: list[list[tuple[int, int]]] = [[] for _ in range(joints)]
     for index, (parent, child) in enumerate(bones):
         if parent >= 0:

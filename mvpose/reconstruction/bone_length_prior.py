@@ -11,6 +11,8 @@ taken from published anthropometry, and uses neither those data sets nor a simul
   are 0.87 m tall at two years of age (WHO, "Child growth standards", 2006) and as tall as adults at the end;
 - shoulder span: biacromial breadth of ANSUR II (Gordon et al. 2014, 0.39 m) minus the two distances from acromion to
   joint centre;
+- hip span: hip centres lie 14 % of the distance of the anterior superior iliac spines inside of these (Bell, Pedersen &
+  Brand, J. Biomechanics 23, 1990), which is 0.23 m (bispinous breadth, ANSUR II); detectors put hips further out;
 - head: ANSUR II (interpupillary and bitragion breadths, tragion to nose) and Drillis & Contini's segment heights.
 """
 
@@ -45,6 +47,7 @@ _BONES: dict[frozenset[str], tuple[float, float]] = {
     frozenset({"knee", "ankle"}): (0.249 * STATURE, 0.02),
     frozenset({"shoulder", "hip"}): (0.296 * STATURE, 0.04),   # trunk, and half the difference of shoulder and hip span
     frozenset({"shoulder"}): (0.33, 0.03),
+    frozenset({"hip"}): (0.19, 0.04),
     frozenset({"nose", "shoulder"}): (0.26, 0.05),             # the head turns: the widest deviation of all
     frozenset({"nose", "eye"}): (0.057, 0.01),
     frozenset({"eye", "ear"}): (0.095, 0.015),

@@ -8,11 +8,14 @@ import numpy as np
 
 from mvpose.kernels import njit
 from mvpose.reconstruction.likelihood import solve
+from mvpose.reconstruction.limb_direction_prior import direction_log_likelihood
 
 
 @njit(cache=True)
-def max_product(states, unary, count, graph, length, precision):
-    """Find the combination of states with the greatest sum of unaries and log-Gaussian pairwise terms of bone length.
+def max_product(states, unary, count, graph, length, precision, pull):
+    """Find the combination of states with the greatest sum of unaries and of pairwise terms of the bones.
+
+    These are log-Gaussian in the length of a bone, and von Mises-Fisher in its direction.
 
     Args:
         states: candidate positions, (J, S, 3), metres.
@@ -22,9 +25,10 @@ def max_product(states, unary, count, graph, length, precision):
         graph: bones of the skeleton, :class:`mvpose.reconstruction.bone_graph.BoneGraph`.
         length: mean bone lengths, (B,), metres.
         precision: inverse variances of the lengths, (B,), 1/m^2; 0 for no constraint.
+        pull: von Mises-Fisher parameters of the directions of bones, (B, 3); zeros for no constraint.
 
     Returns:
-        Index of the chosen state of every joint, (J,); 0 for a joint without states.
+        Index of the chosen state of every joint, (J,), 0 for a joint without states; and that sum.
     """
     joints, most = len(count), 1
     for joint in range(joints):
@@ -42,6 +46,7 @@ def max_product(states, unary, count, graph, length, precision):
                     pairs[joint, slot, s, o] = 0.0
             if bone < 0 or precision[bone] == 0.0:
                 continue
+            bent = pull[bone].any()
             for s in range(count[joint]):
                 for o in range(others):
                     x = states[joint, s, 0] - states[other, o, 0]
@@ -49,7 +54,12 @@ def max_product(states, unary, count, graph, length, precision):
                     z = states[joint, s, 2] - states[other, o, 2]
                     error = np.sqrt(x * x + y * y + z * z) - length[bone]
                     pairs[joint, slot, s, o] = -0.5 * precision[bone] * error * error
-    chosen = np.zeros(joints, np.int64)
+                    if bent:
+                        outward = graph.children[bone] == joint
+                        pairs[joint, slot, s, o] += direction_log_likelihood(
+                            states[joint, s], states[other, o], outward, pull[bone]
+                        )
+    chosen, total = np.zeros(joints, np.int64), 0.0
     for joint in graph.order:  # a joint without states takes part with one state that says nothing
         first, second = graph.later[joint]
         firsts, seconds = max(count[first], 1) if first >= 0 else 1, max(count[second], 1) if second >= 0 else 1
@@ -65,10 +75,12 @@ def max_product(states, unary, count, graph, length, precision):
                     pairs[first, _slot(graph, first, second), a, b] += best
                 elif first >= 0:
                     belief[first, a] += best
+                else:
+                    total += best
     for joint in graph.order[::-1]:
         first, second = graph.later[joint]
         chosen[joint] = choice[joint, chosen[first] if first >= 0 else 0, chosen[second] if second >= 0 else 0]
-    return chosen
+    return chosen, total
 
 
 @njit(cache=True, borrows=True)

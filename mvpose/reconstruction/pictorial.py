@@ -4,7 +4,8 @@ The posterior of a pose is the product of every joint's likelihood in all views 
 length. Its logarithm is a sum over the bones, which form a tree or, with the mirror images of bones
 (:mod:`mvpose.reconstruction.bone_graph`), nearly so. So max-product (here max-sum) finds the best combination of
 proposals exactly, in time linear in the number of bones and quadratic in the number of proposals per joint, cubic for a
-joint that both sides hold.
+joint that both sides hold. The directions of bones join them where a single view sees an end of a bone
+(:mod:`mvpose.reconstruction.limb_direction_prior`): lengths alone leave its depth open.
 
 Pairs of views propose the positions. If a joint is right in two views, its position is among them; the point on which
 all views agree is added because it is more accurate where more views are right. A joint that only one view sees is
@@ -19,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Floats, Integers
+from mvpose.arrays import Floats
 from mvpose.heatmaps import height
 from mvpose.kernels import njit
 from mvpose.lens import distort
@@ -30,17 +31,20 @@ from mvpose.reconstruction.error_scale import person_scale
 from mvpose.reconstruction.inference import max_product
 from mvpose.reconstruction.likelihood import Noise, log_likelihood
 from mvpose.reconstruction.limb_direction_prior import (
-    direction_concentrations,
-    direction_log_likelihood,
-    trunk_direction,
-    trunk_segments,
+    LimbDirections,
+    body_axes,
+    limb_directions,
+    pull_bones,
+    set_left,
 )
 from mvpose.reconstruction.poses import Poses, clear, empty_poses, gather
 from mvpose.reconstruction.refinement import climb, fit_scale, write_uncertainty
 from mvpose.reconstruction.triangulation import consensus, pair_point
 from mvpose.skeleton import Skeleton
 
-_SINGLE_VIEW_STATES = 16  # room for two depths per neighbour
+_SINGLE_VIEW_STATES = 32  # room for two depths per position of each neighbour
+_BEARINGS = 8  # tried for a body whose left and right are unknown
+_BRANCHES = 8  # positions of a neighbour, itself seen by a single view, that propose depths
 _NEARER = 1e-9  # likelihood per metre; decides ties only
 _SAME = 0.25  # squared distance, in variances of the joint, below which refinement moves two proposals to one point
 
@@ -67,10 +71,8 @@ class _BodyPrior(NamedTuple):
     """Their mean lengths, (B,), metres."""
     definition: Floats
     """Standard deviation of their lengths by definition."""
-    concentrations: Floats
-    """Of the directions of limbs, (B,)."""
-    segments: Integers
-    """Segment of the trunk that each joint belongs to, (J,)."""
+    limbs: LimbDirections
+    """Their directions."""
 
 
 @dataclass(frozen=True)
@@ -113,9 +115,7 @@ class PictorialStructure:
             rays.weights[:, :, None] if modes is None else modes.weights,
             self.noise.pixels * rays.pixel,
         )
-        body = _BodyPrior(
-            bone_graph(skeleton), length, definition, direction_concentrations(skeleton), trunk_segments(skeleton)
-        )
+        body = _BodyPrior(bone_graph(skeleton), length, definition, limb_directions(skeleton))
         limits = self.personal, self.most_pairs, self.most_states
         poses = _structures(labels, views, maps, self.noise.sigmas(skeleton), self.noise.floor, body, limits)
         return Poses(*poses)
@@ -123,9 +123,9 @@ class PictorialStructure:
 
 @njit(cache=True)
 def _structures(labels, views, maps, sigmas, floor, body, limits):
-    graph, length, definition, concentrations, segments = body
+    graph, length, definition, limbs = body
     personal, most_pairs, most_states = limits
-    poses, trunk = empty_poses(labels, len(sigmas)), np.empty(3)
+    poses, pull = empty_poses(labels, len(sigmas)), np.zeros((len(length), 3))
     for person in range(len(poses[0])):
         joints, scores, covariance, freedom = poses[0][person], poses[1][person], poses[2][person], poses[3][person]
         clear(joints, scores, covariance, freedom)
@@ -137,9 +137,15 @@ def _structures(labels, views, maps, sigmas, floor, body, limits):
         if maps is not None:
             rescore(states, unary, count, labels, person, scores_2d, maps, floor)
         lengths, precision = personal_prior(states, count, scores_2d, sigmas, graph, length, definition, personal)
-        trunk_direction(states, count, segments, trunk)
-        propose_single_views(states, unary, count, own, floor, graph, lengths, precision, concentrations, trunk)
-        chosen = max_product(states, unary, count, graph, lengths, precision)
+        seen_twice = count.copy()
+        pulled = propose_single_views(states, unary, count, own, floor, graph, lengths, precision)
+        pull[:] = 0.0
+        if pulled.any():
+            chosen = _choose_bent(
+                states, unary, count, seen_twice, centers, graph, lengths, precision, limbs, pulled, pull
+            )
+        else:
+            chosen, _ = max_product(states, unary, count, graph, lengths, precision, pull)
         deviations = np.empty(len(sigmas))
         for j in range(len(sigmas)):
             deviations[j] = scale * sigmas[j]
@@ -152,8 +158,45 @@ def _structures(labels, views, maps, sigmas, floor, body, limits):
         weakened = precision * fit_scale(joints, centers, rays, scores_2d, angles, deviations, floor)
         climb(joints, centers, rays, scores_2d, angles, deviations, floor, graph, lengths, weakened)
         pose = joints, scores, covariance, freedom
-        write_uncertainty(pose, own, sigmas, deviations, floor, graph, precision, concentrations, trunk)
+        write_uncertainty(pose, own, sigmas, deviations, floor, graph, precision, pull)
     return poses
+
+
+@njit(cache=True)
+def _choose_bent(states, unary, count, seen_twice, centers, graph, length, precision, limbs, pulled, pull):
+    """Choose the states of a body of which a single view sees some joints; write the pull of its bones, (B, 3).
+
+    Axes of the body that the joints of several views do not give are searched: bearings around the trunk, as seen from
+    the cameras, of which the one with the most probable pose counts.
+    """
+    axes, chosen, trial = np.zeros((3, 3)), np.zeros(len(count), np.int64), np.zeros_like(pull)
+    body_axes(states, chosen, seen_twice, limbs, axes)
+    if not axes[2].any():
+        chosen, _ = max_product(states, unary, count, graph, length, precision, pull)
+        body_axes(states, chosen, count, limbs, axes)
+        axes[:2] = 0.0
+    if axes[0].any() or not axes[2].any():
+        pull_bones(axes, limbs, pulled, pull)
+        return max_product(states, unary, count, graph, length, precision, pull)[0]
+    towards, best = np.zeros(3), -np.inf
+    for j in range(len(count)):
+        if count[j] > 0:
+            for v in range(len(centers)):
+                for r in range(3):
+                    towards[r] += centers[v, r] - states[j, chosen[j], r]
+    set_left(axes, towards)
+    ahead, aside = axes[0].copy(), axes[1].copy()
+    for k in range(_BEARINGS):
+        angle = 2.0 * np.pi * k / _BEARINGS
+        set_left(axes, np.cos(angle) * ahead + np.sin(angle) * aside)
+        pull_bones(axes, limbs, pulled, trial)
+        candidate, value = max_product(states, unary, count, graph, length, precision, trial)
+        if value > best:
+            best, chosen = value, candidate
+            pull[:] = trial
+    body_axes(states, chosen, count, limbs, axes)
+    pull_bones(axes, limbs, pulled, pull)
+    return max_product(states, unary, count, graph, length, precision, pull)[0]
 
 
 @njit(cache=True)
@@ -262,13 +305,17 @@ def _agreement(point, origins, directions, first, mode, second, other, sigma):
 
 
 @njit(cache=True)
-def propose_single_views(states, unary, count, views, floor, graph, length, precision, concentrations, trunk):
+def propose_single_views(states, unary, count, views, floor, graph, length, precision):
     """Add, in place, proposals for joints that a single view sees: where the ray is a bone length from a neighbour.
 
-    Such a joint has no pair of views, but its ray is known, and the bone length leaves two depths on it. The prior on
-    limb directions (:mod:`mvpose.reconstruction.limb_direction_prior`) ranks the two. Of equally likely ones the
-    nearest to the camera comes first, because a body hides its far side. Joints placed in one round serve their
-    neighbours in the next.
+    Such a joint has no pair of views, but its ray is known, and the bone length leaves two depths on it, for each
+    position of the neighbour. All are proposed, because the bones that follow may exclude the one that looks best: the
+    lengths and directions (:mod:`mvpose.reconstruction.limb_direction_prior`) of all bones together decide. Of equally
+    likely ones the nearest to the camera comes first, because a body hides its far side. Joints placed in one round
+    serve their neighbours in the next.
+
+    Returns:
+        Whether a single view sees an end of each bone, (B,).
     """
     origins, directions, weights, _ = views
     joints, n, _ = weights.shape
@@ -293,28 +340,32 @@ def propose_single_views(states, unary, count, views, floor, graph, length, prec
                 other, bone = graph.neighbours[j, slot], graph.bones[j, slot]
                 if other < 0 or count[other] == 0 or precision[bone] == 0.0:
                     continue
-                along, square = 0.0, 0.0
-                for r in range(3):
-                    offset = states[other, 0, r] - origins[v, r]
-                    along += offset * directions[j, v, 0, r]
-                    square += offset * offset
-                reach = np.sqrt(max(length[bone] ** 2 - (square - along * along), 0.0))
-                for depth in (along - reach, along + reach):
-                    if depth > 0.0 and placed[j] < states.shape[1]:
+                for o in range(min(count[other], _BRANCHES) if only[other] >= 0 else 1):
+                    along, square = 0.0, 0.0
+                    for r in range(3):
+                        offset = states[other, o, r] - origins[v, r]
+                        along += offset * directions[j, v, 0, r]
+                        square += offset * offset
+                    reach = np.sqrt(max(length[bone] ** 2 - (square - along * along), 0.0))
+                    for depth in (along - reach, along + reach):
+                        last = min(placed[j], states.shape[1] - 1)
+                        value = np.log(weights[j, v, 0] + floor) - _NEARER * depth
+                        if depth <= 0.0 or (placed[j] > last and value <= unary[j, last]):
+                            continue
                         for r in range(3):
                             point[r] = origins[v, r] + depth * directions[j, v, 0, r]
-                        value = np.log(weights[j, v, 0] + floor)
-                        value += direction_log_likelihood(
-                            point, states[other, 0], graph.children[bone] == j, concentrations[bone], trunk
-                        )
-                        value -= _NEARER * depth
-                        insert(states[j], unary[j], placed[j], value, point[0], point[1], point[2])
-                        placed[j] += 1
+                        insert(states[j], unary[j], last, value, point[0], point[1], point[2])
+                        placed[j] = last + 1
             any_placed = any_placed or placed[j] > 0
         for j in range(joints):
             count[j] = placed[j]
         if not any_placed:
-            return
+            break
+    of_single = np.zeros(len(length), np.bool_)
+    for bone in range(len(length)):
+        parent = graph.parents[bone]
+        of_single[bone] = parent >= 0 and (only[parent] >= 0 or only[graph.children[bone]] >= 0)
+    return of_single
 
 
 @njit(cache=True)

@@ -52,7 +52,7 @@ def refine(
     skeletal = (graph, length, graph.share / deviation**2)
     climb(refined, *views, noise.sigmas(skeleton), noise.floor, *skeletal)
     pose, sigmas = (refined, scores, covariance, freedom), noise.sigmas(skeleton)
-    write_uncertainty(pose, views, sigmas, sigmas, noise.floor, graph, skeletal[2], np.zeros(len(length)), np.zeros(3))
+    write_uncertainty(pose, views, sigmas, sigmas, noise.floor, graph, skeletal[2], np.zeros((len(length), 3)))
     return refined, scores, covariance, freedom
 
 
@@ -235,7 +235,7 @@ _MOST_ALIKE = 0.95  # of the variances; the keypoints of a detector never agree 
 
 
 @njit(cache=True)
-def write_uncertainty(pose, views, sigmas, deviations, floor, graph, precision, concentrations, trunk):
+def write_uncertainty(pose, views, sigmas, deviations, floor, graph, precision, pull):
     """Write scores (J,), covariances (J, 3, 3) and degrees of freedom (J,) of a pose at the maximum of its posterior.
 
     A pose is its joints (J, 3) and these three arrays, as in :class:`mvpose.reconstruction.poses.Poses`; its views are
@@ -279,7 +279,7 @@ def write_uncertainty(pose, views, sigmas, deviations, floor, graph, precision, 
             for c in range(3):
                 covariance[j, r, c] += alike[j, r, c]
         add_shared(covariance[j], sigmas[j])
-    _add_ambiguity(covariance, joints, origins, directions, weights, graph, precision, concentrations, trunk)
+    _add_ambiguity(covariance, joints, origins, directions, weights, graph, precision, pull)
 
 
 @njit(cache=True, borrows=True)
@@ -299,7 +299,7 @@ def _add_outer(matrix, vector, weight):
 
 
 @njit(cache=True)
-def _add_ambiguity(covariance, joints, origins, directions, weights, graph, precision, concentrations, trunk):
+def _add_ambiguity(covariance, joints, origins, directions, weights, graph, precision, pull):
     """Add the depth ambiguity of joints that only one view sees, whose bones also fit at a second depth.
 
     The second moment around the chosen depth grows by the squared distance between the two depths times the
@@ -347,8 +347,7 @@ def _add_ambiguity(covariance, joints, origins, directions, weights, graph, prec
             for slot in range(graph.neighbours.shape[1]):
                 other, bone = graph.neighbours[j, slot], graph.bones[j, slot]
                 if other >= 0 and graph.children[bone] == j and not np.isnan(joints[other, 0]):
-                    concentration = graph.share[bone] * concentrations[bone]
-                    log_odds += direction_log_likelihood(joints[j], joints[other], True, concentration, trunk)
-                    log_odds -= direction_log_likelihood(mirrored, joints[other], True, concentration, trunk)
+                    log_odds += direction_log_likelihood(joints[j], joints[other], True, pull[bone])
+                    log_odds -= direction_log_likelihood(mirrored, joints[other], True, pull[bone])
             ambiguity[j] += 4.0 * (parent_depth - depth) ** 2 / (1.0 + np.exp(log_odds))
         _add_outer(covariance[j], directions[j, only, 0], ambiguity[j])

@@ -145,18 +145,9 @@ def moved_world(given: Frame, rng: np.random.Generator):
     return Frame(rig, given.detections), lambda joints: (joints - shift) @ turn
 
 
-def renamed_sides(given: Frame, rng: np.random.Generator):
-    """Left and right exchanged in all names: of the same pixels, those of the left wrist are now the right wrist's."""
-    mirror = list(given.detections.skeleton.mirror)
-    changed = replace(
-        given.detections, keypoints=given.detections.keypoints[:, mirror], scores=given.detections.scores[:, mirror]
-    )
-    return Frame(given.rig, changed), lambda joints: joints[:, mirror]
-
-
 def mirrored_world(given: Frame, rng: np.random.Generator):
-    """The world and all pictures seen in a mirror."""
-    flip = np.diag([-1.0, 1.0, 1.0])
+    """The world and all pictures seen in a mirror, where left hands are right hands."""
+    flip, mirror = np.diag([-1.0, 1.0, 1.0]), list(given.detections.skeleton.mirror)
     cameras, keypoints, boxes = [], given.detections.keypoints.copy(), given.detections.boxes.copy()
     for c in given.rig:
         K, distortion = c.K.copy(), c.distortion.copy()
@@ -165,8 +156,9 @@ def mirrored_world(given: Frame, rng: np.random.Generator):
     width = np.array([c.size[0] for c in given.rig])[given.detections.view]
     keypoints[..., 0] = width[:, None] - 1 - keypoints[..., 0]
     boxes[:, 0] = width - 1 - boxes[:, 0] - boxes[:, 2]
-    changed = replace(given.detections, keypoints=keypoints, boxes=boxes)
-    return Frame(Rig(cameras), changed), lambda joints: joints @ flip
+    scores = given.detections.scores[:, mirror]
+    changed = replace(given.detections, keypoints=keypoints[:, mirror], scores=scores, boxes=boxes)
+    return Frame(Rig(cameras), changed), lambda joints: joints[:, mirror] @ flip
 
 
 def doubled_detections(given: Frame, rng: np.random.Generator):
@@ -199,7 +191,6 @@ RELATIONS: dict[str, tuple[Relation, float]] = {
     "permuted detections": (permuted_detections, 1e-6),
     "permuted cameras": (permuted_cameras, 1e-6),
     "moved world": (moved_world, 1e-5),
-    "renamed sides": (renamed_sides, 1e-6),
     "mirrored world": (mirrored_world, 1e-6),
     "doubled detections": (doubled_detections, 1e-6),
     "idle cameras": (idle_cameras, 1e-6),

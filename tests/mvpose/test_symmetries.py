@@ -68,7 +68,7 @@ def test_sides_are_alike_in_every_skeleton(name, preset):
         keypoints = pixels.reshape(-1, len(skeleton), 2) + rng.normal(0, 4, (len(view), len(skeleton), 2))
         scores = np.where(rng.random(keypoints.shape[:2]) < 0.15, 0.0, rng.uniform(0.4, 1.0, keypoints.shape[:2]))
         given = Frame(cameras, Detections.from_keypoints(view, keypoints, scores, skeleton=skeleton))
-        changed, back = RELATIONS["renamed sides"][0](given, rng)
+        changed, back = RELATIONS["mirrored world"][0](given, rng)
         original = mvpose.preset(preset).estimate(*given)
         assert len(original) >= 1
         assert movement(original.joints, back(mvpose.preset(preset).estimate(*changed).joints)) < 1e-6

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mvpose import COCO17, PANOPTIC19, SHELF14
-from mvpose.reconstruction.bone_graph import bone_graph, elimination, mirror_images
+from mvpose.reconstruction.bone_graph import bone_graph, elimination, mirror_images, spans
 from mvpose.reconstruction.bone_length_prior import bone_lengths
 
 SKELETONS = pytest.mark.parametrize("skeleton", [COCO17, SHELF14, PANOPTIC19], ids=lambda skeleton: skeleton.name)
@@ -25,7 +25,7 @@ def test_the_bones_are_those_of_the_tree_and_of_its_mirror_image(skeleton):
     known = bones(graph)
     assert set(known) >= {frozenset(bone) for bone in skeleton.edges}
     assert {frozenset(mirror[joint] for joint in bone) for bone in known} == set(known)
-    assert sum(graph.share[bone] for bone in known.values()) == len(skeleton) - 1  # as many as the tree has
+    assert sum(graph.share[bone] for bone in known.values()) == len(skeleton) - 1 + len(spans(skeleton))
     length, deviation = bone_lengths(skeleton)
     for ends, bone in known.items():
         image = known[frozenset(mirror[joint] for joint in ends)]
@@ -53,6 +53,12 @@ def test_the_nose_hangs_from_both_shoulders():
     held = [COCO17.joints[other] for other in graph.inner[nose]]
     assert held == ["left_shoulder", "right_shoulder"]
     assert mirror_images(PANOPTIC19) == []  # hangs from the neck
+
+
+def test_hips_keep_their_distance_where_the_tree_does_not_join_them():
+    assert [[COCO17.joints[joint] for joint in ends] for ends in spans(COCO17)] == [["left_hip", "right_hip"]]
+    assert len(spans(SHELF14)) == 1
+    assert spans(PANOPTIC19) == []  # both hang from the middle of the hips
 
 
 def test_elimination_leaves_no_bone_out():

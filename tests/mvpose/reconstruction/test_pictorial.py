@@ -10,7 +10,7 @@ from scipy.stats import norm
 from mvpose import COCO17, PANOPTIC19, SHELF14, Detections, Estimate, Matching, Rig, Skeleton
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
-from mvpose.reconstruction.bone_graph import bone_graph, mirror_images
+from mvpose.reconstruction.bone_graph import bone_graph, mirror_images, spans
 from mvpose.reconstruction.bone_length_prior import (
     PROPORTION_DEVIATION,
     _adult,
@@ -22,9 +22,10 @@ from mvpose.reconstruction.error_scale import SHARED
 from mvpose.reconstruction.inference import marginalize, max_product
 from mvpose.reconstruction.likelihood import log_likelihood
 from mvpose.reconstruction.limb_direction_prior import (
-    direction_concentrations,
+    body_axes,
     direction_log_likelihood,
-    trunk_segments,
+    limb_directions,
+    pull_bones,
 )
 from mvpose.reconstruction.pictorial import propose_all, propose_single_views
 from mvpose.reconstruction.refinement import _add_ambiguity, climb, refine
@@ -54,13 +55,15 @@ def some_skeleton(joints, rng):
     return Skeleton(f"{parents} {mirror}", tuple(map(str, range(joints))), parents, mirror, (0.1,) * joints)
 
 
-def total(states, unary, chosen, graph, length, deviation, count):
+def total(states, unary, chosen, graph, length, deviation, count, pull):
     """Log-posterior of a choice, written out; joints without states are left out."""
     value = sum(unary[joint, chosen[joint]] for joint in np.flatnonzero(count))
     for bone, parent, child in bones_of(graph):
         if count[child] and count[parent]:
             reach = np.linalg.norm(states[child, chosen[child]] - states[parent, chosen[parent]])
             value -= 0.5 * ((reach - length[bone]) / deviation[bone]) ** 2
+            if np.isfinite(deviation[bone]):
+                value += (states[child, chosen[child]] - states[parent, chosen[parent]]) @ pull[bone] / reach
     return value
 
 
@@ -72,12 +75,14 @@ def test_max_product_finds_the_best_combination(seed):
     count = rng.integers(0, most + 1, joints)
     states, unary = rng.standard_normal((joints, most, 3)), 3 * rng.standard_normal((joints, most))
     length, deviation = rng.uniform(0.5, 2, len(graph.share)), rng.choice([0.2, 0.5, np.inf], len(graph.share))
-    problem = (graph, length, deviation, count)
-    chosen = max_product(states, unary, count, graph, length, 1 / deviation**2)
+    pull = rng.choice([0.0, 3.0], (len(graph.share), 1)) * rng.standard_normal((len(graph.share), 3))
+    problem = (graph, length, deviation, count, pull)
+    chosen, value = max_product(states, unary, count, graph, length, 1 / deviation**2, pull)
     best = max(
         total(states, unary, choice, *problem) for choice in itertools.product(*(range(max(c, 1)) for c in count))
     )
     assert total(states, unary, chosen, *problem) == pytest.approx(best, abs=1e-9)
+    assert value == pytest.approx(best, abs=1e-9)
 
 
 def wrong_elbow(rig):
@@ -124,11 +129,12 @@ def seen_by_one(rig, body, joints, view=0):
 
 
 @pytest.mark.parametrize("body", [STANDING, LYING, HEADLONG], ids=["standing", "lying", "headlong"])
-def test_a_single_view_joint_lies_on_its_ray_at_the_depth_nearer_to_the_trunk_direction(body):
+def test_a_single_view_joint_lies_on_its_ray_at_the_depth_nearer_to_the_direction_of_its_bone(body):
     rig = ring(4)
     rays = seen_by_one(rig, body, (9, 13, 15))  # a wrist; knee and ankle, which hang on each other
     joints, scores, covariance = reconstruct(rays)
-    down = joints[11:13].mean(axis=0) - joints[5:7].mean(axis=0)
+    limbs, axes = limb_directions(COCO17), np.empty((3, 3))
+    body_axes(joints[:, None], np.zeros(17, np.int64), np.ones(17, np.int64), limbs, axes)
     for joint in (9, 13, 15):
         sight = rays.directions[0, joint]
         offset = joints[joint] - rig.centers[0]
@@ -138,7 +144,8 @@ def test_a_single_view_joint_lies_on_its_ray_at_the_depth_nearer_to_the_trunk_di
         )
         anchor = joints[COCO17.parents[joint]]
         other = joints[joint] + 2 * ((anchor - rig.centers[0]) @ sight - offset @ sight) * sight
-        assert (joints[joint] - anchor) @ down > (other - anchor) @ down - 0.01
+        mean = limbs.strength[joint] @ axes
+        assert (joints[joint] - anchor) @ mean > (other - anchor) @ mean - 0.01
         assert np.linalg.norm(joints[joint] - body[joint]) < 0.3
         assert 0 < scores[joint] < 0.3 * scores[0]
         assert sight @ covariance[joint] @ sight > 4 * sight @ covariance[0] @ sight
@@ -154,8 +161,9 @@ def test_a_bone_of_any_known_length_proposes_two_depths_and_one_of_unknown_lengt
     views = np.zeros((1, 3)), np.tile([1.0, 0.0, 0.0], (17, 1, 1, 1)), weights, np.zeros(1)
     length, bones = np.full(len(graph.share), 0.26), np.full(len(graph.share), 1e4)
     bones[wrist] = precision
-    propose_single_views(states, unary, count, views, 0.01, graph, length, bones, np.zeros(len(bones)), np.zeros(3))
+    pulled = propose_single_views(states, unary, count, views, 0.01, graph, length, bones)
     assert count[wrist] == proposed
+    assert pulled.tolist() == [child == wrist for child in graph.children]
     depths = 3.0 + np.array([-1.0, 1.0]) * np.sqrt(0.26**2 - 0.1**2)
     np.testing.assert_allclose(states[wrist, :proposed, 0], depths[:proposed])
     assert count.sum() == 1 + proposed
@@ -185,11 +193,11 @@ def test_limbs_have_a_direction_prior_in_every_skeleton(skeleton):
     limbs = {joint for joint in skeleton.joints if joint.split("_")[-1] in ("elbow", "wrist", "knee", "ankle")}
     hanging = {
         joint
-        for joint, concentration in zip(skeleton.joints, direction_concentrations(skeleton), strict=False)
-        if concentration  # of the bones of the tree; mirror images follow
+        for joint, strength in zip(skeleton.joints, limb_directions(skeleton).strength, strict=False)
+        if strength.any()  # of the bones of the tree; mirror images follow
     }
-    assert limbs <= hanging <= limbs | {"left_hip", "right_hip"}
-    segments = dict(zip(skeleton.joints, trunk_segments(skeleton), strict=True))
+    assert limbs <= hanging
+    segments = dict(zip(skeleton.joints, limb_directions(skeleton).segments, strict=True))
     assert (segments["left_shoulder"], segments["right_hip"], segments["left_wrist"]) == (1, 2, 0)
     assert 3 in segments.values()
 
@@ -200,23 +208,56 @@ def test_the_direction_prior_is_von_mises_fisher():
     directions = rng.standard_normal((200_000, 3))
     down = np.array([0.6, 0.0, -0.8])
     for concentration in (0.5, 3.0):
-        value = [direction_log_likelihood(each, np.zeros(3), True, concentration, down) for each in directions]
+        pull = concentration * down
+        value = [direction_log_likelihood(each, np.zeros(3), True, pull) - concentration for each in directions]
         constant = 2 * concentration / (1 - np.exp(-2 * concentration))  # over the uniform density, at most 0
         assert np.mean(constant * np.exp(value)) == pytest.approx(1.0, abs=0.01)
-    assert direction_log_likelihood(np.zeros(3), directions[0], False, 3.0, down) == direction_log_likelihood(
-        directions[0], np.zeros(3), True, 3.0, down
+    assert direction_log_likelihood(np.zeros(3), directions[0], False, down) == direction_log_likelihood(
+        directions[0], np.zeros(3), True, down
     )
-    assert direction_log_likelihood(directions[0], np.zeros(3), True, 3.0, np.zeros(3)) == 0.0
+
+
+@pytest.mark.parametrize("skeleton", [COCO17, SHELF14], ids=lambda skeleton: skeleton.name)
+def test_the_direction_prior_is_the_same_in_a_mirror(skeleton):
+    """Left and right exchanged in a body, and the body mirrored: every bone and its image have mirrored pulls."""
+    graph, limbs, mirror = bone_graph(skeleton), limb_directions(skeleton), list(skeleton.mirror)
+    states = np.random.default_rng(4).standard_normal((len(skeleton), 1, 3))
+    pulls = np.empty((2, len(graph.share), 3))
+    for pull, body in zip(pulls, (states, states[mirror] * [1.0, -1.0, 1.0]), strict=True):
+        axes = np.empty((3, 3))
+        body_axes(body, np.zeros(len(body), np.int64), np.ones(len(body), np.int64), limbs, axes)
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(axes) == pytest.approx(1.0)
+        pull_bones(axes, limbs, np.ones(len(pull), bool), pull)
+    known = {(parent, child): bone for bone, parent, child in bones_of(graph)}
+    for (parent, child), bone in known.items():
+        image = known.get((mirror[parent], mirror[child]))
+        sign = 1.0 if image is not None else -1.0  # of a bone from one side to the other
+        image = known[mirror[child], mirror[parent]] if image is None else image
+        np.testing.assert_allclose(pulls[1, image], sign * pulls[0, bone] * [1.0, -1.0, 1.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("turn", range(8))
+@pytest.mark.parametrize("body", [STANDING, LYING, HEADLONG], ids=["standing", "lying", "headlong"])
+def test_a_body_that_one_view_sees_is_not_its_reflection(body, turn):
+    """Two views see one arm and leg, one of them the whole body: the other side is not mirrored in depth."""
+    angle = 2.0 * np.pi * turn / 8 + 0.1
+    c, s = np.cos(angle), np.sin(angle)
+    body = body @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]).T
+    unseen = [joint for joint in range(17) if joint not in (8, 10, 14, 16)]
+    joints, _, _ = reconstruct(seen_by_one(ring(3), body, unseen))
+    assert np.linalg.norm(joints - body, axis=1).max() < 0.45
+    assert np.linalg.norm(joints[11] - joints[12]) == pytest.approx(0.19, abs=0.06)
 
 
 def test_the_covariance_of_a_single_view_joint_covers_its_other_depth():
-    """The forearm is raised towards the only camera that sees the wrist, although hanging arms are likelier."""
+    """The forearm points to the only camera that sees the wrist, at a side: away from it is as likely."""
     rig, body = ring(4), STANDING.copy()
-    away = (body[7] - rig.centers[0]) / np.linalg.norm(body[7] - rig.centers[0])
+    away = (body[7] - rig.centers[1]) / np.linalg.norm(body[7] - rig.centers[1])
     across = np.cross(away, [0.0, 0.0, 1.0])
     body[9] = body[7] + 0.25 * (-0.9 * away + np.sqrt(1 - 0.9**2) * across)
     scores = np.full((4, 17), 0.9)
-    scores[1:, 9] = 0
+    scores[[0, 2, 3], 9] = 0
     rays = viewing_rays(rig, Detections.from_keypoints(np.arange(4), rig.project(body), scores))
     joints, _, covariance = reconstruct(rays)
     off = joints[9] - body[9]
@@ -235,7 +276,7 @@ def test_depth_ambiguity_is_squared_distance_times_probability(concentration):
     directions = np.array([[[[0.0, 4.0, 0.2]]], [[sight]]])
     weights = np.array([[[0.0]], [[1.0]]])
     covariance, down = np.zeros((2, 3, 3)), np.array([0.0, 0.6, -0.8])
-    prior = np.array([1.0, 1.0]), np.array([0.0, concentration]), down
+    prior = np.array([1.0, 1.0]), np.array([np.zeros(3), concentration * down])
     graph = bone_graph(Skeleton("shoulder and elbow", ("shoulder", "elbow"), (-1, 0), (0, 1), (0.1, 0.1)))
     _add_ambiguity(covariance, joints, origin, directions, weights, graph, *prior)
     here, there = (np.array([0, y, -0.2]) @ down / np.hypot(0.2, 0.2) for y in (0.2, -0.2))
@@ -252,7 +293,7 @@ def test_a_joint_inherits_the_ambiguity_of_its_parent():
     joints[2] = origin[0] + directions[2, 0, 0] * 4.2  # at the depth of the elbow along its own ray
     weights, covariance = np.array([0.0, 1.0, 1.0])[:, None, None], np.zeros((3, 3, 3))
     graph = bone_graph(Skeleton("arm", ("shoulder", "elbow", "wrist"), (-1, 0, 1), (0, 1, 2), (0.1, 0.1, 0.1)))
-    _add_ambiguity(covariance, joints, origin, directions, weights, graph, np.ones(3), np.zeros(3), np.zeros(3))
+    _add_ambiguity(covariance, joints, origin, directions, weights, graph, np.ones(3), np.zeros((3, 3)))
     assert np.trace(covariance[1]) == pytest.approx(0.4**2 / 2)  # both depths are as likely
     depth = ((joints[1] - origin[0]) * directions[2, 0, 0]).sum() - 4.2  # of the elbow along the ray of the wrist
     assert np.trace(covariance[2]) == pytest.approx(np.trace(covariance[1]) + 4.0 * depth**2 / 2, rel=1e-3)
@@ -266,7 +307,7 @@ def test_a_second_depth_behind_the_camera_is_none(depth, ambiguous):
     directions, weights = np.tile([0.0, 1.0, 0.0], (2, 1, 1, 1)), np.array([[[0.0]], [[1.0]]])
     graph = bone_graph(Skeleton("two", ("one", "other"), (-1, 0), (0, 1), (0.1, 0.1)))
     covariance = np.zeros((2, 3, 3))
-    _add_ambiguity(covariance, joints, origin, directions, weights, graph, np.ones(2), np.zeros(2), np.zeros(3))
+    _add_ambiguity(covariance, joints, origin, directions, weights, graph, np.ones(2), np.zeros((2, 3)))
     assert np.trace(covariance[1]) == pytest.approx(4.0 * (depth - 1.0) ** 2 / 2 if ambiguous else 0.0)
 
 
@@ -280,7 +321,7 @@ def log_posterior(joints, rays):
         variance = (noise.sigmas(COCO17) ** 2 + (rays.pixel[:, None] * along) ** 2) / rays.weights**2
     right = rays.weights * np.exp(-0.5 * e2 / variance) * (along > 0)
     unary = np.where(rays.weights > 0, np.log(noise.floor + right), 0.0).sum()
-    share = np.array([0.5 if joint == "nose" else 1.0 for joint in COCO17.joints] + [0.5])  # of both shoulders
+    share = np.array([0.5 if joint == "nose" else 1.0 for joint in COCO17.joints] + [0.5, 1.0])  # nose, hips
     known = [(bone, p, c) for bone, p, c in bones_of(bone_graph(COCO17))]
     return unary - 0.5 * sum(
         share[bone] * ((np.linalg.norm(joints[c] - joints[p]) - length[bone]) / deviation[bone]) ** 2
@@ -333,7 +374,7 @@ def test_bone_lengths_are_symmetric_and_plausible(skeleton):
         mirrored = known[frozenset(skeleton.mirror[joint] for joint in ends)]
         assert (mean[bone], deviation[bone]) == (mean[mirrored], deviation[mirrored])
     bones = np.flatnonzero(np.isfinite(deviation))
-    assert len(bones) == len(skeleton) - 1 + len(mirror_images(skeleton))
+    assert len(bones) == len(skeleton) - 1 + len(mirror_images(skeleton)) + len(spans(skeleton))
     assert (deviation[bones] < 0.35 * mean[bones]).all()
     if skeleton is COCO17:  # the standing figure is 1.75 m tall: every bone within three deviations
         real = [np.linalg.norm(STANDING[c] - STANDING[p]) for p, c in skeleton.edges]
