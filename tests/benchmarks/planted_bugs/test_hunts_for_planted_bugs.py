@@ -68,7 +68,7 @@ def test_a_bug_is_hunted_in_both_copies_until_it_is_found(tmp_path):
             assert environment == {"PLANTED_BUGS_UNCHANGED": str(ROOT)}
             assert options["--property"] == "benchmarks.planted_bugs.hunting:worse"
             path = tmp_path / "hunted" / "trials.jsonl"
-            path.parent.mkdir(exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
             rows = [{"seed": k, "findings": [{}]} for k in range(len(calls))]
             path.write_text("".join(json.dumps(row) + "\n" for row in ({}, *rows)))
             return hunting.Finished(0, "", 30.0)
