@@ -141,9 +141,8 @@ def _structures(labels, views, maps, sigmas, floor, body, limits):
         pulled = propose_single_views(states, unary, count, own, floor, graph, lengths, precision)
         pull[:] = 0.0
         if pulled.any():
-            chosen = _choose_bent(
-                states, unary, count, seen_twice, centers, graph, lengths, precision, limbs, pulled, pull
-            )
+            bones = graph, lengths, precision
+            chosen = _choose_bent(states, unary, count, seen_twice, centers, bones, limbs, pulled, pull)
         else:
             chosen, _ = max_product(states, unary, count, graph, lengths, precision, pull)
         deviations = np.empty(len(sigmas))
@@ -163,12 +162,13 @@ def _structures(labels, views, maps, sigmas, floor, body, limits):
 
 
 @njit(cache=True)
-def _choose_bent(states, unary, count, seen_twice, centers, graph, length, precision, limbs, pulled, pull):
+def _choose_bent(states, unary, count, seen_twice, centers, bones, limbs, pulled, pull):
     """Choose the states of a body of which a single view sees some joints; write the pull of its bones, (B, 3).
 
     Axes of the body that the joints of several views do not give are searched: bearings around the trunk, as seen from
     the cameras, of which the one with the most probable pose counts.
     """
+    graph, length, precision = bones
     axes, chosen, trial = np.zeros((3, 3)), np.zeros(len(count), np.int64), np.zeros_like(pull)
     body_axes(states, chosen, seen_twice, limbs, axes)
     if not axes[2].any():

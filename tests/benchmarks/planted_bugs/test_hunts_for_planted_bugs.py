@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.planted_bugs import hunting
-from benchmarks.planted_bugs.checkout import ROOT
+from benchmarks.planted_bugs.checkout import ROOT, Finished
 from mvpose import Matching, preset
 from simharness.hunt.kept_failure import read_failure
 
@@ -16,7 +16,7 @@ from simharness.hunt.kept_failure import read_failure
 def answered(monkeypatch):
     """A frame of two people without errors, and its answer; the unchanged code is the code of this checkout."""
     monkeypatch.setenv("PLANTED_BUGS_UNCHANGED", str(ROOT))
-    frame = read_failure(ROOT / "scenarios" / "failures" / "few-cameras-merged-b3d50b.toml").with_errors(())
+    frame = read_failure(ROOT / "scenarios" / "failures" / "crowd-merged-488c19.toml").with_errors(())
     rig, detections, truth = frame.detected()
     estimate = preset("full").estimate(rig, detections)
     assert len(estimate) == 2
@@ -71,7 +71,7 @@ def test_a_bug_is_hunted_in_both_copies_until_it_is_found(tmp_path):
             path.parent.mkdir(parents=True, exist_ok=True)
             rows = [{"seed": k, "findings": [{}]} for k in range(len(calls))]
             path.write_text("".join(json.dumps(row) + "\n" for row in ({}, *rows)))
-            return hunting.Finished(0, "", 30.0)
+            return Finished(0, "", 30.0)
 
     calls = []
     outcome = hunting.hunt_bug(Copy(), None, folder=tmp_path, limit=100.0)
