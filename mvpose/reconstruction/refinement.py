@@ -272,7 +272,11 @@ def write_uncertainty(pose, views, sigmas, deviations, floor, graph, precision, 
             freedom[j], share = observe(joints[j], view, relative, absolute, information[j])
             if share > 0.0:
                 solve(information[j], b, alike[j], unused)
-                _split(information[j], alike[j], min(share, _MOST_ALIKE))
+                share = min(share, _MOST_ALIKE)
+                for r in range(3):
+                    for c in range(3):
+                        alike[j, r, c] *= share
+                        information[j, r, c] /= 1.0 - share
     marginalize(joints, information, covariance, graph, precision)
     for j in range(count):
         for r in range(3):
@@ -280,22 +284,6 @@ def write_uncertainty(pose, views, sigmas, deviations, floor, graph, precision, 
                 covariance[j, r, c] += alike[j, r, c]
         add_shared(covariance[j], sigmas[j])
     _add_ambiguity(covariance, joints, origins, directions, weights, graph, precision, pull)
-
-
-@njit(cache=True, borrows=True)
-def _split(information, covariance, share):
-    """Leave a share of the variances to the covariance (3, 3), and the rest to the information (3, 3), in place."""
-    for r in range(3):
-        for c in range(3):
-            covariance[r, c] *= share
-            information[r, c] /= 1.0 - share
-
-
-@njit(cache=True, borrows=True)
-def _add_outer(matrix, vector, weight):
-    for r in range(3):
-        for c in range(3):
-            matrix[r, c] += weight * vector[r] * vector[c]
 
 
 @njit(cache=True)
@@ -350,4 +338,6 @@ def _add_ambiguity(covariance, joints, origins, directions, weights, graph, prec
                     log_odds += direction_log_likelihood(joints[j], joints[other], True, pull[bone])
                     log_odds -= direction_log_likelihood(mirrored, joints[other], True, pull[bone])
             ambiguity[j] += 4.0 * (parent_depth - depth) ** 2 / (1.0 + np.exp(log_odds))
-        _add_outer(covariance[j], directions[j, only, 0], ambiguity[j])
+        for r in range(3):
+            for c in range(3):
+                covariance[j, r, c] += ambiguity[j] * directions[j, only, 0, r] * directions[j, only, 0, c]
