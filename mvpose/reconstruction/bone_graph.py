@@ -24,6 +24,7 @@ from mvpose.arrays import Floats, Integers
 from mvpose.skeleton import Skeleton
 
 _SPANS = frozenset({"hip"})  # parts whose two sides keep their distance, beside those that the tree joins
+_Ends = list[tuple[int, int]]  # parents and children of bones
 _WIDTH = 2  # most joints that remain when a joint is eliminated and that it is joined to
 
 
@@ -72,14 +73,14 @@ def bone_graph(skeleton: Skeleton) -> BoneGraph:
     return _graph(skeleton, tree, images, across, skeleton.mirror)
 
 
-def mirror_images(skeleton: Skeleton) -> list[tuple[int, int]]:
+def mirror_images(skeleton: Skeleton) -> _Ends:
     """Return the mirror images (parent, child) of bones of the tree that are not in the tree."""
     known = {frozenset(bone) for bone in skeleton.edges}
     images = [(skeleton.mirror[parent], skeleton.mirror[child]) for parent, child in skeleton.edges]
     return [image for image in images if frozenset(image) not in known]
 
 
-def spans(skeleton: Skeleton) -> list[tuple[int, int]]:
+def spans(skeleton: Skeleton) -> _Ends:
     """Return the two sides of parts that keep their distance and hang from different joints of the tree."""
     return [
         (joint, other)
@@ -90,13 +91,7 @@ def spans(skeleton: Skeleton) -> list[tuple[int, int]]:
     ]
 
 
-def _graph(
-    skeleton: Skeleton,
-    tree: list[tuple[int, int]],
-    images: list[tuple[int, int]],
-    across: list[tuple[int, int]],
-    mirror: Sequence[int],
-) -> BoneGraph:
+def _graph(skeleton: Skeleton, tree: _Ends, images: _Ends, across: _Ends, mirror: Sequence[int]) -> BoneGraph:
     joints, bones = len(skeleton), [*tree, *images, *across]
     known = {frozenset(bone): index for index, bone in enumerate(bones) if bone[0] >= 0}
     whole = [
@@ -116,7 +111,7 @@ def _graph(
             if candidate >= 0 and candidate not in inner[joint]:
                 inner[joint].append(candidate)
     mate = [other if frozenset((joint, other)) in known else joint for joint, other in enumerate(mirror)]
-    depth = _depths(skeleton)
+    depth = [_depth(skeleton, joint) for joint in range(joints)]
     visits = sorted(
         range(joints), key=lambda joint: (-min(depth[joint], depth[mirror[joint]]), min(joint, mirror[joint]), joint)
     )
@@ -165,15 +160,10 @@ def elimination(joints: int, edges: Sequence[tuple[int, int]]) -> tuple[list[int
     return order, [sorted(around[joint], key=order.index) for joint in range(joints)]
 
 
-def _depths(skeleton: Skeleton) -> list[int]:
-    """Return the number of bones between each joint and the root."""
-    depths = []
-    for joint in range(len(skeleton)):
-        depth, ancestor = 0, skeleton.parents[joint]
-        while ancestor >= 0:
-            depth, ancestor = depth + 1, skeleton.parents[ancestor]
-        depths.append(depth)
-    return depths
+def _depth(skeleton: Skeleton, joint: int) -> int:
+    """Return the number of bones between a joint and the root."""
+    parent = skeleton.parents[joint]
+    return 0 if parent < 0 else 1 + _depth(skeleton, parent)
 
 
 def _padded(rows: list[list[int]], width: int) -> Integers:

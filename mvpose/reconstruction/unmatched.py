@@ -347,10 +347,7 @@ def _fits(joint, state, pose, tree):
 
 @njit(cache=True)
 def _linked(child, parent, tree):
-    found = False
-    for k in range(tree.start[child], tree.start[child + 1]):
-        found = found or tree.state[k] == parent
-    return found
+    return (tree.state[tree.start[child] : tree.start[child + 1]] == parent).any()
 
 
 @njit(cache=True)
