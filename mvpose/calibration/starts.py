@@ -118,12 +118,12 @@ def _curves(rig: Rig, tracklets: Tracklets) -> tuple[Floats, float]:
         one, spreads = _placed(sparse, first, window, windows), np.stack([views[a].spread, views[b].spread])
         pair = spreads, rig.packed[[a, b]]
         found = np.array([evidence_and_most(one, other, *pair) for other in placed[b - 1]])  # (S, W, 2)
-        curves[:, a, b, most:-most] = _against_chance(found[..., 0], found[..., 1])
+        curves[:, a, b, most:-most] = against_chance(found[..., 0], found[..., 1])
         curves[:, b, a] = curves[:, a, b, ::-1]
     return curves, step
 
 
-def _against_chance(evidence: Floats, most: Floats) -> Floats:
+def against_chance(evidence: Floats, most: Floats) -> Floats:
     """Return the three curves of :func:`_curves`, (3, S), of one pair, given the evidence of windows, (S, W)."""
     counted = most > _LEAST_MOST
     bins = np.minimum(_BINS * evidence / np.maximum(most, _LEAST_MOST), _BINS - 1).astype(np.int64)
