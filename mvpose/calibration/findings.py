@@ -4,7 +4,6 @@ A finding is an *alarm* where the calibration, the clocks or the pictures are wr
 where a difference is measured that good rigs have as well; and *unknown* where the recording does not determine it.
 """
 
-import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,11 +11,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, Self, get_args
 
-import numpy as np
-
 from mvpose.arrays import Floats
 from mvpose.camera import Camera, Rig
 from mvpose.checks import Sealed, as_array
+from mvpose.files.json_values import json_value
 
 Severity = Literal["alarm", "note", "unknown"]
 Verdict = Literal["fine", "faults", "cannot tell"]
@@ -124,19 +122,21 @@ class Finding:
 
     def to_json(self) -> dict[str, Any]:
         """Return the finding as values that ``json.dumps`` writes."""
-        return {
+        values = {
             "kind": self.kind,
             "camera": self.camera,
             "view": self.view,
             "severity": self.severity,
             "probability": round(self.probability, 4),
-            "size": {name: _number(value) for name, value in self.size.items()},
-            "interval": {name: [_number(low), _number(high)] for name, (low, high) in self.interval.items()},
-            "cost": _number(self.cost),
+            "size": self.size,
+            "interval": self.interval,
+            "cost": self.cost,
             "text": self.text,
             "mend": self.mend,
-            "repair": list(self.repair),
+            "repair": self.repair,
         }
+        found: dict[str, Any] = json_value(values, significant=6)
+        return found
 
 
 @dataclass(frozen=True)
@@ -212,16 +212,16 @@ class Diagnosis(Sealed):
 
     def to_json(self) -> dict[str, Any]:
         """Return the diagnosis as values that ``json.dumps`` writes."""
-        return {
+        values = {
             "verdict": self.verdict,
-            "findings": [each.to_json() for each in self.findings],
-            "evidence": list(self.evidence),
-            "repair": list(self.repair),
-            "within": {name: _number(value) for name, value in self.within.items()},
-            "residuals_px": {
-                name: _number(value) for name, value in zip(self.cameras, self.residuals.tolist(), strict=True)
-            },
+            "findings": self.findings,
+            "evidence": self.evidence,
+            "repair": self.repair,
+            "within": self.within,
+            "residuals_px": dict(zip(self.cameras, self.residuals, strict=True)),
         }
+        found: dict[str, Any] = json_value(values, significant=6)
+        return found
 
 
 def joined_options(of_findings: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
@@ -247,8 +247,3 @@ def camera_names(rig: Rig | Sequence[Camera]) -> tuple[str, ...]:
         name if name and names.count(name) == 1 else f"camera {view}" if not name else f"{name} ({view})"
         for view, name in enumerate(names)
     )
-
-
-def _number(value: float) -> float | None:
-    """Return a number of six digits for JSON; None where it is not finite."""
-    return float(np.format_float_positional(value, 6, fractional=False)) if math.isfinite(value) else None

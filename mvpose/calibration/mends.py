@@ -27,7 +27,7 @@ from mvpose.calibration.reading_changes import (
     scaled_picture,
     turned_camera,
 )
-from mvpose.camera import Camera
+from mvpose.camera import Camera, Rig
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 _OF_ALL = ("mirrored", "up")  # changes of the whole world
@@ -136,9 +136,7 @@ def _by(change: Change) -> Callable[[Camera], Camera]:
     """Return a change of packed cameras and pixels as one of cameras."""
 
     def changed(camera: Camera) -> Camera:
-        upper = [camera.K[0, 0], camera.K[0, 1], camera.K[0, 2], camera.K[1, 1], camera.K[1, 2]]
-        row = np.concatenate([upper, camera.R.ravel(), camera.center, camera.distortion])
-        row, pixels, _ = change(row, camera.size)
+        row, pixels, _ = change(Rig.unchecked([camera]).packed[0], camera.size)
         R = row[5:14].reshape(3, 3)
         posed = replace(camera, R=R, t=-R @ row[14:17], distortion=row[17:22])
         return posed if pixels is None else of_pictures(posed, pixels)

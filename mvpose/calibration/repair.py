@@ -32,6 +32,7 @@ from mvpose.calibration.tracklet_matching import PeopleGroups, RigUncertainty, m
 from mvpose.calibration.tracklets import Tracklets, chosen_frames, link
 from mvpose.camera import Camera, Rig
 from mvpose.detections import Detections
+from mvpose.files.json_values import json_value
 
 Freedom = Literal["extrinsics", "focal", "center"]
 """What a repair may change: places and orientations; focal lengths; principal points."""
@@ -98,29 +99,25 @@ class Repair:
         cameras = [
             {
                 "name": camera.name,
-                "R": camera.R.tolist(),
-                "t": camera.t.tolist(),
-                "K": camera.K.tolist(),
-                "rotation_degrees": np.degrees(self.corrections[v, :3]).tolist(),
-                "shift_metres": self.corrections[v, 3:].tolist(),
-                "sigma_degrees": np.degrees(np.sqrt(np.diag(self.covariance[v])[:3])).tolist(),
-                "sigma_metres": np.sqrt(np.diag(self.covariance[v])[3:]).tolist(),
-                "offset_seconds": float(self.offsets[v]),
-                "sigma_offset_seconds": float(self.offset_sigmas[v]),
-                "focal_factor": float(self.focal[v]),
-                "center_pixels": self.center[v].tolist(),
-                "residual_before_pixels": _number(self.residuals_before[v]),
-                "residual_after_pixels": _number(self.residuals_after[v]),
+                "R": camera.R,
+                "t": camera.t,
+                "K": camera.K,
+                "rotation_degrees": np.degrees(self.corrections[v, :3]),
+                "shift_metres": self.corrections[v, 3:],
+                "sigma_degrees": np.degrees(np.sqrt(np.diag(self.covariance[v])[:3])),
+                "sigma_metres": np.sqrt(np.diag(self.covariance[v])[3:]),
+                "offset_seconds": self.offsets[v],
+                "sigma_offset_seconds": self.offset_sigmas[v],
+                "focal_factor": self.focal[v],
+                "center_pixels": self.center[v],
+                "residual_before_pixels": self.residuals_before[v],
+                "residual_after_pixels": self.residuals_after[v],
             }
             for v, camera in enumerate(self.rig)
         ]
-        return {
-            "refused": self.refused,
-            "held": list(self.held),
-            "people": self.people,
-            "scale": self.scale,
-            "cameras": cameras,
-        }
+        values = {"refused": self.refused, "held": self.held, "people": self.people, "scale": self.scale}
+        found: dict[str, Any] = json_value({**values, "cameras": cameras})
+        return found
 
 
 def repair(
@@ -386,7 +383,3 @@ def _refused(rig: Rig, reason: str) -> Repair:
 
 def _name(rig: Rig, view: int) -> str:
     return f"camera {rig[view].name or view}"
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

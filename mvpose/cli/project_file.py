@@ -31,7 +31,7 @@ from mvpose.cli.inputs import Choices
 from mvpose.commands.option_groups import flag
 from mvpose.files.input_files import SETTINGS, natural_order, parse_toml, read_bytes
 from mvpose.files.message_text import prefixed, shown
-from mvpose.formats.pose2sim_project import FILE, ProjectSettings, folder_names
+from mvpose.formats.pose2sim_project import FILE, ProjectSettings, excluded, trial_folders, trial_keys
 
 NAME = "project.toml"
 """Usual name of a project file."""
@@ -42,7 +42,6 @@ _GROUPS = (Choices, Wanted, Networks)
 _OF_DETECTIONS = ("times", "skeleton", "pictures")  # options that `mvpose run` does not have
 _FILES = ("times", "skeleton", "detector", "pose")  # values that may be paths
 _KINDS = {str: "text", float: "a number", int: "a whole number", bool: "true or false", Path: "a path"}
-_DEPTH = 4  # folders between a project of Pose2Sim and its trials
 
 
 @dataclass(frozen=True)
@@ -175,8 +174,8 @@ def _trial(name: str, common: Mapping[str, Any], own: Mapping[str, Any], base: P
         if wrong := [key for key in _OF_DETECTIONS if key in own]:
             raise ValueError(f"[trials.{name}] {wrong[0]} has no effect on videos; remove it")
         keys = {key: value for key, value in keys.items() if key not in _OF_DETECTIONS}
-    for what, count in (("calibration", "calibration" in keys), ("detections or videos", _one_of(keys))):
-        if not count:
+    for what in ("calibration", "detections or videos"):
+        if sum(key in keys for key in what.split(" or ")) != 1:
             raise ValueError(f"[trials.{name}]: expected {what}, one of them; it has {', '.join(keys) or 'nothing'}")
     if not all(part not in ("", ".", "..") for part in name.split("/")):
         raise ValueError(f"[trials.{name}]: a name of a trial is that of a folder of results")
@@ -187,10 +186,6 @@ def _trial(name: str, common: Mapping[str, Any], own: Mapping[str, Any], base: P
         return value.replace("{trial}", name) if isinstance(value, str) else value
 
     return LabTrial(name, {key: named(value) for key, value in keys.items()}, base)
-
-
-def _one_of(keys: Mapping[str, Any]) -> bool:
-    return ("detections" in keys) != ("videos" in keys)
 
 
 def _checked(table: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -230,44 +225,19 @@ def _of_kind(hint: Any, value: Any, where: str) -> Any:
 
 
 def _pose2sim_trials(base: Path) -> tuple[LabTrial, ...]:
-    """Return the trials of a project of Pose2Sim: the lowest folders with settings."""
-    places = [file.parent for depth in range(_DEPTH) for file in base.glob("*/" * depth + FILE)]
-    lowest = [each for each in places if not any(each in other.parents for other in places)]
-    trials = []
-    for place in sorted(lowest, key=lambda each: [natural_order(Path(part)) for part in each.parts]):
-        name = place.relative_to(base).as_posix() if place != base else place.resolve().name
-        excluded, _ = ProjectSettings.near([place / FILE]).value(("project", "exclude_from_batch"))
-        if not any(f"/{name}".endswith(f"/{each}") for each in excluded or ()):
-            keys = _checked(_pose2sim_keys(place), str(place / FILE))
-            trials.append(LabTrial(name, keys, base))
-    if not trials:
-        raise ValueError(f"{base}: no project: neither {NAME} nor {FILE} of Pose2Sim, in it or in folders below")
-    return tuple(trials)
-
-
-def _pose2sim_keys(place: Path) -> dict[str, Any]:
-    """Return the keys of a trial of Pose2Sim."""
-    from mvpose.formats.calibration.camera_folder import calibration_files
-    from mvpose.formats.detections.sources import POSES
-
-    settings = ProjectSettings.near([place / FILE])
-    poses, videos = (
-        next((place / each for each in folder_names(place, key, usual) if any((place / each).glob("*"))), None)
-        for key, usual in (("pose_folder_name", POSES), ("video_folder_name", ("videos",)))
+    """Return the trials of a project of Pose2Sim."""
+    names = {
+        place: place.relative_to(base).as_posix() if place != base else place.resolve().name
+        for place in trial_folders(base)
+    }
+    found = tuple(
+        LabTrial(name, _checked(trial_keys(place), str(place / FILE)), base)
+        for place, name in names.items()
+        if not any(f"/{name}".endswith(f"/{each}") for each in excluded(place))
     )
-    above = [place, *place.absolute().parents[: _DEPTH - 1]]
-    calibrated = (each for each in above if any(file.name != FILE for file in calibration_files(each)))
-    keys: dict[str, Any] = {"calibration": str(next(calibrated, place))}
-    keys["videos" if poses is None and videos else "detections"] = str((poses or videos or place).absolute())
-    if "videos" in keys:
-        rate, frames = settings.rate()[0], settings.frames()[0]
-        keys |= {} if rate is None else {"fps": rate}
-        keys |= {} if frames is None else {"frames": "{}:{}".format(*frames)}
-    filters = {each: settings.value(("filtering", each))[0] for each in ("filter", "type", "butterworth", "make_c3d")}
-    if filters["filter"] is not False and filters["type"] in ("butterworth", "gcv_spline"):
-        cutoff = (filters["butterworth"] or {}).get("cut_off_frequency", 6)
-        keys["filter"] = "spline" if filters["type"] == "gcv_spline" else f"butterworth:{cutoff}"
-    return keys | ({"format": "trc,c3d"} if filters["make_c3d"] is True else {})
+    if not found:
+        raise ValueError(f"{base}: no project: neither {NAME} nor {FILE} of Pose2Sim, in it or in folders below")
+    return found
 
 
 def _inside(folder: Path) -> Iterator[Path]:

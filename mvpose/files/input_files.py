@@ -11,7 +11,7 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -255,6 +255,11 @@ def file_numbers(files: Sequence[Path]) -> list[int]:
             if len(set(values)) == len(values):
                 return values
     return list(range(len(files)))
+
+
+def files_ending(folder: Path, endings: Collection[str]) -> list[Path]:
+    """Return the files of a folder with some endings, in lower or upper case, in natural order."""
+    return sorted((each for each in folder.iterdir() if each.suffix.lower() in endings), key=natural_order)
 
 
 def natural_order(path: Path) -> list[tuple[int, str]]:

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.files.input_files import file_numbers, natural_order, read_bytes
+from mvpose.files.input_files import file_numbers, files_ending, natural_order, read_bytes
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 """Endings of pictures in folders."""
@@ -174,7 +174,7 @@ def open_pictures(path: Path) -> PictureSource:
 
 
 def _files(folder: Path) -> list[Path]:
-    return sorted((each for each in folder.iterdir() if each.suffix.lower() in SUFFIXES), key=natural_order)
+    return files_ending(folder, SUFFIXES)
 
 
 def _capture(path: Path) -> cv2.VideoCapture:

@@ -20,6 +20,7 @@ from mvpose.arrays import Floats, Integers
 from mvpose.calibration.findings import camera_names
 from mvpose.camera import Rig
 from mvpose.detections import Detections
+from mvpose.files.json_values import json_value
 from mvpose.reconstruction.error_scale import PRIOR_FREEDOM
 from mvpose.recording import People
 from mvpose.report import measures
@@ -85,18 +86,20 @@ class ExaminedRecording:
         """Return all numbers of the page as values that ``json.dumps`` writes."""
         people, pixels, metres = self.people, *self.residual
         views = self.views[self.views >= 0]
-        return {
+        values = {
             "frames": people.frames,
-            "rate_hz": _json(people.rate),
+            "rate_hz": people.rate,
             "frames_measured": len(self.seen.frames),
-            "residual_px": _json(pixels),
-            "residual_mm": _json(1000 * metres),
-            "mean_views": _json(float(np.mean(views)) if len(views) else math.nan),
-            "joints_on_one_view": _json(measures.share_on_one_view(self.supports)),
-            "expected_error_mm": _json(1000 * expected_error(people)),
+            "residual_px": pixels,
+            "residual_mm": 1000 * metres,
+            "mean_views": np.mean(views) if len(views) else math.nan,
+            "joints_on_one_view": measures.share_on_one_view(self.supports),
+            "expected_error_mm": 1000 * expected_error(people),
             "people": [self._numbers_of_person(row) for row in range(len(people))],
             "cameras": self._numbers_of_cameras(),
         }
+        found: dict[str, Any] = json_value(values, significant=6)
+        return found
 
     def _numbers_of_person(self, row: int) -> dict[str, Any]:
         people, span = self.people, self.people.span(row)
@@ -104,18 +107,18 @@ class ExaminedRecording:
         return {
             "id": int(people.ids[row]),
             "frames": int(people.present[:, row].any(axis=1).sum()),
-            "from_s": _json(float(people.times[span.start])),
-            "to_s": _json(float(people.times[max(span.start, span.stop - 1)])),
-            "median_views": _json(float(np.median(views)) if len(views) else math.nan),
-            "joints_on_one_view": _json(measures.share_on_one_view(self.supports[:, row])),
+            "from_s": people.times[span.start],
+            "to_s": people.times[max(span.start, span.stop - 1)],
+            "median_views": np.median(views) if len(views) else math.nan,
+            "joints_on_one_view": measures.share_on_one_view(self.supports[:, row]),
             "expected_error_mm": {
-                name: _json(1000 * value) for name, value in zip(self.groups, self.errors[row].tolist(), strict=True)
+                name: 1000 * value for name, value in zip(self.groups, self.errors[row].tolist(), strict=True)
             },
             "bones": {
                 bone.name: {
-                    "length_mm": _json(1000 * bone.length),
-                    "spread_mm": _json(1000 * bone.spread),
-                    "sides_differ_percent": _json(100 * bone.asymmetry),
+                    "length_mm": 1000 * bone.length,
+                    "spread_mm": 1000 * bone.spread,
+                    "sides_differ_percent": 100 * bone.asymmetry,
                 }
                 for bone in self.bones
                 if bone.person == row
@@ -128,15 +131,11 @@ class ExaminedRecording:
         by_joint = measures.median_by(seen.pixels, (seen.view, len(self.rig)), (seen.joint, len(joints)))
         return {
             camera: {
-                "residual_px": _json(float(by_camera[view])),
-                "residual_by_joint_px": dict(zip(joints, map(_json, by_joint[view].tolist()), strict=True)),
+                "residual_px": by_camera[view],
+                "residual_by_joint_px": dict(zip(joints, by_joint[view].tolist(), strict=True)),
             }
             for view, camera in enumerate(self.names)
         }
-
-
-def _json(value: float) -> float | None:
-    return float(f"{value:.6g}") if math.isfinite(value) else None
 
 
 def expected_median(covariance: Floats, freedom: ArrayLike = PRIOR_FREEDOM) -> float:

@@ -8,7 +8,7 @@ import errno
 import importlib.util
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,22 +28,20 @@ def has_pyav() -> bool:
 
 
 class FilmFile:
-    """Film that is being written.
+    """Film that is being written; a context manager that finishes the file.
+
+    Its size is that of the first picture, without a last odd row or column: colour has half the resolution.
 
     Args:
         path: the file, ``.mp4``.
-        size: width and height of all pictures in pixels, both even: colour has half the resolution.
         rate: pictures per second.
         quality: constant rate factor of VP9, 0 (best) to 63.
 
     Raises:
-        ValueError: an odd width or height.
         OSError: the file cannot be written, or PyAV is not installed.
     """
 
-    def __init__(self, path: Path, size: tuple[int, int], rate: float, *, quality: int = 36) -> None:
-        if size[0] % 2 or size[1] % 2:
-            raise ValueError(f"{path}: width and height of a film must be even, got {size[0]} x {size[1]}")
+    def __init__(self, path: Path, rate: float, *, quality: int = 36) -> None:
         if not has_pyav():
             raise OSError(errno.ENOSYS, NEEDS, str(path))
         import av
@@ -52,13 +50,22 @@ class FilmFile:
         self._container = av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"})
         frequency = Fraction(rate).limit_denominator(_LONGEST_PERIOD)
         options = {**_OPTIONS, "crf": str(quality)}
-        stream: Any = self._container.add_stream("libvpx-vp9", rate=frequency, options=options)
-        stream.width, stream.height, stream.pix_fmt, stream.thread_count = *size, "yuv420p", 1
-        self._stream = stream
+        self._stream: Any = self._container.add_stream("libvpx-vp9", rate=frequency, options=options)
+        self._stream.pix_fmt, self._stream.thread_count = "yuv420p", 1
+        self._begun = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def add(self, picture: Rgb) -> None:
-        """Append a picture, (h, w, 3)."""
-        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+        """Append a picture, (h, w, 3), all of one size."""
+        height, width = (side - side % 2 for side in picture.shape[:2])
+        if not self._begun:
+            self._stream.width, self._stream.height, self._begun = width, height, True
+        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture[:height, :width]), format="rgb24")
         for packet in self._stream.encode(frame):
             self._container.mux(packet)
 
@@ -68,6 +75,6 @@ class FilmFile:
         Raises:
             OSError: no space is left.
         """
-        for packet in self._stream.encode():
+        for packet in self._stream.encode() if self._begun else ():
             self._container.mux(packet)
         self._container.close()

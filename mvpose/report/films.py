@@ -88,15 +88,13 @@ def write_films(
         address = f"{FOLDER}/{names[view]}.mp4"
         scale = min(1.0, _WIDEST / camera.size[0])
         size = tuple(max(2, 2 * round(0.5 * scale * side)) for side in camera.size)  # colour has half the resolution
-        writer, pen = FilmFile(folder / address, (size[0], size[1]), rate), _Pen(recording, view, scale)
-        most, poster = -1, np.full((size[1], size[0], 3), _GROUND, np.uint8)
-        for row, picture in enumerate(pictures(view, frames)):
-            drawn = pen.drawn(row, picture, (size[0], size[1]))
-            if (shown := pen.detected(row)) > most:
-                most, poster = shown, drawn
-            writer.add(drawn)
-            progress(1)
-        writer.close()
+        pen, most, poster = _Pen(recording, view, scale), -1, np.full((size[1], size[0], 3), _GROUND, np.uint8)
+        with FilmFile(folder / address, rate) as film:
+            for row, picture in enumerate(pictures(view, frames)):
+                film.add(drawn := pen.drawn(row, picture, (size[0], size[1])))
+                if (shown := pen.detected(row)) > most:
+                    most, poster = shown, drawn
+                progress(1)
         films.append(CameraFilm(recording.names[view], address, jpeg_uri(poster)))
     return films
 

@@ -22,7 +22,7 @@ from simharness.planning.camera_terms import CameraTerms, covariance, detect_in,
 from simharness.planning.standing_people import ACTIVITIES, StandingScenes, pose_pool, standing_scenes
 from simharness.planning.visibility import see, seen_joints
 from simharness.scenario.sections.detector_section import DetectorSection
-from simharness.scoring.pairing import LIMIT, mean_distances, pair
+from simharness.scoring.pairing import LIMIT, mean_distances, pair, placed_joints
 from simharness.scoring.pcp import Part, nearest, part_states
 from simharness.statistics.intervals import Interval
 from simharness.types.floor import Volume
@@ -274,17 +274,14 @@ def _by_variant(rig: Rig, terms: Sequence[CameraTerms], scenes: StandingScenes, 
     """Return the estimates of a variant of the method."""
     pipeline = preset(variant)
     shape = (len(scenes), scenes.people)
-    close, paired = np.full((*shape, 17, 3), np.nan), np.full((*shape, 17, 3), np.nan)
-    mixed = np.zeros(shape)
+    close, paired, mixed = np.empty((*shape, 17, 3)), np.empty((*shape, 17, 3)), np.zeros(shape)
     for s in range(len(scenes)):
         detections, person = _detections(terms, s)
         estimate = pipeline.estimate(rig, detections)
         truth = np.where(scenes.present[s][:, None, None], scenes.joints[s], np.nan)
-        if len(estimate.joints):
-            partner = nearest(mean_distances(coco17_to_shelf14(truth), coco17_to_shelf14(estimate.joints)))
-            close[s] = np.where((partner >= 0)[:, None, None], estimate.joints[partner], np.nan)
-            partner = pair(truth, estimate.joints, limit=LIMIT).estimate
-            paired[s] = np.where((partner >= 0)[:, None, None], estimate.joints[partner], np.nan)
+        partner = nearest(mean_distances(coco17_to_shelf14(truth), coco17_to_shelf14(estimate.joints)))
+        close[s] = placed_joints(partner, estimate.joints)
+        paired[s] = placed_joints(pair(truth, estimate.joints, limit=LIMIT).estimate, estimate.joints)
         labels = estimate.matching.labels_of(len(detections))
         for q in range(scenes.people):
             own = np.unique(labels[(person == q) & (labels >= 0)])

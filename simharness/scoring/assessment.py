@@ -9,7 +9,7 @@ order does not matter; ghosts in frames without people count, while VoxelPose sk
 joints that both have; and no epsilon is added to denominators.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,14 +19,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose import COCO17, Estimate
 from mvpose.arrays import Floats
+from mvpose.files.json_values import json_value
 from simharness.scoring.catalogue import AP_MM, PCK_MM
 from simharness.scoring.feet_and_hands import WholeBodyInput, whole_body_scores
 from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.joint_errors import joint_errors, pck, pck_area
 from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, count_pairs, count_violations
-from simharness.scoring.pairing import mean_where_shared
+from simharness.scoring.pairing import mean_where_shared, placed_joints
 from simharness.scoring.pcp import Part
-from simharness.scoring.score_registry import ScoreInput, compute_scores
+from simharness.scoring.score_registry import ScoreInput, compute_scores, in_percent, statistic
 from simharness.scoring.score_summary import STAGES, VariantScores
 from simharness.types.recording import Recording
 from simharness.types.views import Visibility
@@ -80,7 +81,7 @@ def assess(recording: Recording, estimates: Sequence[Estimate], *, whole: WholeB
     groups = _groups(recording, estimates)
     truth = np.stack([true.joints for true in recording.truth])
     partner = variant.frames.partner
-    placed = _paired_joints(truth.shape, partner, estimates)
+    placed = np.stack([placed_joints(row, each.joints) for row, each in zip(partner, estimates, strict=True)])
     errors = joint_errors(truth, placed)
     scores = (
         _people_scores(summary)
@@ -171,20 +172,12 @@ def _groups(recording: Recording, estimates: Sequence[Estimate]) -> tuple[list[G
     return list(map(count_groups, views, labels, people)), list(map(count_violations, views, labels))
 
 
-def _paired_joints(shape: tuple[int, ...], partners: Labels, estimates: Sequence[Estimate]) -> Floats:
-    """Return the joints of the estimate paired with each true person, (T, P, J, 3), metres; NaN where missed."""
-    placed = np.full(shape, np.nan)
-    for row, partner, estimate in zip(placed, partners, estimates, strict=True):
-        row[partner >= 0] = estimate.joints[partner[partner >= 0]]
-    return placed
-
-
 def _people_scores(summary: Mapping[str, Any]) -> Scores:
     return {
         "pcp": summary["pcp"],
         **{f"pcp_{group}": value for group, value in summary["pcp_parts"].items()},
-        "recall": _percent(summary["recall"]),
-        "precision": _percent(summary["precision"]),
+        "recall": in_percent(summary["recall"]),
+        "precision": in_percent(summary["precision"]),
         "ghosts": summary["ghosts_per_frame"],
         "missed": summary["missed_per_frame"],
         "mpjpe_mm": summary["mpjpe_mm"]["mean"],
@@ -194,7 +187,7 @@ def _people_scores(summary: Mapping[str, Any]) -> Scores:
 
 def _joint_scores(errors: Floats) -> Scores:
     return {
-        f"mpjpe_{joint}_mm": _statistic(np.mean, 1000.0 * errors[..., index])
+        f"mpjpe_{joint}_mm": statistic(np.mean, 1000.0 * errors[..., index])
         for index, joint in enumerate(COCO17.joints)
     }
 
@@ -209,23 +202,23 @@ def _precision_scores(truth: Floats, estimates: Sequence[Estimate]) -> Scores:
         f"ap{limit}": average_precision(person, distance, score, people=people, threshold=limit / 1000.0)
         for limit in AP_MM
     }
-    return {**found, "map": _statistic(np.mean, np.array(list(found.values()), float))}
+    return {**found, "map": statistic(np.mean, np.array(list(found.values()), float))}
 
 
 def _pck_scores(errors: Floats) -> Scores:
     curve = pck(errors, np.array(PCK_MM) / 1000.0)
-    shares = {f"pck{limit}": _finite(share) for limit, share in zip(PCK_MM, curve, strict=True)}
-    return {**shares, "pck_auc": _finite(pck_area(errors, PCK_MM[-1] / 1000.0))}
+    shares = {f"pck{limit}": share for limit, share in zip(PCK_MM, curve.tolist(), strict=True)}
+    return json_value({**shares, "pck_auc": pck_area(errors, PCK_MM[-1] / 1000.0)})
 
 
 def _picture_scores(recording: Recording, placed: Floats) -> Scores:
     # Medians, because a single joint close to a lens has an error that dominates the mean.
     estimate, detection = reprojection_errors(recording, placed)
-    return {"reprojection_px": _statistic(np.median, estimate), "detection_px": _statistic(np.median, detection)}
+    return {"reprojection_px": statistic(np.median, estimate), "detection_px": statistic(np.median, detection)}
 
 
 def _matching_scores(summary: Mapping[str, Any], counted: tuple[list[GroupCounts], list[int]] | None) -> Scores:
-    pairs = {f"match_{key}": _percent(share) for key, share in summary["matching"].items()}
+    pairs = {f"match_{key}": in_percent(share) for key, share in summary["matching"].items()}
     if counted is None:
         return pairs | dict.fromkeys(("violations", "merged", "split", "phantoms_admitted", "phantoms_pruned"))
     groups, violations = counted
@@ -294,20 +287,6 @@ def _people_table(recording: Recording, variant: VariantScores, errors: Floats) 
         pl.col("error_mm", "pcp", "worst_mm").fill_nan(None),
         pl.col("worst_joint").replace_strict(names, default=None, return_dtype=pl.String),
     )
-
-
-def _percent(share: float | None) -> float | None:
-    return None if share is None else 100.0 * share
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def _statistic(function: Callable[[Floats], np.floating], values: Floats) -> float | None:
-    """Return a statistic of the finite values; None without any."""
-    values = values[np.isfinite(values)]
-    return float(function(values)) if len(values) else None
 
 
 def nearest_people(truth: Floats, estimate: Floats, frame: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:

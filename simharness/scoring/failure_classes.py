@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from mvpose import COCO17, Detections, Estimate, Rig
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.checks import as_array
-from simharness.scoring.pairing import LIMIT, mean_distances, pair
+from simharness.scoring.pairing import LIMIT, mean_distances, pair, placed_joints
 from simharness.types.recording import Recording
 from simharness.types.truth import Truth
 from simharness.types.views import Visibility
@@ -117,8 +117,7 @@ def failures_of_frame(
     pairing = pair(truth_joints, joints)
     partner = pairing.estimate
     missed = pairing.present & (partner < 0)
-    placed = np.full(truth_joints.shape, np.nan)
-    placed[partner >= 0] = joints[partner[partner >= 0]]
+    placed = placed_joints(partner, joints)
     error = np.linalg.norm(placed - truth_joints, axis=-1)
     displaced = _displaced(error, truth_joints, truth.visibility) & (partner >= 0)[:, None]
     unpaired = np.setdiff1d(np.arange(len(joints)), partner)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Bools, Floats
 from mvpose.skeleton import Skeleton
 from simharness.scoring.joint_errors import joint_errors
+from simharness.scoring.pairing import placed_joints
 from simharness.scoring.score_registry import finite_mean
 
 LIMBS = {"feet": ("big_toe", "small_toe", "heel"), "hands": ("hand_",)}
@@ -43,9 +44,7 @@ def whole_body_scores(given: WholeBodyInput | None, partner: NDArray[np.int64]) 
     scores: dict[str, float | None] = dict.fromkeys(WHOLE_BODY_SCORES)
     if given is None:
         return scores
-    paired = np.full(given.truth.shape, np.nan)
-    for row, mine, joints in zip(paired, partner, given.joints, strict=True):
-        row[mine >= 0] = joints[mine[mine >= 0]]
+    paired = [placed_joints(row, joints) for row, joints in zip(partner, given.joints, strict=True)]
     errors = 1000.0 * joint_errors(given.truth, paired)
     for limb in LIMBS:
         of_limb = errors[..., joints_of(given.skeleton, limb)]

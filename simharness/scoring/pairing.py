@@ -68,6 +68,16 @@ def assign(distance: Floats, *, limit: float = LIMIT) -> NDArray[np.int64]:
     return partner
 
 
+def placed_joints(partner: NDArray[np.int64], joints: Floats) -> Floats:
+    """Return the joints of the estimate paired with each true person, (P, J, 3), from those of all, (n, J, 3).
+
+    They are NaN where the person is missed, whose partner is -1.
+    """
+    result, found = np.full((len(partner), *joints.shape[1:]), np.nan), partner >= 0
+    result[found] = joints[partner[found]]
+    return result
+
+
 def mean_distances(truth: Floats, estimate: Floats) -> Floats:
     """Return the mean distance of each true person from each estimate, over the joints that both have.
 

@@ -161,7 +161,17 @@ def compute_scores(given: ScoreInput) -> dict[str, float | None]:
     return found
 
 
+def statistic(function: Callable[[Floats], np.floating], values: Floats) -> float | None:
+    """Return a statistic of the finite values; None without any."""
+    values = values[np.isfinite(values)]
+    return float(function(values)) if len(values) else None
+
+
 def finite_mean(values: Floats) -> float | None:
     """Return the mean of the finite values; None without any."""
-    values = values[np.isfinite(values)]
-    return float(np.mean(values)) if len(values) else None
+    return statistic(np.mean, values)
+
+
+def in_percent(share: float | None) -> float | None:
+    """Return a share in percent; None without one."""
+    return None if share is None else 100.0 * share

@@ -1,17 +1,17 @@
 """Summary of the scores of all frames: the content of ``summary.json`` of a run and of ``--json`` of ``evaluate``."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import add
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simharness.scoring.frame_scores import FrameScores
 from simharness.scoring.pcp import GROUPS, percent
+from simharness.scoring.score_registry import statistic
 
 STAGES = ("affinity", "matching", "reconstruction", "total")
 
@@ -59,7 +59,6 @@ class VariantScores:
         found, people = int(scored.found.sum()), int(scored.present.sum())
         estimates, ghosts = int(scored.estimates.sum()), int(scored.ghosts.sum())
         errors = scored.error.ravel() * 1000.0
-        errors = errors[np.isfinite(errors)]
         table = self.pcp_table(actors=actors)
         more = {"tracking": self.tracking, "scores": self.scores}
         return {
@@ -70,7 +69,7 @@ class VariantScores:
             "recall": found / people if people else None,
             "ghosts_per_frame": ghosts / frames if frames else None,
             "missed_per_frame": (people - found) / frames if frames else None,
-            "mpjpe_mm": {"mean": _statistic(np.mean, errors), "median": _statistic(np.median, errors)},
+            "mpjpe_mm": {"mean": statistic(np.mean, errors), "median": statistic(np.median, errors)},
             "matching": self._matching(),
             "timings_ms": {stage: self._timing(stage) for stage in STAGES},
             **{key: value for key, value in more.items() if value is not None},
@@ -93,8 +92,8 @@ class VariantScores:
     def _timing(self, stage: str) -> dict[str, float | None]:
         times = np.array([1000.0 * timing[stage] for timing in self.timings if stage in timing])
         return {
-            "median": _statistic(np.median, times),
-            "p99": _statistic(lambda values: np.percentile(values, 99), times),
+            "median": statistic(np.median, times),
+            "p99": statistic(lambda values: np.percentile(values, 99), times),
         }
 
 
@@ -132,7 +131,3 @@ def summarize(
 def _mean(values: Iterable[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return math.fsum(known) / len(known) if known else None
-
-
-def _statistic(function: Callable[[NDArray[np.float64]], np.floating], values: NDArray[np.float64]) -> float | None:
-    return float(function(values)) if len(values) else None

@@ -5,6 +5,8 @@ To add a format, write one module beside this one with a constant ``FORMAT``, a
 :data:`FORMATS`. Programs that use mvpose as a library call :func:`register` instead.
 """
 
+from pathlib import Path
+
 from mvpose.formats.detections import coco_results, mmpose, openpose, rtmlib
 from mvpose.formats.detections.detection_file import WHAT, DetectionFile, DetectionFormat, summary
 
@@ -27,14 +29,19 @@ def suffixes() -> tuple[str, ...]:
     return tuple(dict.fromkeys(suffix for each in FORMATS.values() for suffix in each.suffixes))
 
 
+def formats_for(path: Path) -> list[DetectionFormat]:
+    """Return the formats whose files have the ending of a file."""
+    return [each for each in FORMATS.values() if path.suffix.lower() in each.suffixes]
+
+
 def format_of(file: DetectionFile) -> DetectionFormat:
     """Return the format of a file.
 
     Raises:
         ValueError: no registered format recognises it.
     """
-    for each in FORMATS.values():
-        if file.path.suffix.lower() in each.suffixes and each.recognises(file):
+    for each in formats_for(file.path):
+        if each.recognises(file):
             return each
     if "annotations" in file.object:
         raise ValueError(

@@ -14,7 +14,7 @@ import numpy as np
 
 from mvpose.arrays import Floats, Integers
 from mvpose.detections import Detections
-from mvpose.files.input_files import file_numbers, natural_order
+from mvpose.files.input_files import file_numbers, files_ending
 from mvpose.files.message_text import listed
 from mvpose.formats.detections.detection_file import DetectionFile, DetectionFormat, PicturePeople, summary
 from mvpose.formats.detections.detection_formats import FORMATS, format_of, suffixes
@@ -280,8 +280,7 @@ def read_view(
     kinds: list[DetectionFormat] = []
 
     def of_folder() -> Iterator[tuple[int, PicturePeople]]:
-        found = (each for each in source.path.iterdir() if each.suffix.lower() in suffixes())
-        files = sorted(found, key=natural_order)
+        files = files_ending(source.path, suffixes())
         if not files:
             raise ValueError(f"{source.path}: an empty folder; expected a *.json file for each picture")
         paths = dict(sorted(zip(file_numbers(files), files, strict=True)))

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mvpose.files.input_files import MIB, natural_order
+from mvpose.files.input_files import MIB, files_ending, natural_order
 from mvpose.files.message_text import listed, one_line
 from mvpose.formats.detections.detection_file import LONG_LIST, DetectionFile
-from mvpose.formats.detections.detection_formats import FORMATS, suffixes
+from mvpose.formats.detections.detection_formats import formats_for, suffixes
 from mvpose.formats.pose2sim_project import folder_names
 
 POSES = ("pose-sync", "pose", "pose-2d", "predictions")
@@ -63,7 +63,7 @@ def _below(path: Path) -> list[Source]:
         if path.suffix.lower() not in suffixes():
             raise ValueError(f"{name}: expected detections, {_KINDS}; `mvpose detect` makes them of videos")
         return [_source(path)]
-    files = _files(path)
+    files = files_ending(path, suffixes())
     if files:
         first = next(filter(_is_detections, files), files[0])
         if _is_of_one_picture(first):
@@ -73,7 +73,7 @@ def _below(path: Path) -> list[Source]:
     for inside in folder_names(path, "pose_folder_name", POSES):
         if path / inside in folders:
             return _below(path / inside)
-    found = [_source(each) for each in folders if _files(each)]
+    found = [_source(each) for each in folders if files_ending(each, suffixes())]
     if not found:
         has = "has neither" if any(path.iterdir()) else "is an empty folder"
         if folders:
@@ -82,25 +82,17 @@ def _below(path: Path) -> list[Source]:
     return found
 
 
-def _files(folder: Path) -> list[Path]:
-    return sorted((each for each in folder.iterdir() if each.suffix.lower() in suffixes()), key=natural_order)
-
-
 def _is_of_one_picture(path: Path) -> bool:
     """Return whether a file holds the people of one picture, so that its folder holds those of one camera."""
     file = DetectionFile(path)
-    return path.stat().st_size <= LONG_LIST and any(
-        path.suffix.lower() in each.suffixes and each.of_picture(file) for each in FORMATS.values()
-    )
+    return path.stat().st_size <= LONG_LIST and any(each.of_picture(file) for each in formats_for(path))
 
 
 def _is_detections(path: Path) -> bool:
     """Return whether a file may hold detections: files of settings beside them are small, and of no known format."""
     file = DetectionFile(path)
     try:
-        return path.stat().st_size > _SETTINGS or any(
-            path.suffix.lower() in each.suffixes and each.recognises(file) for each in FORMATS.values()
-        )
+        return path.stat().st_size > _SETTINGS or any(each.recognises(file) for each in formats_for(path))
     except (OSError, ValueError):
         return True  # its reader says what is wrong
 

@@ -1,6 +1,5 @@
 """True keypoints in the pictures of each camera as a COCO keypoints file, for detectors to be trained or scored on."""
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -8,7 +7,7 @@ import numpy as np
 
 from mvpose import Rig
 from mvpose.skeleton import COCO17
-from simharness.outputs.benchmark.layout import Layout
+from simharness.outputs.benchmark.layout import Layout, write_json
 from simharness.types.truth import Truth
 from simharness.types.views import Visibility
 
@@ -48,7 +47,5 @@ def write_coco(layout: Layout, rig: Rig, truth: Mapping[int, Truth], people: Seq
                 who = {"id": len(annotations) + 1, "image_id": frame, "category_id": 1, "track_id": int(people[person])}
                 joints = {"keypoints": keypoints, "num_keypoints": int((flag > 0).sum()), "iscrowd": 0}
                 annotations.append(who | joints | box)
-        path = layout.folder / COCO / f"{camera.name}.json"
-        path.parent.mkdir(exist_ok=True)
         content = {"images": images, "annotations": annotations, "categories": [_CATEGORY]}
-        path.write_text(json.dumps(content, allow_nan=False) + "\n", encoding="utf-8")
+        write_json(layout.folder / COCO / f"{camera.name}.json", content)

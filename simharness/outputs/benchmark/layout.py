@@ -13,7 +13,8 @@ In ``body3DScene`` files the confidence of a joint says how many pictures show i
 even where they are hidden; the dataset's mark of an undefined joint (0 0 0 -1) is never written.
 """
 
-from collections.abc import Iterable, Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -102,13 +103,16 @@ class Layout:
         """Return the path of the detections in the picture of a camera."""
         return self.folder / PEOPLE.format(camera=camera, frame=frame)
 
-    def make_folders(self, cameras: Iterable[str], *, pictures: bool) -> None:
-        """Create the folders of the files."""
-        self.bodies(0).parent.mkdir(parents=True)
-        for camera in cameras:
-            self.people(camera, 0).parent.mkdir(parents=True)
-            if pictures:
-                self.picture(camera, 0).parent.mkdir(parents=True)
+
+def readable_json(content: dict[str, Any]) -> bytes:
+    """Return the bytes of a JSON file for people: indented, with all letters as they are."""
+    return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a JSON file for programs, and its folder where it is missing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content, allow_nan=False) + "\n", encoding="utf-8")
 
 
 CONFIDENCES = {"two or more": 1.0, "one": 0.5, "none": 0.2, "none, nor any joint of the person": 0.0}

@@ -14,9 +14,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from mvpose import SHELF14, Detections, Rig
+from mvpose import SHELF14, Rig
 from mvpose.arrays import Floats
 from mvpose.commands.output_files import check_writable
 from mvpose.commands.progress import Reporter, Silence, Stages
@@ -28,7 +27,7 @@ from mvpose.formats.people.panoptic_poses import body_scene
 from mvpose.recording import People
 from mvpose.skeleton import PANOPTIC19
 from simharness.outputs.benchmark.coco_truth import COCO, write_coco
-from simharness.outputs.benchmark.layout import FORMAT, Layout, confidences, manifest
+from simharness.outputs.benchmark.layout import FORMAT, Layout, confidences, manifest, readable_json, write_json
 from simharness.outputs.benchmark.render import CHANNELS, channel_image, write_image
 from simharness.outputs.benchmark.submission import write_exact
 from simharness.reality.annotation_errors import annotate_simulation
@@ -43,7 +42,7 @@ _HEAD = (
     "# The detections and the truth of this sequence as a recording: simharness evaluate FOLDER\n"
     "# Frames are counted as they were written: frame k is the k-th file of each camera.\n"
 )
-_JPEG_QUALITY = 95
+_JPEG = (cv2.IMWRITE_JPEG_QUALITY, 95)
 _FINER = 2  # samples per pixel along each axis, against aliasing
 
 
@@ -113,7 +112,6 @@ def export_sequence(
     frames = range(0, scenario.frames, plan.every)
     with Stages(reporter).stage("write", len(frames)) as advance, atomic_folder(plan.folder, FORMAT) as partial:
         layout = Layout(partial, scenario.name)
-        layout.make_folders(names, pictures=plan.pictures)
         layout.scenario.write_text(dumps(scenario), encoding="utf-8")
         write_cameras(layout.calibration, true_rig, source=scenario.name)
         if faulty := not _same_cameras(true_rig, believed_rig):
@@ -128,14 +126,16 @@ def export_sequence(
                 time=float(sequence.time[frame]),
                 rate=scenario.rate,
             )
-            _write_json(layout.bodies(frame), bodies)
+            write_json(layout.bodies(frame), bodies)
             shown = current.detections if current.whole is None else current.whole.detections
-            _write_people(layout, names, frame, shown)
+            for view, name in enumerate(names):
+                seen = shown.select(shown.view == view)
+                write_json(layout.people(name, frame), people_file(seen.keypoints, seen.scores, skeleton=seen.skeleton))
             if source is not None:
                 for view, name in enumerate(names):
                     if plan.pictures:
                         picture = source.picture(exposures, frame, view, finer=_FINER)
-                        _write_picture(layout.picture(name, frame), picture)
+                        write_image(layout.picture(name, frame), picture[..., ::-1], *_JPEG)
                     for channel in channels:
                         image = channel_image(source, trial, frame, view, channel)
                         write_image(layout.channel(channel, name, frame), image)
@@ -152,7 +152,7 @@ def export_sequence(
             command=command,
             seconds=round(time.perf_counter() - start, 3),
         ) | {"request": request or {}}
-        layout.manifest.write_text(json.dumps(description, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        layout.manifest.write_bytes(readable_json(description))
     return plan.folder
 
 
@@ -162,24 +162,6 @@ def _same_cameras(one: Rig, other: Rig) -> bool:
         for a, b in zip(one, other, strict=True)
         for key in ("K", "R", "t", "distortion")
     )
-
-
-def _write_people(layout: Layout, names: Sequence[str], frame: int, detections: Detections) -> None:
-    for view, name in enumerate(names):
-        of_view = detections.view == view
-        keypoints, scores = detections.keypoints[of_view], detections.scores[of_view]
-        _write_json(layout.people(name, frame), people_file(keypoints, scores, skeleton=detections.skeleton))
-
-
-def _write_json(path: Path, content: Mapping[str, Any]) -> None:
-    path.write_text(json.dumps(content, allow_nan=False) + "\n", encoding="utf-8")
-
-
-def _write_picture(path: Path, rgb: NDArray[np.uint8]) -> None:
-    encoded, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-    if not encoded:
-        raise RuntimeError(f"OpenCV cannot encode a picture of shape {rgb.shape} as JPEG")
-    path.write_bytes(data.tobytes())
 
 
 def hd_names(names: Sequence[str]) -> tuple[str, ...]:
@@ -209,8 +191,7 @@ def write_cameras(path: Path, rig: Rig, *, source: str) -> None:
     entries = json.loads(path.read_text(encoding="utf-8"))["cameras"]
     for entry in entries:
         entry["panel"], entry["node"] = map(int, entry["name"].split("_"))
-    text = json.dumps({"calibDataSource": source, "cameras": entries}, indent=1)
-    path.write_text(text + "\n", encoding="utf-8")
+    path.write_text(json.dumps({"calibDataSource": source, "cameras": entries}, indent=1) + "\n", encoding="utf-8")
 
 
 def _write_description(layout: Layout, scenario: Scenario, joints: Floats, frames: range, *, believed: bool) -> None:

@@ -1,6 +1,6 @@
 """Rendered pictures or films of all cameras of a scenario, and a mosaic of them, as files."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,22 +92,24 @@ def render(scenario: Scenario, plan: RenderPlan, *, out: Path, reporter: Reporte
     check_writable(folder, _RENDER)
     trial, layers = _layers(scenario, plan, reporter)
     picture_source = picture_source_of(scenario, Playback(trial.scene))
-    frames = range(0, scenario.frames, plan.every)
+    frames, rate = range(0, scenario.frames, plan.every), scenario.rate / plan.every
     names = [*(camera.name for camera in trial.exposures.believed_rig), "mosaic"]
     with (
         reporter.stage("render", len(frames)) as advance,
         atomic_folder(folder, _RENDER) as partial,
         ExitStack() as stack,
     ):
-        write: Callable[[str, int, Rgb], None] = _PngWriter(partial)
-        if plan.video:
-            write = stack.enter_context(_VideoWriter(partial, rate=scenario.rate / plan.every))
+        files = [FilmFile(partial / f"{name}.mp4", rate, quality=_FILM_QUALITY) for name in names if plan.video]
+        films = [stack.enter_context(each) for each in files]
         for frame, pictures in zip(frames, _pictures(trial, picture_source, plan, layers, frames), strict=True):
             sheet = mosaic(pictures, names[:-1])
             shrink = min(1.0, _MOSAIC_WIDTH / sheet.shape[1])
             small = cv2.resize(sheet, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA).astype(np.uint8)
-            for name, picture in zip(names, [*pictures, small], strict=True):
-                write(name, frame, picture)
+            for k, (name, picture) in enumerate(zip(names, [*pictures, small], strict=True)):
+                if films:
+                    films[k].add(picture)
+                else:
+                    write_image(partial / name / f"{frame:04d}.png", picture[..., ::-1])
             for view, name in enumerate(names[:-1]):
                 for channel in sorted(plan.channels):
                     write_image(
@@ -180,41 +182,8 @@ def channel_image(
     return (image.parts + 1).astype(np.uint8)
 
 
-def write_image(path: Path, picture: NDArray[np.unsignedinteger]) -> None:
-    """Write a PNG, and its folder where it is missing."""
+def write_image(path: Path, picture: NDArray[np.unsignedinteger], *options: int) -> None:
+    """Write a picture with options of OpenCV's, in the format of its name, and its folder where it is missing."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    if not cv2.imwrite(str(path), picture):
+    if not cv2.imwrite(str(path), picture, options):
         raise RuntimeError(f"OpenCV cannot write a picture of shape {picture.shape} to {path}")
-
-
-class _PngWriter:
-    """Writer of one PNG for each picture, in a folder for each name."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def __call__(self, name: str, frame: int, rgb: Rgb) -> None:
-        write_image(self._folder / name / f"{frame:04d}.png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR).astype(np.uint8))
-
-
-class _VideoWriter:
-    """Writer of one MP4 for each name, frame by frame; a context manager that closes the files."""
-
-    def __init__(self, folder: Path, *, rate: float) -> None:
-        self._folder = folder
-        self._rate = rate
-        self._writers: dict[str, FilmFile] = {}
-
-    def __enter__(self) -> "_VideoWriter":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for writer in self._writers.values():
-            writer.close()
-
-    def __call__(self, name: str, frame: int, rgb: Rgb) -> None:
-        even = rgb[: rgb.shape[0] // 2 * 2, : rgb.shape[1] // 2 * 2]  # the codec halves the resolution of colour
-        if name not in self._writers:
-            path, size = self._folder / f"{name}.mp4", (even.shape[1], even.shape[0])
-            self._writers[name] = FilmFile(path, size, self._rate, quality=_FILM_QUALITY)
-        self._writers[name].add(even)

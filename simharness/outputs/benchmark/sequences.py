@@ -10,7 +10,6 @@ that is there is kept: an export that was stopped goes on, and several machines 
 """
 
 import hashlib
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -25,6 +24,7 @@ from mvpose.files.input_files import read_bytes, read_json_object
 from mvpose.formats.people import read_people
 from mvpose.report.documents import fill_template
 from simharness.outputs import TEMPLATES
+from simharness.outputs.benchmark.layout import readable_json
 from simharness.outputs.benchmark.panoptic_sequence import ExportPlan, export_sequence
 from simharness.runtime.frame_pool import map_jobs
 from simharness.scenario.load import fingerprint
@@ -133,20 +133,16 @@ def _describe(scenario: Scenario, folder: Path, command: str | None) -> None:
     about: dict[str, Any] = {"format": "simharness benchmark", "version": 1, "name": scenario.name}
     about |= {"description": scenario.description, "sequences": sequences, "truth_sha256": digest.hexdigest()}
     about["provenance"] = provenance(command=command, seeds=seeds, variants=[], seconds=0.0)
-    write_atomic(folder / "benchmark.json", _json(about))
+    write_atomic(folder / "benchmark.json", readable_json(about))
     metadata = read_json_object(_DATA / "croissant.json", what="the metadata")
     metadata |= {"name": scenario.name, "description": scenario.description or f"Scenario {scenario.name}"}
-    metadata["distribution"][0]["sha256"] = hashlib.sha256(_json(about)).hexdigest()
-    write_atomic(folder / "croissant.json", _json(metadata))
+    metadata["distribution"][0]["sha256"] = hashlib.sha256(readable_json(about)).hexdigest()
+    write_atomic(folder / "croissant.json", readable_json(metadata))
     text = fill_template("benchmark.md", folder=TEMPLATES, about=about, scenario=scenario)
     write_atomic(folder / "README.md", text.encode())
     files = sorted(each for each in folder.rglob("*") if each.is_file() and each.name not in (MANIFEST, "SHA256SUMS"))
     lines = [f"{_sha256(each)}  {each.relative_to(folder).as_posix()}\n" for each in files]
     write_atomic(folder / "SHA256SUMS", "".join(lines).encode())
-
-
-def _json(content: dict[str, Any]) -> bytes:
-    return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
 
 
 def _sha256(path: Path) -> str:

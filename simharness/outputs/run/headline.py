@@ -7,6 +7,7 @@ from typing import Any
 from mvpose.report.tables import NOTHING
 from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import SCORES, ScoreInfo
+from simharness.scoring.score_registry import in_percent
 
 
 @dataclass(frozen=True)
@@ -35,14 +36,10 @@ class Column:
         return number if number == NOTHING or not self.unit else f"{number} {self.unit}"
 
 
-def _percent(share: float | None) -> float | None:
-    return None if share is None else 100 * share
-
-
 COLUMNS: tuple[Column, ...] = (
     Column("PCP", "%", "body parts whose error is at most half their length", lambda s: s["pcp"], 1),
-    Column("Precision", "%", "estimates that match a true person", lambda s: _percent(s["precision"]), 1),
-    Column("Recall", "%", "true people who were found, over all frames", lambda s: _percent(s["recall"]), 1),
+    Column("Precision", "%", "estimates that match a true person", lambda s: in_percent(s["precision"]), 1),
+    Column("Recall", "%", "true people who were found, over all frames", lambda s: in_percent(s["recall"]), 1),
     Column("MPJPE", "mm", "mean joint error of the people found", lambda s: s["mpjpe_mm"]["mean"], 1),
     Column("Ghosts", "", "estimates per frame that match no person", lambda s: s["ghosts_per_frame"], 3),
     Column("Missed", "", "true people per frame who were not found", lambda s: s["missed_per_frame"], 3),

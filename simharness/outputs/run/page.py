@@ -19,11 +19,11 @@ from simharness.outputs.run import plots, standard_figures
 from simharness.outputs.run.figures import draw_figures
 from simharness.outputs.run.headline import COLUMNS, scored_columns
 from simharness.outputs.run.identity_plots import TRACKING_COLUMNS, tracked_variants
-from simharness.outputs.run.pictures import PagePicture, RunFilm
+from simharness.outputs.run.pictures import PagePicture, RunFilm, rows_of
 from simharness.outputs.run.standard_figures import person_errors, presence
 from simharness.scenario.toml_files import dumps
 from simharness.scoring.feet_and_hands import WHOLE_BODY_SCORES
-from simharness.scoring.pairing import pair
+from simharness.scoring.frame_scores import score_frames
 from simharness.scoring.pcp import GROUPS, Part
 from simharness.study.causes.cause_shares import Blame
 from simharness.trial.run_folder import Record
@@ -122,21 +122,15 @@ def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
 
 def _parts(scores: pl.DataFrame, variant: str) -> NDArray[np.int8]:
     """Return the :class:`Part` value of the ten parts of every true person in every frame, (T, P, 10)."""
-    rows = scores.filter(pl.col("variant") == variant).sort("frame")["parts"].to_list()
-    people = len(rows[0]) // 10
-    return np.array(rows, np.int8).reshape(len(rows), people, 10)
+    rows = rows_of(scores, variant)["parts"].to_list()
+    return np.array(rows, np.int8).reshape(len(rows), -1, 10)
 
 
 def joint_errors(record: Record, variant: str) -> Floats:
     """Return the distance of every joint of those who are there from its estimate, (n,) mm; NaN without an estimate."""
     joints = np.stack([true.joints for true in record.truth])
-    errors = np.full(joints.shape[:3], np.nan)
-    for frame, (true, estimate) in enumerate(zip(record.truth, record.estimates[variant], strict=True)):
-        partner = pair(true.joints, estimate.joints).estimate
-        found = partner >= 0
-        offset = true.joints[found] - estimate.joints[partner[found]]
-        errors[frame, found] = 1000 * np.linalg.norm(offset, axis=-1)
-    return errors[np.isfinite(joints).all(axis=-1)]
+    errors = score_frames(joints, [estimate.joints for estimate in record.estimates[variant]]).errors
+    return 1000 * errors[np.isfinite(joints).all(axis=-1)]
 
 
 def _stage_times(record: Record) -> dict[str, dict[str, float]]:

@@ -13,7 +13,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from mvpose import Camera, Detections, Estimate
+from mvpose import Camera, Detections, Estimate, Rig
 from mvpose.report.film_file import FilmFile
 from mvpose.report.overlay import BoxTag, Mark, Overlay, legend, mosaic, rooms_in_grid
 from mvpose.report.palette import COCO17_BODY, SMALL_FACE, TRUTH, UNMATCHED, Color, person_color, plain_face
@@ -67,31 +67,30 @@ def draw_pictures(
     frames = {"A typical frame": typical}
     if costs[worst] > costs[typical]:
         frames["The worst frame"] = worst
-    picture_source = picture_source_of(trial.scenario, Playback(trial.scene))
+    source = picture_source_of(trial.scenario, Playback(trial.scene))
     pictures = []
     for title, frame in frames.items():
-        rgb = draw_frame(
-            trial,
-            picture_source,
-            frame,
-            truth=record.truth[frame],
-            detections=record.detections[frame],
-            estimate=record.estimates[variant][frame],
-        )
+        truth, detections, estimate = record.truth[frame], record.detections[frame], record.estimates[variant][frame]
+        rgb = draw_frame(trial, source, frame, truth=truth, detections=detections, estimate=estimate)
         pictures.append(PagePicture(title, _caption(record, variant, frame), rgb))
         progress(1)
     return pictures
 
 
+def rows_of(scores: pl.DataFrame, variant: str) -> pl.DataFrame:
+    """Return the rows of a variant in the order of frames."""
+    return scores.filter(pl.col("variant") == variant).sort("frame")
+
+
 def frame_costs(scores: pl.DataFrame, variant: str) -> NDArray[np.float64]:
     """Return the cost of each frame, (T,) millimetres: sum of the errors of people, 500 per missed person or ghost."""
-    rows = scores.filter(pl.col("variant") == variant).sort("frame")
+    rows = rows_of(scores, variant)
     wrong = (rows["missed"] + rows["ghosts"]).to_numpy()
     return rows["errors_mm"].list.sum().to_numpy() + 1000 * LIMIT * wrong
 
 
 def _caption(record: Record, variant: str, frame: int) -> str:
-    row = record.scores.filter((pl.col("variant") == variant) & (pl.col("frame") == frame)).row(0, named=True)
+    row = rows_of(record.scores, variant).row(frame, named=True)
     found = f"{row['found']} of {row['people']} people found"
     ghosts = f"{row['ghosts']} ghost{'' if row['ghosts'] == 1 else 's'}"
     error = "" if row["mpjpe_mm"] is None else f", mean joint error {row['mpjpe_mm']:.1f} mm"
@@ -122,9 +121,8 @@ def draw_frame(
         explained: whether a legend is the last tile; None: where the last row of tiles has room for it.
     """
     rig = trial.exposures.believed_rig
-    views = np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MAX_VIEWS)).astype(int))
-    tiles = []
-    for view in map(int, views):
+    views, tiles = _shown_views(rig), []
+    for view in views:
         rgb = picture_source.picture(trial.exposures, frame, view, finer=2)
         camera = trial.exposures.camera(frame, view)
         tiles.append(annotate(rgb, camera, view, truth=truth, detections=detections, estimate=estimate))
@@ -133,6 +131,11 @@ def draw_frame(
         tiles.append(legend(legend_entries(trial.scenario), size=rig[0].size, title="Legend"))
         titles.append("")
     return mosaic(tiles, titles)
+
+
+def _shown_views(rig: Rig) -> list[int]:
+    """Return the views of a mosaic, evenly spaced ones where there are many."""
+    return np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MAX_VIEWS)).astype(int)).tolist()
 
 
 def annotate(
@@ -167,7 +170,8 @@ def annotate(
         # True person of each detection by the matching of the method; label -1 has none.
         assigned = np.append(owner, -1)[estimate.matching.labels_of(len(truth.person))]
         for joints, person in zip(estimate.joints, owner, strict=True):
-            _draw_estimate(overlay, camera, joints, person_color(int(person)))
+            points, color = project_to_image(camera, joints), person_color(int(person))
+            overlay.skeleton(points, color=color, edges=COCO17_BODY, width=7, dots=0, opacity=0.55)
     if show_truth:
         for pixels in truth.pixels[view]:
             overlay.skeleton(
@@ -180,10 +184,6 @@ def annotate(
         ]
         overlay.tags([tag for tag in tags if tag.text])
     return overlay.rgb
-
-
-def _draw_estimate(overlay: Overlay, camera: Camera, joints: NDArray[np.float64], color: Color) -> None:
-    overlay.skeleton(project_to_image(camera, joints), color=color, edges=COCO17_BODY, width=7, dots=0, opacity=0.55)
 
 
 def _draw_detection(overlay: Overlay, detections: Detections, index: int, *, assigned: int, true: int) -> BoxTag:
@@ -219,7 +219,6 @@ def outlines(scene: Scene) -> list[NDArray[np.float64]]:
 
 
 _MAX_FRAMES = 60  # more would be larger than the rest of the page
-_MAX_VIEWS = 8  # with the legend, three rows of three tiles
 _LEAST_RATE = 1.0  # pictures per second: players show nothing of a slower film for long
 
 
@@ -260,11 +259,18 @@ def make_film(
         variant: variant whose estimates are drawn.
     """
     frames = sorted(previews)
-    views = np.unique(np.linspace(0, len(record.rig) - 1, min(len(record.rig), _MAX_VIEWS)).astype(int)).tolist()
+    views = _shown_views(record.rig)
     height, width = previews[frames[0]][views[0]].shape[:2]
     entries = [entry for entry in legend_entries(record.scenario) if entry[0] == "limbs"]
     explained = legend(entries, size=(width, height), title="Legend")
-    sheets = [_sheet(previews[frame], record, exposures, frame, views, variant, explained) for frame in frames]
+    titles = [*(record.rig[view].name for view in views), ""]
+
+    def tile(frame: int, view: int) -> Rgb:
+        rgb, camera = previews[frame][view], exposures.camera(frame, view)
+        estimate, camera = record.estimates[variant][frame], scaled(camera, rgb.shape[1] / camera.size[0])
+        return annotate(rgb, camera, view, truth=record.truth[frame], estimate=estimate, show_truth=False)
+
+    sheets = [mosaic([*(tile(frame, view) for view in views), explained], titles) for frame in frames]
     step = float(record.time[frames[1]] - record.time[frames[0]]) if len(frames) > 1 else 1.0
     mp4 = encode_mp4(sheets, rate=max(1.0 / step, _LEAST_RATE))
     if mp4 is None:
@@ -272,33 +278,6 @@ def make_film(
     shown = "" if len(views) == len(record.rig) else f", {len(views)} of {len(record.rig)} cameras"
     count = "All frames" if len(frames) == len(record.time) else f"{len(frames)} of {len(record.time)} frames"
     return RunFilm(f"{count} in real time{shown}, with the estimates of variant {variant}.", mp4, sheets[0])
-
-
-def _sheet(
-    pictures: Sequence[Rgb],
-    record: Record,
-    exposures: ExposureSchedule,
-    frame: int,
-    views: Sequence[int],
-    variant: str,
-    explained: Rgb,
-) -> Rgb:
-    tiles = []
-    for view in views:
-        rgb = pictures[view]
-        camera = exposures.camera(frame, view)
-        tiles.append(
-            annotate(
-                rgb,
-                scaled(camera, rgb.shape[1] / camera.size[0]),
-                view,
-                truth=record.truth[frame],
-                estimate=record.estimates[variant][frame],
-                show_truth=False,
-            )
-        )
-    titles = [record.rig[view].name for view in views]
-    return mosaic([*tiles, explained], [*titles, ""])
 
 
 def encode_mp4(pictures: Sequence[Rgb], *, rate: float) -> bytes | None:
@@ -310,14 +289,12 @@ def encode_mp4(pictures: Sequence[Rgb], *, rate: float) -> bytes | None:
         pictures: pictures, one or more.
         rate: pictures per second.
     """
-    height, width = (side - side % 2 for side in pictures[0].shape[:2])
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.mp4"
         try:
-            film = FilmFile(path, (width, height), rate)
+            with FilmFile(path, rate) as film:
+                for rgb in pictures:
+                    film.add(rgb)
         except OSError:
             return None
-        for rgb in pictures:
-            film.add(rgb[:height, :width])
-        film.close()
         return path.read_bytes()

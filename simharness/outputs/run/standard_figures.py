@@ -10,6 +10,7 @@ from mvpose.arrays import Bools, Floats
 from mvpose.report.palette import line_color
 from simharness.outputs.run import plots
 from simharness.outputs.run.figures import figure
+from simharness.outputs.run.pictures import rows_of
 from simharness.trial.run_folder import Record
 from simharness.types.views import Visibility
 
@@ -69,10 +70,8 @@ def presence(record: Record) -> Bools:
 
 def person_errors(scores: pl.DataFrame, variant: str) -> Floats:
     """Return the mean joint error of every true person in every frame, (T, P) millimetres; NaN where not found."""
-    rows = scores.filter(pl.col("variant") == variant).sort("frame")["errors_mm"].to_list()
-    return np.array([[np.nan if error is None else error for error in row] for row in rows], float).reshape(
-        len(rows), -1
-    )
+    rows = rows_of(scores, variant)["errors_mm"].to_list()
+    return np.array(rows, float).reshape(len(rows), -1)  # None becomes NaN
 
 
 _FAR = 1.5  # times the error of the best: from there on the worst is named

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from mvpose import COCO17, SHELF14, Estimate
 from mvpose.arrays import Floats
 from mvpose.skeleton import HeadMapping, coco17_to_shelf14
-from simharness.scoring.pairing import pair
+from simharness.scoring.pairing import pair, placed_joints
 from simharness.scoring.score_registry import ScoreInput, finite_mean, score, scores, shipped_scores
 from simharness.scoring.tracking.identity_scores import clear_mot, hota, identity_scores, pose_figures
 from simharness.scoring.tracking.tracked_frames import DISTANCES, PLACES, TrackedFrames, ids_of, tracked_frames
@@ -104,10 +104,7 @@ def tracking_summary(truth: Floats, estimates: Sequence[Estimate], time: Floats)
             found[place] = {f"{each:g}": identity_figures(frames, time, distance=each) for each in DISTANCES}
         frames = tracked_frames(truth, joints, ids, skeleton=COCO17)
         found |= pose_figures(frames, truth, joints, distance=DISTANCE)
-    paired = np.full(truth.shape, np.nan)
-    for row, true, estimated in zip(paired, truth, joints, strict=True):
-        partner = pair(true, estimated).estimate
-        row[partner >= 0] = estimated[partner[partner >= 0]]
+    paired = np.stack([placed_joints(pair(*each).estimate, each[1]) for each in zip(truth, joints, strict=True)])
     velocity, jerk = velocity_error(truth, paired, time), rms_jerk(truth, paired, time)
     return found | {
         "velocity_mm_s": None if velocity is None else 1000.0 * velocity,

@@ -86,10 +86,9 @@ class TestPicturesOfAnotherRecording:
                 (tmp_path / "other").mkdir(exist_ok=True)
                 pictures = [np.full((size[1], size[0], 3), 40 + number, np.uint8) for number in range(count)]
                 if video:
-                    film = FilmFile(tmp_path / "other" / f"{name}.mp4", size, 50.0)
-                    for each in pictures:
-                        film.add(each)
-                    film.close()
+                    with FilmFile(tmp_path / "other" / f"{name}.mp4", 50.0) as film:
+                        for each in pictures:
+                            film.add(each)
                     continue
                 (tmp_path / "other" / name).mkdir(exist_ok=True)
                 for number, each in enumerate(pictures):
