@@ -272,13 +272,10 @@ def exaggerated(before: Camera, after: Camera, factor: float) -> Camera:
     return Camera(after.K, R, -R @ center, after.distortion, after.size, after.name)
 
 
-def rig_from_above(
-    name: str, rig: Rig, *, repaired: Rig | None, moved: Sequence[int], points: Floats, factor: float
-) -> str:
+def rig_from_above(rig: Rig, *, repaired: Rig | None, moved: Sequence[int], points: Floats, factor: float) -> str:
     """Plot the rig from above: all cameras, those that moved before and after, and where people were.
 
     Args:
-        name: name of the plot, unique on its page.
         rig: the rig as it was given.
         repaired: the rig as the doctor finds it, or None.
         moved: views that are drawn twice, or in the colour of faults where there is no repaired rig.
@@ -291,7 +288,7 @@ def rig_from_above(
     extent = np.vstack([rig.centers[:, :2], where])
     low, high = extent.min(axis=0) - _MARGIN, extent.max(axis=0) + _MARGIN
     reach = 0.2 * float((high - low).max())
-    with svg_plot(name, size=(5.2, 5.2 * _TALL)) as (axes, written):
+    with svg_plot("rig-from-above", size=(5.2, 5.2 * _TALL)) as (axes, written):
         axes.plot(*shown.T, ".", ms=2.5, mew=0, color=FAINT, alpha=0.5, zorder=2)
         for view, camera in enumerate(rig):
             if view not in moved:
@@ -321,9 +318,9 @@ def _outline(axes: Axes, camera: Camera, reach: float, color: str, style: str) -
     axes.plot(*camera.center[:2], "o", ms=4, mew=0, color=color, zorder=6)
 
 
-def clock_offsets(name: str, offsets: Sequence[ClockOffset]) -> str:
+def clock_offsets(offsets: Sequence[ClockOffset]) -> str:
     """Plot the offset of each camera's clock with its 90 % interval, ms."""
-    with svg_plot(name, size=(5.2, 0.9 + 0.34 * len(offsets))) as (axes, written):
+    with svg_plot("clock-offsets", size=(5.2, 0.9 + 0.34 * len(offsets))) as (axes, written):
         axes.axvline(0.0, color=FAINT, lw=0.8, zorder=1)
         for row, each in enumerate(offsets):
             sure = np.isfinite([each.low, each.high]).all()

@@ -153,9 +153,7 @@ def _above(case: DoctorCase) -> dict[str, Any]:
     if repaired is not None and not moved:
         moved = [view for view in range(len(case.rig)) if np.any(repaired[view].P != case.rig[view].P)]
     factor = 1.0 if repaired is None or not moved else drawings.motion_factor(case.rig, repaired)
-    svg = drawings.rig_from_above(
-        "rig-from-above", case.rig, repaired=repaired, moved=moved, points=case.before.point, factor=factor
-    )
+    svg = drawings.rig_from_above(case.rig, repaired=repaired, moved=moved, points=case.before.point, factor=factor)
     return {"svg": Markup(svg), "factor": f"{factor:g}" if factor > 1 else ""}
 
 
@@ -268,4 +266,4 @@ def _clocks(case: DoctorCase) -> Markup | None:
             offsets[finding.view] = drawings.ClockOffset(case.names[finding.view], finding.size["ms"], low, high)
     if not offsets:
         return None
-    return Markup(drawings.clock_offsets("clock-offsets", [offsets[view] for view in sorted(offsets)]))
+    return Markup(drawings.clock_offsets([offsets[view] for view in sorted(offsets)]))

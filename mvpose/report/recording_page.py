@@ -109,8 +109,8 @@ def _sections(recording: ExaminedRecording, pictures: Pictures | None) -> dict[s
         return {"plots": {}, "step": step}
     drawn = {
         "above": plots.paths_from_above("from-above", people, recording.rig),
-        "identities": plots.identities("identities", people),
-        "views": plots.views_over_time("views-over-time", people, seen.frames, recording.views, len(recording.rig)),
+        "identities": plots.identities(people),
+        "views": plots.views_over_time(people, seen.frames, recording.views, len(recording.rig)),
     }
     columns = plots.longest(people, _MOST_COLUMNS).tolist()
     return {

@@ -142,12 +142,12 @@ def paths_from_above(name: str, people: People, rig: Rig) -> str:
     return written[0]
 
 
-def identities(name: str, people: People) -> str:
+def identities(people: People) -> str:
     """Plot when each person is there: a row for each identity, a bar for each stretch of frames."""
     rows, half = longest(people, MOST_ROWS), half_step(people.times)
     start, end = float(people.times[0]) - half, float(people.times[-1]) + half
     present: Bools = np.logical_or.reduce(people.present, axis=2)
-    with svg_plot(name, size=(5.2, _height(len(rows)))) as (axes, written):
+    with svg_plot("identities", size=(5.2, _height(len(rows)))) as (axes, written):
         for row, person in enumerate(rows.tolist()):
             there = present[:, person]
             for first, last in runs_of(there):
@@ -160,13 +160,12 @@ def identities(name: str, people: People) -> str:
     return written[0]
 
 
-def views_over_time(name: str, people: People, frames: Integers, views: Integers, cameras: int) -> str:
+def views_over_time(people: People, frames: Integers, views: Integers, cameras: int) -> str:
     """Plot how many views show each person: a row for each, as high as the number of views.
 
     Times at which at most one view shows a person have the colour of the text.
 
     Args:
-        name: name of the plot, unique on its page.
         people: n people.
         frames: frames that were counted, (F,).
         views: views of each person, (F, n); -1 where absent.
@@ -176,7 +175,7 @@ def views_over_time(name: str, people: People, frames: Integers, views: Integers
     every = max(1, -(-len(frames) // _MOST_POINTS))
     times, views = people.times[frames[::every]], views[::every]
     half = half_step(times)
-    with svg_plot(name, size=(5.2, _height(len(rows)))) as (axes, written):
+    with svg_plot("views-over-time", size=(5.2, _height(len(rows)))) as (axes, written):
         for row, person in enumerate(rows.tolist()):
             count = views[:, person]
             axes.plot([times[0] - half, times[-1] + half], [row + 0.42] * 2, color=FAINT, lw=0.5, zorder=2)

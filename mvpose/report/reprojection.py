@@ -59,7 +59,7 @@ class Reprojection:
         return np.hypot(self.offset[:, 0], self.offset[:, 1])
 
 
-def reproject(rig: Rig, frames: Sequence[Detections], people: People, *, noise: Noise | None = None) -> Reprojection:
+def reproject(rig: Rig, frames: Sequence[Detections], people: People) -> Reprojection:
     """Compare people with the detections of the same frames.
 
     In each picture people and detections are paired one to one so that the sum of their mean distances is least; a
@@ -69,7 +69,6 @@ def reproject(rig: Rig, frames: Sequence[Detections], people: People, *, noise: 
         rig: V cameras.
         frames: detections of the T frames of the recording.
         people: people of the same frames.
-        noise: error model that says which keypoints support a joint.
 
     Raises:
         ValueError: another number of frames than people have, or of joints.
@@ -79,7 +78,7 @@ def reproject(rig: Rig, frames: Sequence[Detections], people: People, *, noise: 
             f"detections and people must be of the same frames, got {len(frames)} and {people.frames}; pass the frames "
             "that were estimated"
         )
-    noise = noise or Noise()
+    noise = Noise()
     reach = np.sqrt(-2.0 * np.log(noise.floor)) * noise.sigmas(people.skeleton)
     numbers = compared_frames(len(frames))
     pixels, scale = _projected(rig, people, numbers)

@@ -91,8 +91,8 @@ def render_plan(plan: RigPlan, *, command: str = "") -> str:
             "views": drawn("views", shown.views, 1.0, float(max(len(plan.rig), 4)), digits=1),
             "risk": drawn("risk", 100.0 * shown.risk, 30.0, 0.0),
         },
-        curve=Markup(buying_curve("curve", plan)) if plan.curve else None,
-        bars=Markup(rig_bars("bars", plan)),
+        curve=Markup(buying_curve(plan)) if plan.curve else None,
+        bars=Markup(rig_bars(plan)),
         command=command,
     )
 

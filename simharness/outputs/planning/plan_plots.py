@@ -124,9 +124,9 @@ def draw_room(axes: Axes, room: Room) -> None:
         axes.plot(*np.stack([start, end]).T, color=DOOR, lw=5.0, solid_capstyle="butt", zorder=2.5)
 
 
-def draw_camera(axes: Axes, camera: Camera, *, color: str, reach: float = _REACH) -> None:
+def draw_camera(axes: Axes, camera: Camera, *, color: str) -> None:
     """Draw a camera from above with its horizontal field of view."""
-    axes.add_patch(Polygon(cone_from_above(camera, reach), fc=color, ec="none", alpha=0.2, zorder=3.5))
+    axes.add_patch(Polygon(cone_from_above(camera, _REACH), fc=color, ec="none", alpha=0.2, zorder=3.5))
     center = camera.center[:2]
     axes.plot(*center, "o", color=color, ms=5.5, mec="white", mew=0.8, zorder=5)
 
@@ -157,9 +157,9 @@ def place_map(name: str, plan: RigPlan, values: Floats, *, worst: float, best: f
     return written[0]
 
 
-def buying_curve(name: str, plan: RigPlan) -> str:
+def buying_curve(plan: RigPlan) -> str:
     """Plot the PCP and the share of the volume within the target against the number of cameras."""
-    with svg_plot(name, size=_SIZE) as (axes, written):
+    with svg_plot("curve", size=_SIZE) as (axes, written):
         counts = [point.cameras for point in plan.curve]
         axes.plot(counts, [point.figures.pcp.mean for point in plan.curve], "o-", color=_LAYER, ms=5, label="PCP")
         axes.plot(
@@ -175,10 +175,10 @@ def buying_curve(name: str, plan: RigPlan) -> str:
     return written[0]
 
 
-def rig_bars(name: str, plan: RigPlan) -> str:
+def rig_bars(plan: RigPlan) -> str:
     """Plot PCP of the plan, of the next best rigs and of usual ones: by the fast layer and by simulation."""
     rows = plan.alternatives
-    with svg_plot(name, size=(_SIZE[0], 0.6 + 0.42 * len(rows))) as (axes, written):
+    with svg_plot("bars", size=(_SIZE[0], 0.6 + 0.42 * len(rows))) as (axes, written):
         for k, each in enumerate(rows):
             y = len(rows) - 1 - k
             axes.plot(

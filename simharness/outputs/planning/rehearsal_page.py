@@ -58,14 +58,14 @@ def render_rehearsal(rehearsal: Rehearsal, *, provenance: Mapping[str, Any]) -> 
         view=rig_view_3d(rehearsal),
         maps=_maps(rehearsal),
         cameras=sorted(rehearsal.cameras.values(), key=lambda each: -each.worth.mean),
-        crowd=Markup(crowd_curve(rehearsal, name="crowd")),
-        matching=Markup(matching_curve(rehearsal, name="matching")),
+        crowd=Markup(crowd_curve(rehearsal)),
+        matching=Markup(matching_curve(rehearsal)),
         tolerances=[
             (each, Markup(tolerance_curve(each, pcp, name=f"tolerance-{each.fault.key}", bottom=bottom)))
             for each in rehearsal.tolerances
         ],
         subsets=sets[:_MOST_SETS],  # by number of cameras, the best first
-        subset_curve=Markup(subset_curve(rehearsal, name="sets")) if every else None,
+        subset_curve=Markup(subset_curve(rehearsal)) if every else None,
         fixed=fixed,
         signed=signed,
         cell=Interval.texts,
@@ -82,7 +82,7 @@ def _maps(rehearsal: Rehearsal) -> dict[str, Any]:
     counted = MapColors(0.0, float(len(rehearsal.rig)))
     parts = simulated_map(rehearsal, [100.0 * np.where(each.inside, each.parts, np.nan) for each in scenes])
     off = simulated_map(rehearsal, [1000.0 * np.where(each.inside, each.errors, np.nan) for each in scenes])
-    ellipses, factor = ellipse_map(rehearsal, name="map-ellipses")
+    ellipses, factor = ellipse_map(rehearsal)
 
     def drawn(name: str, values: Floats, colors: MapColors, **style: Any) -> Markup:
         return Markup(floor_map(rehearsal, values, colors, name=f"map-{name}", **style))

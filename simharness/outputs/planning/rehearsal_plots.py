@@ -141,7 +141,7 @@ def draw_cells(axes: Axes, places: Floats, values: Floats, colors: Floats, *, di
             axes.text(x, y, text, ha="center", va="center", fontsize=6.2, color=ink, zorder=3)
 
 
-def ellipse_map(rehearsal: Rehearsal, *, name: str) -> tuple[str, str]:
+def ellipse_map(rehearsal: Rehearsal) -> tuple[str, str]:
     """Return the map of the ellipses of one standard deviation of the trunk's joints, and how much larger they are."""
     places, covariance = rehearsal.prediction.places, rehearsal.prediction.ellipse
     spacing = grid_spacing(places)
@@ -150,7 +150,7 @@ def ellipse_map(rehearsal: Rehearsal, *, name: str) -> tuple[str, str]:
     longest = np.array([np.sqrt(max(values[1], 0.0)) for values, _ in axes_of])
     wanted = 0.35 * spacing / max(float(np.median(longest)) if len(longest) else 1.0, 1e-6)
     factor = max((each for each in _NICE if each <= wanted), default=_NICE[0])
-    with svg_plot(name, size=SIZE) as (axes, written):
+    with svg_plot("map-ellipses", size=SIZE) as (axes, written):
         for k, (values, vectors) in zip(known, axes_of, strict=True):
             across, along = (2 * factor * np.sqrt(np.maximum(values, 0.0))).clip(max=1.5 * spacing)
             angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
@@ -199,10 +199,10 @@ def outline_of(places: Floats, chosen: Bools) -> list[Floats]:
     return lines
 
 
-def crowd_curve(rehearsal: Rehearsal, *, name: str) -> str:
+def crowd_curve(rehearsal: Rehearsal) -> str:
     """Plot PCP against the number of people: the fast layer as a line, simulation as points with intervals."""
     crowds = rehearsal.crowds
-    with svg_plot(name, size=_WIDE) as (axes, written):
+    with svg_plot("crowd", size=_WIDE) as (axes, written):
         people, layer = [each.people for each in crowds], [each.layer_pcp for each in crowds]
         axes.plot(people, layer, "--", color=LAYER, lw=1.5, label="fast layer")
         known = [(each.people, each.pcp) for each in crowds if each.pcp is not None]
@@ -216,10 +216,10 @@ def crowd_curve(rehearsal: Rehearsal, *, name: str) -> str:
     return written[0]
 
 
-def matching_curve(rehearsal: Rehearsal, *, name: str) -> str:
+def matching_curve(rehearsal: Rehearsal) -> str:
     """Plot the simulated percentage of matches that take two people for one, against the number of people."""
     known = [(each.people, each.mixed) for each in rehearsal.crowds if each.mixed is not None]
-    with svg_plot(name, size=_WIDE) as (axes, written):
+    with svg_plot("matching", size=_WIDE) as (axes, written):
         _points(axes, [number for number, _ in known], [mixed for _, mixed in known], "simulation")
         top = max([5.0, *(each.high for _, each in known if np.isfinite(each.high))])
         axes.set(xlabel="people in the volume", ylabel="matches of two people, %", ylim=(0, 1.05 * top))
@@ -246,11 +246,11 @@ def tolerance_bottom(rehearsal: Rehearsal) -> float:
     return _bottom([_low(pcp) for each in rehearsal.tolerances for pcp in each.pcp])
 
 
-def subset_curve(rehearsal: Rehearsal, *, name: str) -> str:
+def subset_curve(rehearsal: Rehearsal) -> str:
     """Plot the simulated PCP of all sets of cameras against their number, with the best of each number as a line."""
     sets = {names: each for names, each in rehearsal.subsets.items() if np.isfinite(each.pcp.mean)}
     counts = sorted({len(names) for names in sets})
-    with svg_plot(name, size=_WIDE) as (axes, written):
+    with svg_plot("sets", size=_WIDE) as (axes, written):
         sizes, pcp = [len(names) for names in sets], [each.pcp.mean for each in sets.values()]
         axes.plot(sizes, pcp, "o", color=SIMULATION, ms=4.5, alpha=0.45, mew=0, label="a set of cameras")
         best = [max(each.pcp.mean for names, each in sets.items() if len(names) == count) for count in counts]

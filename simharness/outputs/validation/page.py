@@ -103,12 +103,12 @@ def _points(validation: Validation) -> dict[str, dict[str, list[tuple[float, flo
 def _plots(validation: Validation) -> dict[str, str]:
     shades = plots.colors(validation.plan.variants)
     drawn = {
-        "agreement": plots.agreement(_points(validation), shades, name="agreement"),
-        "parts": plots.part_differences(validation.whole.parts, shades, name="parts"),
-        "ratios": plots.ratios(_ratios(validation), name="ratios"),
+        "agreement": plots.agreement(_points(validation), shades),
+        "parts": plots.part_differences(validation.whole.parts, shades),
+        "ratios": plots.ratios(_ratios(validation)),
     }
     if validation.responses:
-        drawn["losses"] = plots.losses(validation.responses, shades, name="losses")
+        drawn["losses"] = plots.losses(validation.responses, shades)
     return drawn
 
 

@@ -27,19 +27,16 @@ def colors(variants: Sequence[str]) -> dict[str, Color]:
     return {name: VARIANT_COLORS[index % len(VARIANT_COLORS)] for index, name in enumerate(variants)}
 
 
-def agreement(
-    points: Mapping[str, Mapping[str, Sequence[tuple[float, float]]]], variants: Mapping[str, Color], *, name: str
-) -> str:
+def agreement(points: Mapping[str, Mapping[str, Sequence[tuple[float, float]]]], variants: Mapping[str, Color]) -> str:
     """Plot predicted against measured PCP: everything that was scored, with the identity and the accepted range.
 
     Args:
         points: (real, twin) PCP, percent, by kind of setting and variant.
         variants: colour of each variant.
-        name: different from the name of every other plot on the page.
     """
     markers = ("o", "s", "D", "^", "v", "P", "X", "<")
     everything = np.array([pair for of in points.values() for each in of.values() for pair in each]).reshape(-1, 2)
-    with svg_plot(name, size=_SQUARE) as (axes, written):
+    with svg_plot("agreement", size=_SQUARE) as (axes, written):
         low = max(0.0, 5 * np.floor(np.nanmin(everything, initial=95.0) / 5 - 0.2))
         ends = np.array([low, 101.0])
         axes.fill_between(ends, ends - BOUNDS.subset, ends + BOUNDS.subset, color=FAINT, alpha=_BAND, lw=0, zorder=1)
@@ -62,10 +59,10 @@ def agreement(
     return written[0]
 
 
-def losses(responses: Sequence[DoseResponse], variants: Mapping[str, Color], *, name: str) -> str:
+def losses(responses: Sequence[DoseResponse], variants: Mapping[str, Color]) -> str:
     """Plot the predicted against the measured loss of PCP of every treatment, with the accepted range."""
     markers = dict(zip(KINDS, ("o", "s", "D", "^", "v", "P"), strict=True))
-    with svg_plot(name, size=_SQUARE) as (axes, written):
+    with svg_plot("losses", size=_SQUARE) as (axes, written):
         values = np.array([[each.loss.real.mean, each.loss.twin.mean] for each in responses]).reshape(-1, 2)
         low, high = np.nanmin(values, initial=-2.0) - 1, 1.06 * np.nanmax(values, initial=10.0)
         grid = np.linspace(low, high, 200)
@@ -120,10 +117,10 @@ def response(responses: Sequence[DoseResponse], variants: Mapping[str, Color], *
     return written[0]
 
 
-def part_differences(parts: Mapping[str, Mapping[str, Compared]], variants: Mapping[str, Color], *, name: str) -> str:
+def part_differences(parts: Mapping[str, Mapping[str, Compared]], variants: Mapping[str, Color]) -> str:
     """Plot simulated less measured PCP of each part of the body and variant, with intervals and the accepted range."""
     groups = list(next(iter(parts.values())))
-    with svg_plot(name, size=(4.9, 0.9 + 0.5 * len(groups))) as (axes, written):
+    with svg_plot("parts", size=(4.9, 0.9 + 0.5 * len(groups))) as (axes, written):
         axes.axvspan(-BOUNDS.parts, BOUNDS.parts, color=FAINT, alpha=_BAND, lw=0, zorder=1)
         for index, (variant, color) in enumerate(variants.items()):
             figures = [parts[variant][group] for group in groups]
@@ -140,14 +137,13 @@ def part_differences(parts: Mapping[str, Mapping[str, Compared]], variants: Mapp
     return written[0]
 
 
-def ratios(figures: Mapping[str, tuple[Compared, tuple[float, float] | None]], *, name: str) -> str:
+def ratios(figures: Mapping[str, tuple[Compared, tuple[float, float] | None]]) -> str:
     """Plot simulated over measured for many measurements, with intervals and accepted ranges.
 
     Args:
         figures: figure by title, and the least and greatest accepted ratio, where there is one.
-        name: different from the name of every other plot on the page.
     """
-    with svg_plot(name, size=(4.9, 0.9 + 0.24 * len(figures))) as (axes, written):
+    with svg_plot("ratios", size=(4.9, 0.9 + 0.24 * len(figures))) as (axes, written):
         axes.axvline(1.0, color=FAINT, lw=0.9, zorder=1)
         for row, (figure, accepted) in enumerate(figures.values()):
             real = figure.real.mean

@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from mvpose.arrays import Floats
-from mvpose.skeleton import HeadMapping
 from simharness.scoring.frame_scores import on_shelf14
 from simharness.scoring.pcp import part_states, percent
 from simharness.scoring.score_registry import finite_mean
@@ -121,7 +120,6 @@ def pose_figures(
     joints: Sequence[Floats],
     *,
     distance: float,
-    head: HeadMapping = "voxelpose",
     actors: Sequence[int] | None = None,
 ) -> dict[str, float | None]:
     """Return PCP (percent) and MPJPE (mm) under identities; None without any defined part, or if nobody is found.
@@ -133,11 +131,10 @@ def pose_figures(
         truth: true joints on COCO17 or SHELF14, (T, P, J, 3), metres; NaN where undefined.
         joints: joints of the estimates of each frame on the same skeleton, (k, J, 3), metres.
         distance: largest distance between a person and its estimate, metres.
-        head: mapping of COCO17 to the head of SHELF14, on which PCP is computed.
         actors: indices of the people whose PCP is averaged; None: all.
     """
     placed = tracked_joints(frames, identity_scores(frames, distance=distance), joints, distance=distance)
-    parts = part_states(on_shelf14(truth, head, "truth"), on_shelf14(placed, head, "estimate"))
+    parts = part_states(on_shelf14(truth, "voxelpose", "truth"), on_shelf14(placed, "voxelpose", "estimate"))
     chosen = range(frames.people) if actors is None else actors
     shares = [share for actor in chosen if (share := percent(parts[:, actor])) is not None]
     error = 1000.0 * np.linalg.norm(placed - truth, axis=-1)
