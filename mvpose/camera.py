@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from mvpose.checks import Sealed, as_array, as_points
 from mvpose.kernels import njit
 from mvpose.lens import distort, undistort
@@ -111,7 +111,7 @@ class Camera(Sealed):
         world = local @ self.R
         return world / np.linalg.norm(world, axis=-1, keepdims=True)
 
-    def inside(self, pixels: ArrayLike) -> NDArray[np.bool_]:
+    def inside(self, pixels: ArrayLike) -> Bools:
         """Return whether pixels (..., 2) lie in the image, that is, within half a pixel of the centre of a pixel."""
         pixels = as_points(pixels, 2, "pixels")
         with np.errstate(invalid="ignore"):

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.checks import Sealed, as_array, seal
 from mvpose.heatmaps import Heatmaps
 from mvpose.skeleton import COCO17, SHELF14, Skeleton
@@ -31,7 +31,7 @@ class Detections(Sealed):
         ValueError: a wrong shape or skeleton, a negative view, scores outside 0..1, or an invalid box.
     """
 
-    view: NDArray[np.int64]
+    view: Integers
     """Index of the camera of each detection, (m,)."""
     keypoints: Floats
     """Pixels, (m, J, 2)."""
@@ -90,7 +90,7 @@ class Detections(Sealed):
     def __len__(self) -> int:
         return len(self.view)
 
-    def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Self:
+    def select(self, which: Bools | Integers) -> Self:
         """Return some detections without heat maps, given by a mask (m,) or by indices in a new order."""
         if which.dtype == np.bool_:
             which = np.flatnonzero(which)
@@ -103,7 +103,7 @@ class Detections(Sealed):
         return selected
 
     @property
-    def detected(self) -> NDArray[np.bool_]:
+    def detected(self) -> Bools:
         """Mask of detected keypoints, (m, J)."""
         return self.scores > 0
 

@@ -7,8 +7,8 @@ per view into a person, so the second detections would form a ghost beside the p
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mvpose.arrays import Bools
 from mvpose.detections import Detections
 from mvpose.kernels import njit
 
@@ -47,7 +47,7 @@ class Duplicates:
         if self.least_joints < 1:
             raise ValueError(f"least_joints must be at least 1, got {self.least_joints}")
 
-    def __call__(self, detections: Detections) -> NDArray[np.bool_]:
+    def __call__(self, detections: Detections) -> Bools:
         """Return a mask of the detections to keep, (m,)."""
         return _suppress(
             detections.view,

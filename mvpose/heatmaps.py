@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from mvpose.checks import Sealed, as_array, as_points
 from mvpose.kernels import njit
 
@@ -99,7 +99,7 @@ class Heatmaps(Sealed):
         return _modes(self.values, self.origin, self.stride, int(most))
 
 
-def _first_bad(values: Floats, good: NDArray[np.bool_]) -> str:
+def _first_bad(values: Floats, good: Bools) -> str:
     index = int(np.flatnonzero(~good.all(axis=1))[0])
     return f"{values[index].tolist()} of detection {index}"
 

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mvpose.affinity import Affinity, FusedAffinity
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Rig
 from mvpose.checks import seal
 from mvpose.detections import Detections
@@ -30,12 +30,12 @@ class Pipeline:
 
     affinity: Affinity = FusedAffinity()
     """Affinity between detections, that is, the likelihood that two detections show one person."""
-    matching: Callable[[NDArray[np.float64], NDArray[np.int64]], Matching] = Matcher()
+    matching: Callable[[Floats, Integers], Matching] = Matcher()
     """Function from affinities (m, m) and views (m,) to people, over all views at once. Views are numbered in the order
     of their first detections."""
-    reconstruction: Callable[[Rays, NDArray[np.int64], Skeleton], Poses] = PictorialStructure()
+    reconstruction: Callable[[Rays, Integers, Skeleton], Poses] = PictorialStructure()
     """Function from the rays of all detections, labels (m,) and the skeleton to 3D poses."""
-    duplicates: Callable[[Detections], NDArray[np.bool_]] = Duplicates()
+    duplicates: Callable[[Detections], Bools] = Duplicates()
     """Function that returns a mask (m,) of the detections to keep; the others repeat a more confident detection of
     their view."""
 
@@ -67,9 +67,9 @@ class Pipeline:
 class UnmatchedPipeline:
     """Estimation without matching (the paper's "No matching"): the pictorial structure also groups the detections."""
 
-    reconstruction: Callable[[Rays, Skeleton], tuple[Poses, NDArray[np.int64]]] = UnmatchedPictorialStructure()
+    reconstruction: Callable[[Rays, Skeleton], tuple[Poses, Integers]] = UnmatchedPictorialStructure()
     """Function from the rays of all detections and the skeleton to 3D poses and labels."""
-    duplicates: Callable[[Detections], NDArray[np.bool_]] = Duplicates()
+    duplicates: Callable[[Detections], Bools] = Duplicates()
     """As in :class:`Pipeline`."""
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
@@ -82,8 +82,8 @@ class UnmatchedPipeline:
 
 
 def prepare_rays(
-    rig: Rig, detections: Detections, duplicates: Callable[[Detections], NDArray[np.bool_]]
-) -> tuple[NDArray[np.int64], Detections, Rays]:
+    rig: Rig, detections: Detections, duplicates: Callable[[Detections], Bools]
+) -> tuple[Integers, Detections, Rays]:
     """Return the indices of the detections that take part, in canonical order, and their detections and rays.
 
     Blank and repeated detections are left out before any other stage, so that they cannot influence it.
@@ -96,7 +96,7 @@ def prepare_rays(
     return order, ordered, rays
 
 
-def _restored(matching: Matching, chosen: NDArray[np.int64], detections: int) -> Matching:
+def _restored(matching: Matching, chosen: Integers, detections: int) -> Matching:
     """Return a matching of the chosen detections as one of all detections, in their given order."""
     labels = np.full(detections, -1)
     labels[chosen] = matching.labels

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Floats, Integers
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Rig
 from mvpose.checks import seal
 from mvpose.detections import MOST_DETECTIONS, Detections
@@ -38,7 +38,7 @@ class Modes:
     cameras: Floats
     """Camera of each detection, as :attr:`mvpose.camera.Rig.packed`, (m, 22)."""
 
-    def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> "Modes":
+    def select(self, which: Bools | Integers) -> "Modes":
         """Return the modes of some detections; all maps stay where they are, because copies would take long."""
         directions, weights, row = self.directions[which], self.weights[which], self.row[which]
         return Modes(directions, weights, row, self.values, self.grid[which], self.cameras[which])
@@ -48,7 +48,7 @@ class Modes:
 class Rays:
     """Viewing rays of m detections with J joints."""
 
-    view: NDArray[np.int64]
+    view: Integers
     """Camera of each detection, (m,)."""
     origins: Floats
     """Optical centres, (m, 3), metres."""
@@ -64,7 +64,7 @@ class Rays:
     def __len__(self) -> int:
         return len(self.view)
 
-    def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> "Rays":
+    def select(self, which: Bools | Integers) -> "Rays":
         """Return the rays of some detections, given by a mask (m,) or by indices in a new order."""
         if which.dtype == np.bool_:
             which = np.flatnonzero(which)

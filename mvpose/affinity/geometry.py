@@ -8,9 +8,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mvpose.affinity.base import FASTMATH, Floats, group_by_view, pack_poses, scalar_sigmoid, shared_joints
+from mvpose.arrays import Integers
 from mvpose.camera import Rig
 from mvpose.checks import check_numbers
 from mvpose.detections import Detections
@@ -75,7 +75,7 @@ class GeometricAffinity:
         return distance
 
 
-def ray_distance(rays: Rays, *, saturation: float = np.inf, nearest: float = 0.0) -> tuple[Floats, NDArray[np.int64]]:
+def ray_distance(rays: Rays, *, saturation: float = np.inf, nearest: float = 0.0) -> tuple[Floats, Integers]:
     """Return the mean distance between viewing rays of corresponding joints, weighted by both scores.
 
     Rays start ``nearest`` in front of the camera; where the lines meet behind that point, the distance is taken from

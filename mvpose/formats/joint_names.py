@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mvpose import COCO17, SHELF14
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.recording import People
 from mvpose.skeleton import PANOPTIC19, HeadMapping, Skeleton, coco17_to_shelf14
 from mvpose.wholebody import SKELETONS, known_names, skeleton_by_name
@@ -86,7 +85,7 @@ class JointNames:
             joints[own[canonical(old)]] = canonical(new)
         return JointNames(self.name, tuple(joints))
 
-    def rows(self, wanted: Sequence[str]) -> NDArray[np.int64]:
+    def rows(self, wanted: Sequence[str]) -> Integers:
         """Return the index of each wanted joint, (n,); -1 where the file does not have it."""
         return np.array([self._rows.get(canonical(joint), -1) for joint in wanted])
 
@@ -223,12 +222,12 @@ _SIGMA = 0.08  # OKS standard deviation of a joint of which nothing is known: ab
 _LIMBS = 12  # joints of SHELF14 before those of the head
 
 
-def _take(joints: Floats, rows: NDArray[np.int64]) -> Floats:
+def _take(joints: Floats, rows: Integers) -> Floats:
     """Return joints by their rows, (..., n, 3); NaN for a row of -1."""
     return np.where((rows >= 0)[:, None], joints[..., rows, :], np.nan)
 
 
-def _some_rows(names: JointNames, wanted: Sequence[str], title: str) -> NDArray[np.int64]:
+def _some_rows(names: JointNames, wanted: Sequence[str], title: str) -> Integers:
     rows = names.rows(wanted)
     if (rows < 0).all():
         raise ValueError(

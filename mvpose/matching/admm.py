@@ -22,9 +22,8 @@ The optimum of the convex problem does not depend on the start.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.kernels import njit
 from mvpose.matching.projection import block_starts, project_block
 from mvpose.matching.rounding import read_only
@@ -68,9 +67,9 @@ class Relaxation:
 
 def solve(
     affinity: Floats,
-    view: NDArray[np.int64],
+    view: Integers,
     *,
-    parts: NDArray[np.int64] | None = None,
+    parts: Integers | None = None,
     alpha: float = 0.5,
     weight: float = 50.0,
     rho: float = 1.0,
@@ -137,7 +136,7 @@ def _iterate(
     S: Floats,
     gain: Floats,
     Z: Floats,
-    starts: NDArray[np.int64],
+    starts: Integers,
     weight: float,
     rho: float,
     tolerance: float,

@@ -4,8 +4,8 @@ SciPy's solver cannot be called from numba, and one call of it costs more than a
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mvpose.arrays import Floats, Integers
 from mvpose.kernels import njit
 
 
@@ -77,9 +77,7 @@ def best_assignment(value):
     return column_of
 
 
-def match_view_pairs(
-    affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: float = 0.5
-) -> NDArray[np.float64]:
+def match_view_pairs(affinity: Floats, view: Integers, *, alpha: float = 0.5) -> Floats:
     """Match every pair of views separately: the baseline without cycle consistency (paper, section 3.2, figure 3).
 
     Args:

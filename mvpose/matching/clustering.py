@@ -12,8 +12,8 @@ solved only for a view with a detection that would gain in another part.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mvpose.arrays import Floats, Integers
 from mvpose.kernels import njit
 from mvpose.matching.assignment import best_assignment
 from mvpose.matching.rounding import read_only
@@ -23,7 +23,7 @@ _LEAST_GAIN = 1e-9  # a smaller gain is rounding error and could cause cycles
 _MOST_ROUNDS = 50
 
 
-def cluster(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: float = 0.5) -> NDArray[np.int64]:
+def cluster(affinity: Floats, view: Integers, *, alpha: float = 0.5) -> Integers:
     """Partition the detections.
 
     Args:
@@ -38,12 +38,12 @@ def cluster(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: fl
     return _cluster(read_only(affinity, np.float64), read_only(view, np.int64), order, float(alpha))
 
 
-def contract(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: float = 0.5) -> NDArray[np.int64]:
+def contract(affinity: Floats, view: Integers, *, alpha: float = 0.5) -> Integers:
     """Partition the detections by greedy contraction only, the first step of :func:`cluster`."""
     return _contract_pairs(read_only(affinity, np.float64), read_only(view, np.int64), float(alpha))
 
 
-def join_by_gains(gains: NDArray[np.float64]) -> NDArray[np.int64]:
+def join_by_gains(gains: Floats) -> Integers:
     """Partition n objects by greedy contraction: the two parts with the greatest sum of gains are joined first.
 
     Args:

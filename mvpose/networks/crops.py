@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.kernels import njit
 
 Pixels = NDArray[np.uint8]
@@ -29,7 +29,7 @@ class Placement(NamedTuple):
     stride: Floats
     """Image pixels between neighbouring crop pixels, x and y, (m, 2)."""
 
-    def select(self, rows: NDArray[np.bool_]) -> "Placement":
+    def select(self, rows: Bools) -> "Placement":
         """Return the placement of some of the crops, given by a mask (m,)."""
         return Placement(self.origin[rows], self.stride[rows])
 
@@ -61,8 +61,8 @@ def padded(boxes: Floats, size: tuple[int, int], padding: float) -> Placement:
 
 
 def in_view(
-    images: Images, view: NDArray[np.int64], placement: Placement, size: tuple[int, int], *, least: float = 0.0
-) -> NDArray[np.bool_]:
+    images: Images, view: Integers, placement: Placement, size: tuple[int, int], *, least: float = 0.0
+) -> Bools:
     """Return a mask of the crops that show part of the image of their view, (m,).
 
     These are the crops with an area, of which at least one pixel and at least a fraction ``least`` of the pixels have
@@ -86,7 +86,7 @@ def in_view(
     return np.all(placement.stride > 0, axis=1) & (share > 0) & (share >= least)
 
 
-def check_images(images: Images, view: NDArray[np.int64], boxes: Floats) -> None:
+def check_images(images: Images, view: Integers, boxes: Floats) -> None:
     """Check that images holds a picture or None for every view of a box, and that boxes are finite.
 
     Raises:
@@ -113,7 +113,7 @@ def check_images(images: Images, view: NDArray[np.int64], boxes: Floats) -> None
 
 
 def crop_images(
-    images: Images, view: NDArray[np.int64], placement: Placement, size: tuple[int, int], *, fill: tuple[int, int, int]
+    images: Images, view: Integers, placement: Placement, size: tuple[int, int], *, fill: tuple[int, int, int]
 ) -> Pixels:
     """Cut crops out of images, (m, height, width, 3), red green blue.
 

@@ -21,7 +21,7 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.networks.card import Card
 from mvpose.networks.crops import Pixels, Placement, crop_images
 from mvpose.networks.pose import PoseHead
@@ -66,7 +66,7 @@ class PeopleInPicture:
         columns = ("boxes", "scores", "keypoints", "keypoint_scores")
         return cls(*(np.concatenate([getattr(each, column) for each in parts]) for column in columns))
 
-    def select(self, rows: NDArray[np.int64]) -> "PeopleInPicture":
+    def select(self, rows: Integers) -> "PeopleInPicture":
         """Return some people, in a given order."""
         kept = [None if each is None else each[rows] for each in (self.keypoints, self.keypoint_scores)]
         return PeopleInPicture(self.boxes[rows], self.scores[rows], *kept)
@@ -234,7 +234,7 @@ def decode_yolo(values: Floats) -> PeopleInPicture:
     return PeopleInPicture(boxes, score, points[..., :2], np.clip(points[..., 2], 0.0, 1.0))
 
 
-def suppressed(boxes: Floats, *, overlap: float) -> NDArray[np.int64]:
+def suppressed(boxes: Floats, *, overlap: float) -> Integers:
     """Return the rows that remain after non-maximum suppression of boxes (m, 4) in the order of their scores."""
     low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
     areas = boxes[:, 2] * boxes[:, 3]

@@ -11,7 +11,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.checks import as_array
 from mvpose.detections import Detections
 from mvpose.heatmaps import Heatmaps
@@ -125,7 +125,7 @@ class PoseHead:
             Cells.from_convention(convention, h, height),
         )
 
-    def _outputs(self, images: Images, view: NDArray[np.int64], placement: Placement) -> list[Values]:
+    def _outputs(self, images: Images, view: Integers, placement: Placement) -> list[Values]:
         """Return heat maps (m, J, h, w), or SimCC vectors (m, J, Wx) and (m, J, Wy), with confident peaks of 1."""
         outputs = self._run(images, view, placement)
         if self.flip:
@@ -141,15 +141,13 @@ class PoseHead:
             )
         return outputs
 
-    def _run(self, images: Images, view: NDArray[np.int64], placement: Placement) -> list[Values]:
+    def _run(self, images: Images, view: Integers, placement: Placement) -> list[Values]:
         outputs = self.session(crop_images(images, view, placement, self.session.size, fill=_BLACK))
         if self._joints_last:
             outputs = [np.moveaxis(values, -1, 1) for values in outputs]
         return [values / np.float32(self.session.card.peak) for values in outputs]
 
-    def _decoded(
-        self, outputs: list[Values], view: NDArray[np.int64], boxes: Floats, placement: Placement
-    ) -> Detections:
+    def _decoded(self, outputs: list[Values], view: Integers, boxes: Floats, placement: Placement) -> Detections:
         if not self.simcc:
             heatmaps = placed_heatmaps(outputs[0], placement, self._columns, self._rows)
             found = Detections.from_heatmaps(view, heatmaps, boxes=boxes, skeleton=self.skeleton)
@@ -164,7 +162,7 @@ class PoseHead:
         raise ValueError(f"network {self.session.path}: {what}")
 
 
-def _with_empty(found: Detections, seen: NDArray[np.bool_], view: NDArray[np.int64], boxes: Floats) -> Detections:
+def _with_empty(found: Detections, seen: Bools, view: Integers, boxes: Floats) -> Detections:
     """Merge the detections of the boxes in view with empty detections for the other boxes."""
     if seen.all():
         return found

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Bools, Floats
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Camera
 from mvpose.detections import Detections
 from mvpose.report.overlay import USUAL_HEIGHT
@@ -63,7 +63,7 @@ def picture_element(
 
 
 def draw_detections(
-    camera: Camera, detections: Detections, view: int, owners: NDArray[np.int64], colors: Sequence[str]
+    camera: Camera, detections: Detections, view: int, owners: Integers, colors: Sequence[str]
 ) -> Iterator[str]:
     """Yield the detections of a view as thin lines with dots at the joints; nobody's are grey and dashed.
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import COCO17, Detections, Rig, preset
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.camera import Camera
 from mvpose.rays import Rays
 from mvpose.reconstruction import Triangulation
@@ -289,7 +289,7 @@ def _by_variant(rig: Rig, terms: Sequence[CameraTerms], scenes: StandingScenes, 
     return Reconstruction(close, paired, mixed)
 
 
-def _detections(terms: Sequence[CameraTerms], scene: int) -> tuple[Detections, NDArray[np.int64]]:
+def _detections(terms: Sequence[CameraTerms], scene: int) -> tuple[Detections, Integers]:
     """Return the detections of one scene in all cameras, ordered as detectors report them, and whom each shows."""
     columns: dict[str, list[NDArray]] = {key: [] for key in ("keypoints", "scores", "boxes", "box_scores", "person")}
     view = []

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 import polars as pl
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mvpose import COCO17, Estimate
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.files.json_values import json_value
 from simharness.scoring.catalogue import AP_MM, PCK_MM
 from simharness.scoring.feet_and_hands import WholeBodyInput, whole_body_scores
@@ -32,7 +32,6 @@ from simharness.scoring.score_summary import STAGES, VariantScores
 from simharness.types.recording import Recording
 from simharness.types.views import Visibility
 
-Labels = NDArray[np.int64]
 Scores = dict[str, float | None]
 _PAIR_COLUMNS = ("pairs_correct", "pairs_wrong", "pairs_lost")
 _SEEN_OR_SELF_OCCLUDED = (Visibility.VISIBLE, Visibility.SELF_OCCLUDED)
@@ -144,7 +143,7 @@ def reprojection_errors(recording: Recording, placed: Floats) -> tuple[Floats, F
     return estimate[compared], detection[compared]
 
 
-def _labels(recording: Recording, estimates: Sequence[Estimate]) -> list[Labels] | None:
+def _labels(recording: Recording, estimates: Sequence[Estimate]) -> list[Integers] | None:
     """Return the labels of every frame; None if the method gives no labels for the detections of some frame."""
     counts = list(map(len, recording.detections))
     matchings = [estimate.matching for estimate in estimates]
@@ -289,7 +288,7 @@ def _people_table(recording: Recording, variant: VariantScores, errors: Floats) 
     )
 
 
-def nearest_people(truth: Floats, estimate: Floats, frame: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
+def nearest_people(truth: Floats, estimate: Floats, frame: Integers) -> tuple[Integers, Floats]:
     """Find the true person nearest to each estimate.
 
     Args:

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mvpose.arrays import Bools, Floats
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.skeleton import Skeleton
 from simharness.scoring.joint_errors import joint_errors
 from simharness.scoring.pairing import placed_joints
@@ -34,7 +33,7 @@ class WholeBodyInput:
     """Joints of the estimates of each frame, (n, J, 3), metres; NaN where missing."""
 
 
-def whole_body_scores(given: WholeBodyInput | None, partner: NDArray[np.int64]) -> dict[str, float | None]:
+def whole_body_scores(given: WholeBodyInput | None, partner: Integers) -> dict[str, float | None]:
     """Return error and PCK of feet and hands; None without true joints of the limb.
 
     Args:

@@ -11,9 +11,9 @@ How well the reported confidence says the errors is scored by the coverage of el
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from mvpose.skeleton import COCO17
 from simharness.scoring.score_registry import ScoreInput, finite_mean, score, shipped_scores
 
@@ -131,7 +131,7 @@ def inside(truth: ArrayLike, estimate: ArrayLike, ellipsoid: ArrayLike) -> Float
     return np.where(known, (distance <= 1.0) & ~singular, np.nan)
 
 
-def brier(probability: ArrayLike, happened: NDArray[np.bool_]) -> float | None:
+def brier(probability: ArrayLike, happened: Bools) -> float | None:
     """Return the mean squared difference between probabilities and what happened, both (k,); None without any."""
     return finite_mean((np.asarray(probability, float) - happened) ** 2)
 

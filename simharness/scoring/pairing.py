@@ -7,10 +7,10 @@ Panoptic's recall, Tu et al., ECCV 2020).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.checks import as_array
 
 LIMIT = 0.5
@@ -21,14 +21,14 @@ LIMIT = 0.5
 class Pairing:
     """True people of one frame and the estimates paired with them."""
 
-    estimate: NDArray[np.int64]
+    estimate: Integers
     """Index of the estimate paired with each true person, (P,); -1 where the person is missed or absent."""
-    error: NDArray[np.float64]
+    error: Floats
     """MPJPE of each pair over the joints that both have, (P,), metres; NaN without a pair."""
-    present: NDArray[np.bool_]
+    present: Bools
     """Which of the P people are in the frame, that is have at least one defined joint, (P,)."""
 
-    def owners(self, count: int) -> NDArray[np.int64]:
+    def owners(self, count: int) -> Integers:
         """Return the true person of each of ``count`` estimates, (n,); -1 for a ghost."""
         owner = np.full(count, -1)
         owner[self.estimate[self.estimate >= 0]] = np.flatnonzero(self.estimate >= 0)
@@ -57,7 +57,7 @@ def pair(truth: ArrayLike, estimate: ArrayLike, *, limit: float = LIMIT) -> Pair
     return Pairing(partner, error, present)
 
 
-def assign(distance: Floats, *, limit: float = LIMIT) -> NDArray[np.int64]:
+def assign(distance: Floats, *, limit: float = LIMIT) -> Integers:
     """Return the estimate paired with each true person, (P,), -1 for none, from their distances (P, n) in metres."""
     # A pair over the limit costs more than any change among the allowed pairs can save.
     forbidden = 1.0 + 2.0 * limit * min(distance.shape)
@@ -68,7 +68,7 @@ def assign(distance: Floats, *, limit: float = LIMIT) -> NDArray[np.int64]:
     return partner
 
 
-def placed_joints(partner: NDArray[np.int64], joints: Floats) -> Floats:
+def placed_joints(partner: Integers, joints: Floats) -> Floats:
     """Return the joints of the estimate paired with each true person, (P, J, 3), from those of all, (n, J, 3).
 
     They are NaN where the person is missed, whose partner is -1.

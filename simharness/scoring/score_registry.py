@@ -25,9 +25,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.files.input_files import parse_toml
 
 if TYPE_CHECKING:
@@ -85,7 +84,7 @@ class ScoreInput:
     paired: Floats
     """Joints of the estimate that is paired with each true person, (T, P, 17, 3), metres; NaN where the person is
     missed or the joint was not placed."""
-    partner: NDArray[np.int64]
+    partner: Integers
     """Index of that estimate, (T, P); -1 where the person is missed."""
 
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,14 @@ class Mirror:
         points = np.asarray(points, float)
         return points - 2 * self.in_front(points)[..., None] * np.array(self.normal)
 
-    def on_glass(self, points: ArrayLike) -> NDArray[np.bool_]:
+    def on_glass(self, points: ArrayLike) -> Bools:
         """Return whether points (..., 3) in the plane of the glass lie on the glass, (...)."""
         local = np.asarray(points, float) - self.center
         across = np.cross([0.0, 0.0, 1.0], self.normal)
         with np.errstate(invalid="ignore"):
             return (np.abs(local @ across) <= self.half[0]) & (np.abs(local[..., 2]) <= self.half[1])
 
-    def shows(self, viewpoint: ArrayLike, points: ArrayLike) -> NDArray[np.bool_]:
+    def shows(self, viewpoint: ArrayLike, points: ArrayLike) -> Bools:
         """Return whether the mirror shows points (..., 3) to a viewpoint (3,), occlusion ignored, (...)."""
         viewpoint, points = np.asarray(viewpoint, float), np.asarray(points, float)
         viewer_distance, point_distance = self.in_front(viewpoint), self.in_front(points)

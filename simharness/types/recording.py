@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mvpose import COCO17, Detections, Estimate, Rig
 from mvpose.arrays import Floats
@@ -25,7 +24,7 @@ class Recording:
         ValueError: no frame, different lengths, a skeleton other than COCO-17, or frames of different people.
     """
 
-    time: NDArray[np.float64]
+    time: Floats
     """Times of the frames, (T,), seconds, evenly spaced."""
     rig: Rig
     """Believed rig, V cameras: the calibration that the method is given."""

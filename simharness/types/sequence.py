@@ -17,7 +17,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Bools, Floats
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.checks import as_array
 from mvpose.skeleton import COCO17, Skeleton
 
@@ -36,7 +36,7 @@ class Sequence:
     landmarks: Floats
     """Positions of ``simharness.types.sequence.LANDMARKS`` in the world, (T, P, L, 3), metres; finite in all frames: an
     absent person waits somewhere outside of the scene."""
-    ids: NDArray[np.int64]
+    ids: Integers
     """Numbers of the people, (P,) int."""
     time: Floats
     """Times of the frames, (T,), seconds."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.formats.people.animation import Hierarchy, hierarchy
 from mvpose.formats.people.people_files import AXES, Export
 
@@ -90,7 +90,7 @@ class _File:
     def _bones(self, ends: Floats) -> int | None:
         """Add a mesh of an octahedron from the origin to each end (k, 3), and return its index; None for no length."""
         places: list[Floats] = []
-        faces: list[NDArray[np.int64]] = []
+        faces: list[Integers] = []
         for end in ends:
             length = float(np.linalg.norm(end))
             if length > 0.0:

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.camera import Rig
 from mvpose.files.atomic_files import atomic_folder
 from simharness.capture.picture import meshes_at
@@ -142,7 +142,7 @@ def _add_shown(spec: mujoco.MjSpec, name: str, mesh: Mesh, assets: Path) -> None
         _add_faces(spec, f"{name} {k}" if len(keys) > 1 else name, mesh, faces, mesh.uv[faces], material)
 
 
-def _rounded_colors(colors: NDArray[np.float32]) -> tuple[Floats, NDArray[np.int64]]:
+def _rounded_colors(colors: NDArray[np.float32]) -> tuple[Floats, Integers]:
     """Return at most a few dozen colours, (n, 3), and which of them each face has, (k,)."""
     for steps in _COLOR_STEPS:
         keys, which = np.unique(np.round(steps * colors), axis=0, return_inverse=True)
@@ -163,9 +163,7 @@ def _material(spec: mujoco.MjSpec, name: str, picture: NDArray[np.uint8], color:
     return name
 
 
-def _add_faces(
-    spec: mujoco.MjSpec, name: str, mesh: Mesh, faces: NDArray[np.int64], uv: NDArray[Any], material: str
-) -> None:
+def _add_faces(spec: mujoco.MjSpec, name: str, mesh: Mesh, faces: Integers, uv: NDArray[Any], material: str) -> None:
     """Add some faces of a mesh as a geom that touches nothing."""
     corners = mesh.vertices[mesh.faces[faces]].reshape(-1, 3)
     rows = np.concatenate([corners, uv.reshape(-1, 2)], axis=1).astype(np.float32)

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from mvpose import COCO17, Estimate
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.report.palette import UNMATCHED, css, identity_color
 from mvpose.report.recording_plots import BAR, draw_bar, half_step, label_ends, runs_of, thinned
 from mvpose.report.svg_plots import FAINT, INK, Color, legend_above, svg_plot
@@ -47,7 +46,7 @@ class Identities:
     identity that never is a person's."""
 
     @property
-    def ghosts(self) -> "list[tuple[int, Labels]]":
+    def ghosts(self) -> list[tuple[int, Integers]]:
         """Index of each identity that has estimates without a person, and the frames of these, ascending by time."""
         found: dict[int, list[int]] = {}
         for frame, (tracks, paired) in enumerate(zip(self.frames.tracks, self.pairs.track, strict=True)):
@@ -229,9 +228,9 @@ def _legend_of_states(axes: Axes, identities: Identities) -> None:
         axes.plot([], [], "v", ms=4.5, color=INK, mew=0, label="identity switch")
 
 
-def _ghost_rows(identities: Identities) -> tuple[list[list[tuple[int, NDArray[np.int64]]]], int]:
+def _ghost_rows(identities: Identities) -> tuple[list[list[tuple[int, Integers]]], int]:
     """Arrange the tracks of ghosts in rows without overlaps; return the rows, and how many tracks found no place."""
-    rows: list[list[tuple[int, NDArray[np.int64]]]] = []
+    rows: list[list[tuple[int, Integers]]] = []
     left_out = 0
     for track, frames in identities.ghosts:
         free = [row for row in rows if row[-1][1][-1] < frames[0]]
@@ -244,13 +243,10 @@ def _ghost_rows(identities: Identities) -> tuple[list[list[tuple[int, NDArray[np
     return rows, left_out
 
 
-def _stretches(frames: NDArray[np.int64]) -> list[tuple[int, int]]:
+def _stretches(frames: Integers) -> list[tuple[int, int]]:
     """Return the first and the last of each stretch of consecutive frames."""
     found = runs_of(frames - np.arange(len(frames)))
     return [(int(frames[start]), int(frames[end - 1])) for start, end in found]
-
-
-Labels = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,9 @@ The trial is replayed for pictures: scene, detections and estimates, which table
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mvpose import Detections, Estimate
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.report.palette import COCO17_LIMBS, css, person_color
 from mvpose.report.view_3d import PYRAMID, Piece3D, Scene3D, Shape3D, Style3D, View3D, camera_pyramid, view_3d
 from mvpose.skeleton import COCO17
@@ -31,7 +30,7 @@ class Replay:
     """The built scenario."""
     variant: str
     """Variant of the method."""
-    time: NDArray[np.float64]
+    time: Floats
     """Time of each frame, (T,), seconds."""
     truth: tuple[Truth, ...]
     """Truth of each frame, T."""
@@ -40,7 +39,7 @@ class Replay:
     estimates: tuple[Estimate, ...]
     """Estimates of the variant for each frame, T."""
 
-    def owners(self, frame: int) -> NDArray[np.int64]:
+    def owners(self, frame: int) -> Integers:
         """Return the true person of each estimate of a frame, (n,), -1 for a ghost."""
         estimate = self.estimates[frame]
         return pair(self.truth[frame].joints, estimate.joints).owners(len(estimate))

@@ -26,10 +26,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats, Integers
 from simharness.scoring.frame_scores import on_shelf14
 from simharness.scoring.pcp import part_states, percent
 from simharness.scoring.score_registry import finite_mean
@@ -43,7 +42,7 @@ _EPSILON = float(np.finfo(float).eps)  # a similarity at the threshold counts
 class IdentityScores:
     """Identities of the true people over the whole sequence."""
 
-    track: NDArray[np.int64]
+    track: Integers
     """Index into ``TrackedFrames.ids`` of the identity of each true person, (P,); -1 for none."""
     right: int
     """Number of frames in which the estimate of a person's identity is within the distance (IDTP)."""
@@ -160,7 +159,7 @@ class Hota:
     """AssA."""
     location: Floats
     """LocA."""
-    pairs: NDArray[np.int64]
+    pairs: Integers
     """Number of pairs, TP."""
 
     @property
@@ -217,10 +216,10 @@ _KEPT = 1000.0  # weight of a pair of the frame before: more than all similariti
 class ClearMot:
     """Pairs of people and identities in each frame, and what they count."""
 
-    track: NDArray[np.int64]
+    track: Integers
     """Index into ``TrackedFrames.ids`` of the identity that each true person is paired with, (T, P); :data:`MISSED`
     where it has none, :data:`ABSENT` where the person is not there."""
-    switched: NDArray[np.bool_]
+    switched: Bools
     """Where a person's identity is another one than the last time, (T, P)."""
     fragmentations: int
     """How often people are paired again after frames without a pair."""

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mvpose import Estimate, Skeleton
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.checks import as_array
 from simharness.scoring.pairing import mean_distances
-
-Labels = NDArray[np.int64]
 
 Place = Literal["mean_joint", "root"]
 """What the distance between a true and an estimated person is: the mean distance of the joints that both have, or the
@@ -32,11 +30,11 @@ class TrackedFrames:
 
     people: int
     """Number of true people P, present or not."""
-    ids: Labels
+    ids: Integers
     """The K different identities in ascending order, (K,)."""
-    present: tuple[Labels, ...]
+    present: tuple[Integers, ...]
     """For each frame, the g true people who are in it, (g,), ascending."""
-    tracks: tuple[Labels, ...]
+    tracks: tuple[Integers, ...]
     """For each frame, the index into ``ids`` of each of its k estimates, (k,), all different."""
     distances: tuple[Floats, ...]
     """For each frame, distances between them, (g, k), metres; infinite where they cannot be compared."""
@@ -46,12 +44,12 @@ class TrackedFrames:
         return len(self.present)
 
     @property
-    def frames_of_people(self) -> Labels:
+    def frames_of_people(self) -> Integers:
         """Number of frames in which each true person is present, (P,)."""
         return np.bincount(np.concatenate([_NOBODY, *self.present]), minlength=self.people)
 
     @property
-    def frames_of_tracks(self) -> Labels:
+    def frames_of_tracks(self) -> Integers:
         """Number of frames in which each identity has an estimate, (K,)."""
         return np.bincount(np.concatenate([_NOBODY, *self.tracks]), minlength=len(self.ids))
 
@@ -121,7 +119,7 @@ def tracked_frames(
     )
 
 
-def ids_of(estimates: Sequence[Estimate]) -> list[Labels] | None:
+def ids_of(estimates: Sequence[Estimate]) -> list[Integers] | None:
     """Return the identities of each frame, (k,); None without frames, or if people are not tracked in one of them."""
     ids = [estimate.ids for estimate in estimates if estimate.ids is not None]
     return ids if ids and len(ids) == len(estimates) else None
