@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from mvpose.cli.estimate_command import Wanted, estimate_into
-from mvpose.cli.inputs import Calibration, Choices, picture_size, with_rates
+from mvpose.cli.inputs import OF_DETECTIONS, PATH, Calibration, Choices, picture_size, with_rates
 from mvpose.cli.program import PROGRAM
-from mvpose.commands.option_groups import grouped, option
+from mvpose.commands.option_groups import grouped, marked, option
 from mvpose.commands.programs import note
 
 if TYPE_CHECKING:
@@ -34,12 +34,14 @@ class Networks:
         "movenet",
         "Detector of people, a name of [cyan]mvpose networks list[/] or an ONNX file: YOLOX, RTMDet or YOLO; "
         "or MoveNet, RTMO and YOLO-pose, which need no --pose.",
+        marks=(PATH,),
         metavar="NAME|FILE",
     )
     pose: str | None = option(
         None,
         "Pose head, a name or an ONNX file: RTMPose or another SimCC head, or one of heat maps (HRNet, "
         "ViTPose), such as rtmpose-m_body8-halpe26 of rtmlib.",
+        marks=(PATH,),
         metavar="NAME|FILE",
     )
     detector_kind: str | None = option(
@@ -81,7 +83,7 @@ def detect(
     typer.echo(f"detections of {len(sources)} videos: {out}")
 
 
-@grouped(without=["times", "skeleton", "pictures"])
+@grouped(without=marked(OF_DETECTIONS, Choices, Wanted))
 def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: Networks, choices: Choices) -> None:
     """Make tracked people of videos: detect, then estimate.
 

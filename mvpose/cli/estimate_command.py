@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
+from mvpose.cli.inputs import OF_DETECTIONS, Calibration, Choices, DetectionPaths, read_inputs
 from mvpose.cli.program import PROGRAM
 from mvpose.commands.option_groups import given, grouped, option
 from mvpose.commands.programs import note
@@ -50,6 +50,7 @@ class Wanted:
     pictures: list[Path] | None = option(
         None,
         "Videos or folders of pictures of the cameras, or a folder with them, for page and films. Repeatable.",
+        marks=(OF_DETECTIONS,),
         metavar="VIDEO",
     )
     films: bool = option(

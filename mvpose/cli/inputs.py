@@ -90,6 +90,10 @@ class Inputs:
         return self.frames[0].skeleton if self.frames else COCO17
 
 
+PATH, OF_DETECTIONS = "path", "of detections"
+"""Marks of options whose values may be paths, and of those that detections alone need, which ``mvpose run`` makes."""
+
+
 @dataclass(frozen=True)
 class Choices:
     """Options of commands that read a recording, as given."""
@@ -98,6 +102,7 @@ class Choices:
     times: Path | None = option(
         None,
         "Times of the pictures in seconds: a line for each frame, with one number, or one for each camera.",
+        marks=(PATH, OF_DETECTIONS),
         metavar="FILE",
     )
     sync: bool = option(
@@ -121,6 +126,7 @@ class Choices:
         None,
         "Skeleton of the detections, if their number of joints does not show it: coco17, body25, halpe26, "
         "wholebody133 ..., or a TOML file.",
+        marks=(PATH, OF_DETECTIONS),
         metavar="NAME",
     )
     joints: str = option(

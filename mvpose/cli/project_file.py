@@ -27,8 +27,8 @@ from typing import Any, Self
 
 from mvpose.cli.detect_command import Networks
 from mvpose.cli.estimate_command import Wanted
-from mvpose.cli.inputs import Choices
-from mvpose.commands.option_groups import flag
+from mvpose.cli.inputs import OF_DETECTIONS, PATH, Choices
+from mvpose.commands.option_groups import flag, marked
 from mvpose.files.input_files import SETTINGS, natural_order, parse_toml, read_bytes
 from mvpose.files.message_text import prefixed, shown
 from mvpose.formats.pose2sim_project import FILE, ProjectSettings, excluded, trial_folders, trial_keys
@@ -39,8 +39,7 @@ NAME = "project.toml"
 _OUT = "results"
 _INPUTS = {"calibration": str, "detections": list[str], "videos": list[str]}
 _GROUPS = (Choices, Wanted, Networks)
-_OF_DETECTIONS = ("times", "skeleton", "pictures")  # options that `mvpose run` does not have
-_FILES = ("times", "skeleton", "detector", "pose")  # values that may be paths
+_OF_DETECTIONS, _FILES = marked(OF_DETECTIONS, *_GROUPS), marked(PATH, *_GROUPS)
 _KINDS = {str: "text", float: "a number", int: "a whole number", bool: "true or false", Path: "a path"}
 
 

@@ -14,20 +14,28 @@ T = TypeVar("T")
 
 _GIVEN: ContextVar[frozenset[str]] = ContextVar("given", default=frozenset())
 _CONTEXT = "context_of_typer"
-_OPTION = "option"  # in the metadata of a field
+_OPTION, _MARKS = "option", "marks"  # in the metadata of a field
 
 
-def option(default: T, text: str, *flags: str, **settings: Any) -> T:
+def option(default: T, text: str, *flags: str, marks: Collection[str] = (), **settings: Any) -> T:
     """Return a field of a dataclass of options, or the default of a parameter of a command that is :func:`grouped`.
 
     Args:
         default: value of an option that is not given.
         text: what it does, for the help.
         flags: its names on the command line, if they do not follow from that of the field.
+        marks: words by which :func:`marked` finds it.
         settings: further arguments of ``typer.Option``.
     """
-    field: T = dataclasses.field(default=default, metadata={_OPTION: typer.Option(*flags, help=text, **settings)})
+    about = typer.Option(*flags, help=text, **settings)
+    field: T = dataclasses.field(default=default, metadata={_OPTION: about, _MARKS: marks})
     return field
+
+
+def marked(mark: str, *groups: type[Any]) -> tuple[str, ...]:
+    """Return the names of the fields with a mark, of some dataclasses of options."""
+    fields = (field for group in groups for field in dataclasses.fields(group))
+    return tuple(field.name for field in fields if mark in field.metadata.get(_MARKS, ()))
 
 
 def grouped(*, without: Collection[str] = ()) -> Callable[[Command], Command]:

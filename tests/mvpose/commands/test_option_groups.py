@@ -10,7 +10,7 @@ import typer
 from typer.testing import CliRunner
 
 from mvpose.cli.app import app
-from mvpose.commands.option_groups import grouped, option
+from mvpose.commands.option_groups import grouped, marked, option
 
 
 @dataclass(frozen=True)
@@ -79,3 +79,14 @@ def test_shared_options_have_the_same_defaults():
     assert {name: estimate[name] for name in estimate.keys() & run.keys()} == {
         name: run[name] for name in estimate.keys() & run.keys()
     }
+
+
+def test_fields_are_found_by_their_marks():
+    @dataclass(frozen=True)
+    class Places:
+        folder: str = option("", "A folder.", marks=("path", "new"))
+        count: int = option(1, "A number.")
+        file: str = option("", "A file.", "--input", marks=("path",))
+
+    assert marked("path", Places) == ("folder", "file")
+    assert marked("new", Places, Places) == ("folder", "folder")
