@@ -100,7 +100,7 @@ class MatchedJoint:
     name: str
 
 
-def matched_joints(sightings: Sightings, pair: tuple[int, int], sizes: Sequence[tuple[int, int]]) -> list[MatchedJoint]:
+def matched_joints(sightings: Sightings, pair: tuple[int, int], rig: Rig) -> list[MatchedJoint]:
     """Return joints of one frame that both views of a pair detected, far from each other in the second picture.
 
     The frame is that with the most people in both views, and then with the most joints. Hips and the like, whose place
@@ -109,15 +109,14 @@ def matched_joints(sightings: Sightings, pair: tuple[int, int], sizes: Sequence[
     Args:
         sightings: keypoints matched over views.
         pair: the two views.
-        sizes: width and height of the pictures of all views, pixels.
+        rig: the cameras.
     """
     exact = np.array(sightings.skeleton.sigmas)[sightings.joint] < _INEXACT
-    first, second = (
-        {_key(sightings, k): k for k in np.flatnonzero(exact & (sightings.view == view)).tolist()} for view in pair
-    )
+    keys = list(zip(*(each.tolist() for each in (sightings.frame, sightings.person, sightings.joint)), strict=True))
+    first, second = ({keys[k]: k for k in np.flatnonzero(exact & (sightings.view == view)).tolist()} for view in pair)
     frames: dict[int, list[tuple[int, int, int]]] = {}
     for key, k in second.items():
-        if key in first and _inside(sightings.pixels[k], sizes[pair[1]]):
+        if key in first and (sightings.pixels[k] >= 0).all() and (sightings.pixels[k] < rig[pair[1]].size).all():
             frames.setdefault(key[0], []).append(key)
     if not frames:
         return []
@@ -148,14 +147,6 @@ def draw_bodies(camera: Camera, sightings: Sightings, frame: int, view: int) -> 
             if a in place and b in place
         )
     yield f'<path class="body" d="{path}" stroke-width="{1.6 * unit:.3g}"/>'
-
-
-def _key(sightings: Sightings, k: int) -> tuple[int, int, int]:
-    return int(sightings.frame[k]), int(sightings.person[k]), int(sightings.joint[k])
-
-
-def _inside(pixel: Floats, size: tuple[int, int]) -> bool:
-    return bool(0 <= pixel[0] < size[0] and 0 <= pixel[1] < size[1])
 
 
 def _far_apart(points: Floats) -> list[int]:
@@ -226,13 +217,12 @@ def best_partner(sightings: Sightings, view: int, rig: Rig) -> int | None:
     shared[view] = 0
     if not shared.any():
         return None
-    sizes = [camera.size for camera in rig]
     candidates = np.flatnonzero(2 * shared >= shared.max()).tolist()
-    return max(candidates, key=lambda other: _median_distance(rig, sightings, (other, view), sizes))
+    return max(candidates, key=lambda other: _median_distance(rig, sightings, (other, view)))
 
 
-def _median_distance(rig: Rig, sightings: Sightings, pair: tuple[int, int], sizes: Sequence[tuple[int, int]]) -> float:
-    joints = matched_joints(sightings, pair, sizes)
+def _median_distance(rig: Rig, sightings: Sightings, pair: tuple[int, int]) -> float:
+    joints = matched_joints(sightings, pair, rig)
     distances = [distance_from_line(rig[pair[0]], rig[pair[1]], joint) for joint in joints]
     known = [distance for distance in distances if math.isfinite(distance)]
     return float(np.median(known)) if known else -1.0
@@ -255,13 +245,9 @@ class ClockOffset:
 def motion_factor(before: Rig, after: Rig) -> float:
     """Return one factor, 1, 2, 5, 10, ..., by which corrections are exaggerated so that the largest is easy to see."""
     moved = np.linalg.norm(after.centers - before.centers, axis=1).max()
-    turned = max(_rotation_vectors(before, after).max(initial=0.0), 1e-9)
+    turns = [Rotation.from_matrix(b.R @ a.R.T).magnitude() for a, b in zip(before, after, strict=True)]
     extent = float(np.ptp(before.centers[:, :2], axis=0).max()) + 2 * _MARGIN
-    return nice_factor(min(_LONGEST * extent / max(float(moved), 1e-9), _WIDEST / turned, 100.0))
-
-
-def _rotation_vectors(before: Rig, after: Rig) -> Floats:
-    return np.array([Rotation.from_matrix(b.R @ a.R.T).magnitude() for a, b in zip(before, after, strict=True)])
+    return nice_factor(min(_LONGEST * extent / max(float(moved), 1e-9), _WIDEST / max(*turns, 1e-9), 100.0))
 
 
 def exaggerated(before: Camera, after: Camera, factor: float) -> Camera:

@@ -230,8 +230,7 @@ def _lines(case: DoctorCase, pictures: Pictures | None) -> dict[str, Any] | None
     first = drawings.best_partner(case.sightings, second, case.rig)
     if first is None:
         return None
-    sizes = [camera.size for camera in case.rig]
-    joints = drawings.matched_joints(case.sightings, (first, second), sizes)
+    joints = drawings.matched_joints(case.sightings, (first, second), case.rig)
     if not joints:
         return None
     before, after = (case.rig[first], case.rig[second]), None

@@ -6,7 +6,7 @@ from typing import Any
 
 from mvpose.report.tables import NOTHING
 from simharness.runtime.number_text import fixed
-from simharness.scoring.catalogue import SCORES, ScoreInfo
+from simharness.scoring.catalogue import SCORES
 from simharness.scoring.score_registry import in_percent
 
 
@@ -51,8 +51,10 @@ COLUMNS: tuple[Column, ...] = (
 def scored_columns(summary: Mapping[str, Any], keys: Iterable[str] = SCORES) -> tuple[Column, ...]:
     """Return the scores of a run that any of its variants has, in the order of the keys."""
     known = [scores.get("scores", {}) for scores in summary["variants"].values()]
-    return tuple(_column(SCORES[key]) for key in keys if any(each.get(key) is not None for each in known))
+    return tuple(column_of(key) for key in keys if any(each.get(key) is not None for each in known))
 
 
-def _column(info: ScoreInfo) -> Column:
-    return Column(info.title, info.unit, info.about, lambda scores: scores.get("scores", {}).get(info.key), info.digits)
+def column_of(key: str, value: Callable[[Mapping[str, Any]], float | None] | None = None) -> Column:
+    """Return the column of a score, whose number is that of the key, or what a function of a summary returns."""
+    info, own = SCORES[key], lambda scores: scores.get("scores", {}).get(key)
+    return Column(info.title, info.unit, info.about, value or own, info.digits)

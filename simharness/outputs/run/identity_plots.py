@@ -16,8 +16,7 @@ from mvpose.arrays import Floats, Integers
 from mvpose.report.palette import UNMATCHED, css, identity_color
 from mvpose.report.recording_plots import BAR, draw_bar, half_step, label_ends, runs_of, thinned
 from mvpose.report.svg_plots import FAINT, INK, Color, legend_above, svg_plot
-from simharness.outputs.run.headline import Column
-from simharness.scoring.catalogue import SCORES
+from simharness.outputs.run.headline import Column, column_of
 from simharness.scoring.tracking.identity_figures import DISTANCE
 from simharness.scoring.tracking.identity_scores import ABSENT, MISSED, ClearMot, clear_mot, identity_scores
 from simharness.scoring.tracking.tracked_frames import TrackedFrames, ids_of, roots, tracked_frames
@@ -291,22 +290,17 @@ def has_identities(scores: Mapping[str, Any]) -> bool:
     return (scores.get("tracking") or {}).get("mean_joint") is not None
 
 
-def _column(key: str, value: Callable[[Mapping[str, Any]], float | None]) -> Column:
-    info = SCORES[key]
-    return Column(info.title, info.unit, info.about, value, info.digits)
-
-
 IDENTITY_COLUMNS: tuple[Column, ...] = (
-    *(_column(key, _identity(key, 100.0)) for key in ("hota", "idf1")),
-    *(_column(key, _identity(key)) for key in ("id_switches", "switches_per_minute")),
+    *(column_of(key, _identity(key, 100.0)) for key in ("hota", "idf1")),
+    *(column_of(key, _identity(key)) for key in ("id_switches", "switches_per_minute")),
 )
 """Columns of the terminal, of variants with identities only."""
 
 TRACKING_COLUMNS: tuple[Column, ...] = (
-    *(_column(key, _identity(key, 100.0)) for key in ("hota", "deta", "assa", "idf1", "mota")),
-    *(_column(key, _identity(key)) for key in ("id_switches", "fragmentations")),
-    _column("pcp_tracked", lambda scores: scores["tracking"]["pcp_tracked"]),
-    _column("velocity_mm_s", lambda scores: scores["tracking"]["velocity_mm_s"]),
-    _column("jerk_ratio", _jerk),
+    *(column_of(key, _identity(key, 100.0)) for key in ("hota", "deta", "assa", "idf1", "mota")),
+    *(column_of(key, _identity(key)) for key in ("id_switches", "fragmentations")),
+    column_of("pcp_tracked", lambda scores: scores["tracking"]["pcp_tracked"]),
+    column_of("velocity_mm_s", lambda scores: scores["tracking"]["velocity_mm_s"]),
+    column_of("jerk_ratio", _jerk),
 )
 """Columns of the table of variants."""

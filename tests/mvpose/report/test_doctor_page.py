@@ -134,7 +134,7 @@ class TestEpipolarLines:
     def test_joints_are_of_one_frame_and_of_both_views(self):
         rig = ring(4)
         sightings = sighted(rig)
-        found = matched_joints(sightings, (0, 2), [camera.size for camera in rig])
+        found = matched_joints(sightings, (0, 2), rig)
         assert len({joint.frame for joint in found}) == 1
         assert len(found) == 6
         assert not {"left hip", "right hip"} & {joint.name for joint in found}
