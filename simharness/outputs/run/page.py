@@ -153,8 +153,6 @@ def _findings(record: Record, main: str, errors: Mapping[str, Floats]) -> dict[s
 def _plots(record: Record, main: str, things: Sequence[Floats], errors: Mapping[str, Floats]) -> dict[str, Markup]:
     """Return the SVG of each plot by name; plots without data are left out."""
     joints = np.stack([true.joints for true in record.truth])
-    people = joints.shape[1]
-    colors = [line_color(person) for person in range(people)]
     found = np.concatenate([estimate.joints[:, _HIPS, :2].mean(axis=1) for estimate in record.estimates[main]])
     drawn = {
         "plan": plots.floor_plan(
@@ -163,10 +161,9 @@ def _plots(record: Record, main: str, things: Sequence[Floats], errors: Mapping[
             things=things,
             paths=joints[:, :, _HIPS, :2].mean(axis=2),
             estimates=found,
-            colors=colors,
         ),
         "times": plots.stage_times(_stage_times(record)),
     }
-    if people:
+    if joints.shape[1]:
         drawn["distribution"] = plots.error_distribution(errors)
     return {name: Markup(svg) for name, svg in drawn.items()}

@@ -8,27 +8,28 @@ from matplotlib.patches import Polygon
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
 from mvpose.report import svg_plots
+from mvpose.report.palette import line_color
 from mvpose.report.rig_plots import camera_from_above, name_cameras
 
 VISIBILITY_COLORS: tuple[svg_plots.Color, ...] = ("#2e9e6b", "#d9a514", "#d9643a", "#8a63c9", "#8b93a1")
 
 
-def error_over_time(time: Floats, errors: Floats, present: Bools, *, colors: Sequence[svg_plots.Color]) -> str:
+def error_over_time(time: Floats, errors: Floats, present: Bools) -> str:
     """Plot the mean joint error of each person over time.
 
     Args:
         time: seconds, (T,).
         errors: millimetres, (T, P); NaN where a person was not found.
         present: who is in the scene, (T, P); where such a person was not found is marked below the axis.
-        colors: colours of the P people.
     """
     with svg_plots.svg_plot("error-over-time") as (axes, written):
         top = float(np.nanmax(errors)) * 1.15 if np.isfinite(errors).any() else 100.0
         for person in range(errors.shape[1]):
-            axes.plot(time, errors[:, person], color=colors[person], lw=1.6, label=f"person {person}", zorder=3)
+            color = line_color(person)
+            axes.plot(time, errors[:, person], color=color, lw=1.6, label=f"person {person}", zorder=3)
             lost = np.isnan(errors[:, person]) & present[:, person]
             row = -top * (0.05 + 0.045 * person)
-            axes.plot(time[lost], np.full(lost.sum(), row), "s", ms=3, color=colors[person], clip_on=False)
+            axes.plot(time[lost], np.full(lost.sum(), row), "s", ms=3, color=color, clip_on=False)
         axes.set(xlabel="time, s", ylabel="mean joint error, mm")
         axes.set_ylim(-top * (0.05 + 0.045 * errors.shape[1]) if (np.isnan(errors) & present).any() else 0, top)
         axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= top])
@@ -110,7 +111,6 @@ def floor_plan(
     things: Sequence[Floats],
     paths: Floats,
     estimates: Floats,
-    colors: Sequence[svg_plots.Color],
 ) -> str:
     """Plot the scene from above.
 
@@ -120,7 +120,6 @@ def floor_plan(
         things: outlines of the clutter, each (n, 2) metres.
         paths: true paths of the people, (T, P, 2) metres.
         estimates: positions of the estimates, (k, 2) metres.
-        colors: colours of the P people.
     """
     with svg_plots.svg_plot("floor-plan", size=(5.2, 4.8)) as (axes, written):
         half = np.array(room) / 2
@@ -130,9 +129,9 @@ def floor_plan(
             axes.add_patch(Polygon(outline, fc=svg_plots.LINE, ec=svg_plots.FAINT, lw=0.8))
         for camera in rig:
             camera_from_above(axes, camera)
-        for person in range(paths.shape[1]):
-            axes.plot(*paths[:, person].T, color=colors[person], lw=2.2, alpha=0.55, solid_capstyle="round", zorder=3)
-            axes.plot(*paths[-1, person], "o", ms=5, color=colors[person], zorder=4, label=f"person {person}")
+        for person, color in enumerate(map(line_color, range(paths.shape[1]))):
+            axes.plot(*paths[:, person].T, color=color, lw=2.2, alpha=0.55, solid_capstyle="round", zorder=3)
+            axes.plot(*paths[-1, person], "o", ms=5, color=color, zorder=4, label=f"person {person}")
         if len(estimates):
             axes.plot(*estimates.T, ".", ms=2.2, color=svg_plots.INK, mew=0, zorder=5)
             axes.plot([], [], ".", ms=5, color=svg_plots.INK, mew=0, label="estimated")

@@ -7,7 +7,6 @@ import numpy as np
 import polars as pl
 
 from mvpose.arrays import Bools, Floats
-from mvpose.report.palette import line_color
 from simharness.outputs.run import plots
 from simharness.outputs.run.figures import figure
 from simharness.outputs.run.pictures import rows_of
@@ -32,8 +31,7 @@ _VISIBILITY_LABELS = {
 def error_over_time(record: Record, variant: str) -> str | None:
     """Plot the mean joint error of each person over time; None without people."""
     errors = person_errors(record.scores, variant)
-    colors = [line_color(person) for person in range(errors.shape[1])]
-    return plots.error_over_time(record.time, errors, presence(record), colors=colors) if colors else None
+    return plots.error_over_time(record.time, errors, presence(record)) if errors.shape[1] else None
 
 
 @figure(

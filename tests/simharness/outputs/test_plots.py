@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
+from mvpose.report.palette import line_color
 from mvpose.report.svg_plots import STAGE_COLORS
 from simharness.outputs.run import plots
 from simharness.outputs.study import plots as study_plots
@@ -15,8 +16,6 @@ from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval
 from simharness.world.rigs.layouts import build_rig
 
-COLORS = ["#336699", "#996633", "#339966"]
-
 
 def draw_all(people: int = 3, frames: int = 6) -> list[str]:
     rng = np.random.default_rng(0)
@@ -24,7 +23,7 @@ def draw_all(people: int = 3, frames: int = 6) -> list[str]:
     errors[1:3] = np.nan
     shares = np.full((5, 5), 0.2)
     return [
-        plots.error_over_time(np.arange(frames) / 10, errors, np.ones(errors.shape, bool), colors=COLORS),
+        plots.error_over_time(np.arange(frames) / 10, errors, np.ones(errors.shape, bool)),
         plots.error_distribution({"full": errors.ravel(), "no-3dps": errors.ravel() * 2}),
         plots.visibility_shares([f"cam{k}" for k in range(5)], shares, labels=list("abcde")),
         plots.stage_times({"full": {"affinity": 1.0, "matching": 2.0, "total": 3.1}, "other": {"affinity": 4.0}}),
@@ -34,7 +33,6 @@ def draw_all(people: int = 3, frames: int = 6) -> list[str]:
             things=[np.array([[0, 0], [1, 0], [1, 1.0]])],
             paths=rng.normal(size=(frames, people, 2)),
             estimates=rng.normal(size=(people, 2)),
-            colors=COLORS,
         ),
     ]
 
@@ -79,7 +77,7 @@ def test_only_people_who_are_there_are_marked_as_not_found():
     errors = np.array([[20.0, 30.0], [20.0, np.nan], [20.0, np.nan]])
     everywhere, once = np.ones((3, 2), bool), np.array([[True, True], [True, True], [True, False]])
     marks = [
-        plots.error_over_time(np.arange(3.0), errors, present, colors=COLORS).count(f"fill: {COLORS[1]}")
+        plots.error_over_time(np.arange(3.0), errors, present).count(f"fill: {line_color(1)}")
         for present in (everywhere, once, np.isfinite(errors))
     ]
     assert marks[0] - marks[1] == marks[1] - marks[2] == 1
@@ -87,11 +85,11 @@ def test_only_people_who_are_there_are_marked_as_not_found():
 
 def test_empty_data_gives_a_plot():
     missed = np.full((4, 2), np.nan)
-    assert "<svg" in plots.error_over_time(np.arange(4.0), missed, np.ones((4, 2), bool), colors=COLORS)
+    assert "<svg" in plots.error_over_time(np.arange(4.0), missed, np.ones((4, 2), bool))
     assert "<svg" in plots.error_distribution({"full": np.zeros(0)})
     assert "<svg" in plots.stage_times({})
     rig = build_rig(CamerasSection())
-    empty = {"things": [], "paths": np.zeros((4, 0, 2)), "estimates": np.zeros((0, 2)), "colors": []}
+    empty = {"things": [], "paths": np.zeros((4, 0, 2)), "estimates": np.zeros((0, 2))}
     assert "<svg" in plots.floor_plan(rig, (8, 8), **empty)
 
 
