@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose import Detections, Estimate
+from mvpose import Estimate
 from mvpose.commands.output_files import check_writable
 from mvpose.commands.progress import Reporter, Silence
 from mvpose.files.atomic_files import atomic_folder
@@ -21,7 +21,7 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.run_trial import Goal, run_trial
 from simharness.trial.stages.build_trial import Trial, build_trial
 from simharness.trial.stages.capture import picture_source_of
-from simharness.types.truth import Truth
+from simharness.types.recording import Recording
 from simharness.world.scene.playback import Playback
 
 Rgb = NDArray[np.uint8]
@@ -120,16 +120,11 @@ def render(scenario: Scenario, plan: RenderPlan, *, out: Path, reporter: Reporte
     return folder
 
 
-@dataclass(frozen=True)
-class _Layers:
-    """Layers of every frame; estimates only if they are drawn."""
-
-    truth: Sequence[Truth]
-    detections: Sequence[Detections]
-    estimates: Sequence[Estimate] | None
+Layers = tuple[Recording, Sequence[Estimate] | None]
+"""Truth and detections of every frame, and the estimates if they are drawn."""
 
 
-def _layers(scenario: Scenario, plan: RenderPlan, reporter: Reporter) -> tuple[Trial, _Layers | None]:
+def _layers(scenario: Scenario, plan: RenderPlan, reporter: Reporter) -> tuple[Trial, Layers | None]:
     """Build the trial, and run it as far as the overlay needs; no layers without an overlay."""
     if not plan.overlay:
         with reporter.stage("build", 1):
@@ -138,12 +133,11 @@ def _layers(scenario: Scenario, plan: RenderPlan, reporter: Reporter) -> tuple[T
     until: Goal = "estimate" if "estimates" in plan.overlay else "detect"
     every = plan.every if until == "detect" else 1  # estimates of trackers depend on all frames
     result = run_trial(scenario, variants=first, until=until, reporter=reporter, every=every)
-    recording = result.recording
-    return result.trial, _Layers(recording.truth, recording.detections, result.estimates.get(first[0]))
+    return result.trial, (result.recording, result.estimates.get(first[0]))
 
 
 def _pictures(
-    trial: Trial, picture_source: ScenePictures, plan: RenderPlan, layers: _Layers | None, frames: range
+    trial: Trial, picture_source: ScenePictures, plan: RenderPlan, layers: Layers | None, frames: range
 ) -> Iterator[list[Rgb]]:
     """Yield the pictures of all views, frame by frame."""
     overlay = plan.overlay
@@ -152,13 +146,14 @@ def _pictures(
         for view in range(len(trial.exposures.believed_rig)):
             rgb = picture_source.picture(trial.exposures, frame, view, finer=plan.finer)
             if layers is not None:
+                recording, estimates = layers
                 rgb = annotate(
                     rgb,
                     trial.exposures.camera(frame, view),
                     view,
-                    truth=layers.truth[frame],
-                    detections=layers.detections[frame] if "detections" in overlay else None,
-                    estimate=layers.estimates[frame] if layers.estimates is not None else None,
+                    truth=recording.truth[frame],
+                    detections=recording.detections[frame] if "detections" in overlay else None,
+                    estimate=estimates[frame] if estimates is not None else None,
                     show_truth="truth" in overlay,
                 )
             pictures.append(rgb)

@@ -248,24 +248,15 @@ def _stretches(frames: Integers) -> list[tuple[int, int]]:
     return [(int(frames[start]), int(frames[end - 1])) for start, end in found]
 
 
-@dataclass(frozen=True)
-class TrackedVariant:
-    """Plots of a variant with identities."""
-
-    variant: str
-    timeline: Markup
-    trajectories: Markup
-
-
-def tracked_variants(record: Record) -> list[TrackedVariant]:
-    """Return the plots of all variants that track people."""
+def tracked_variants(record: Record) -> list[dict[str, str]]:
+    """Return the ``variant``, the ``timeline`` and the ``trajectories`` of all variants that track people."""
     truth = np.stack([true.joints for true in record.truth])
     found = []
     for number, (variant, estimates) in enumerate(record.estimates.items()):
         identities = identities_of(truth, estimates, record.time)
         if identities is not None:
-            drawn = (draw(f"{draw.__name__}-{number}", identities) for draw in (timeline, trajectories))
-            found.append(TrackedVariant(variant, *map(Markup, drawn)))
+            drawn = {draw.__name__: draw(f"{draw.__name__}-{number}", identities) for draw in (timeline, trajectories)}
+            found.append({"variant": variant, **{key: Markup(svg) for key, svg in drawn.items()}})
     return found
 
 
