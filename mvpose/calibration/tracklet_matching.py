@@ -338,7 +338,7 @@ def mean_looks(tracklets: Tracklets) -> tuple[Floats, Bools]:
     return total / np.maximum(number, 1)[:, None], number > 0
 
 
-def evidence_of_looks(tracklets: Tracklets, apart: Bools, *, scale: AppearanceAffinity | None = None) -> Floats:
+def evidence_of_looks(tracklets: Tracklets, apart: Bools) -> Floats:
     """Return the log-likelihood ratio that two tracklets show one person or two, (n, n); 0 without descriptors.
 
     As in tracking (:func:`mvpose.tracking.reappearance.evidence_of_looks`), looks speak for one person by as much as
@@ -348,9 +348,8 @@ def evidence_of_looks(tracklets: Tracklets, apart: Bools, *, scale: AppearanceAf
     Args:
         tracklets: tracklets of all views.
         apart: which tracklets are known to show different people, or to be the same one, (n, n).
-        scale: scale of descriptor distances.
     """
-    scale = scale or AppearanceAffinity()
+    scale = AppearanceAffinity()
     looks, described = mean_looks(tracklets)
     if not described.any():
         return np.zeros(apart.shape)

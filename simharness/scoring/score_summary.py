@@ -29,9 +29,6 @@ class VariantScores:
     scores: Mapping[str, float | None] | None = None
     """Scores of a trial by their keys in :mod:`simharness.scoring.catalogue`."""
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "timings", tuple(self.timings))
-
     @classmethod
     def pooled(cls, recordings: "Sequence[VariantScores]") -> "VariantScores":
         """Return the scores of a variant in all frames of several recordings.

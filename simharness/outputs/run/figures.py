@@ -41,16 +41,6 @@ class RunFigure:
     """Function of the same that returns what the figure shows, a sentence, or an empty text."""
 
 
-@dataclass(frozen=True)
-class DrawnFigure:
-    """A figure of one run, as the template shows it."""
-
-    title: str
-    caption: str
-    svg: Markup
-    finding: str = ""
-
-
 _registered: dict[str, RunFigure] = {}
 
 
@@ -70,18 +60,21 @@ def figure(title: str, caption: str, *, finding: Callable[[Record, str], str] | 
     return register
 
 
-def draw_figures(record: Record, variant: str) -> list[DrawnFigure]:
-    """Return all registered figures of a run, in the order of :data:`MODULES`; those without data are left out."""
+def draw_figures(record: Record, variant: str) -> list[dict[str, str]]:
+    """Return ``title``, ``caption``, ``svg`` and ``finding`` of all registered figures of a run.
+
+    They are in the order of :data:`MODULES`; those without data are left out.
+    """
     modules = [import_module(f"simharness.outputs.run.{module}").__name__ for module in MODULES]
     figures = sorted(_registered.values(), key=lambda each: modules.index(each.draw.__module__))
     drawn = [(each, each.draw(record, variant)) for each in figures]
     return [
-        DrawnFigure(
-            each.title,
-            each.caption.replace("{variant}", variant),
-            Markup(svg),
-            each.finding(record, variant) if each.finding else "",
-        )
+        {
+            "title": each.title,
+            "caption": each.caption.replace("{variant}", variant),
+            "svg": Markup(svg),
+            "finding": each.finding(record, variant) if each.finding else "",
+        }
         for each, svg in drawn
         if svg is not None
     ]
