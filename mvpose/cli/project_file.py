@@ -31,7 +31,8 @@ from mvpose.cli.inputs import OF_DETECTIONS, PATH, Choices
 from mvpose.commands.option_groups import flag, marked
 from mvpose.files.input_files import SETTINGS, natural_order, parse_toml, read_bytes
 from mvpose.files.message_text import prefixed, shown
-from mvpose.formats.pose2sim_project import FILE, ProjectSettings, excluded, trial_folders, trial_keys
+from mvpose.formats.pose2sim_project import FILE, ProjectSettings
+from mvpose.formats.pose2sim_trials import excluded, trial_folders, trial_keys
 
 NAME = "project.toml"
 """Usual name of a project file."""
