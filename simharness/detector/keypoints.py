@@ -189,6 +189,7 @@ class _KeypointErrors:
                 found[stray] = self._anywhere(person)[stray]
 
         share = config.quality * self._inversion_factor[:, :, person, None] * self._inversion
+        share = share * np.where(occlusion == OCCLUDED, 1.0, config.inversion_uncovered)
         other = true[:, :, MIRROR]
         if config.inversion_reach:
             share = share * distance_factors(true, other, self._boxes[:, :, person, 3], config.inversion_reach)
@@ -252,7 +253,8 @@ class _KeypointErrors:
         of_neighbour = self._target[frame, view, neighbour]
         shown = conditions.occlusion[frame, view, neighbour] != OUTSIDE
         crowded = conditions.crowded[:, :, person].astype(int)
-        share = self._config.quality * self._swap[crowded]
+        covered = conditions.occlusion[:, :, person] == OCCLUDED
+        share = self._config.quality * self._swap[crowded] * np.where(covered, 1.0, self._config.swap_uncovered)
         possible = shown & (neighbour >= 0)[..., None]
         if self._config.swap_reach and share.any():
             height = self._boxes[:, :, person, 3]

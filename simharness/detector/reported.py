@@ -126,7 +126,7 @@ def last_pixels(rig: Rig) -> Floats:
     return np.array([camera.size for camera in rig], float)[:, None] - 1
 
 
-_BEHIND = 0.2  # metres behind the middle of the trunk at which the shares of drops hold
+_BEHIND = 0.2  # metres behind the middle of the trunk, from the side, at which the shares of drops hold
 
 
 def drop_shares(
@@ -144,7 +144,7 @@ def drop_shares(
         occlusion: occlusion classes of the joints, (T, V, P, 17).
         bearings: bearings of the cameras from the heads, (T, V, P), radians to the left of straight ahead; None if
             ``face`` has no shares.
-        depth: depth of the joints behind the middle of the trunk, (T, V, P, 17) metres; None if it changes nothing.
+        depth: depth of the joints behind the middle of the trunk from the side, (T, V, P, 17) metres; None: no effect.
     """
     table = np.array([shares.by_joint() for shares in (drop.visible, drop.self_occluded, drop.occluded)])
     result = table[np.where(occlusion == OUTSIDE, VISIBLE, occlusion), np.arange(occlusion.shape[-1])]

@@ -192,10 +192,19 @@ _TRUNK = (5, 6, 11, 12)
 
 
 def trunk_depths(joints: ArrayLike, rig: Rig) -> Floats:
-    """Return by how much joints (T, P, 17, 3) are behind the middle of their trunk, (T, V, P, 17) metres."""
+    """Return by how much joints (T, P, 17, 3) are on the far side of their trunk, (T, V, P, 17) metres.
+
+    That is their depth behind the middle of the trunk, times the square of the cosine between view and shoulder line:
+    from the side, the trunk hides limbs; from the front and from behind, the place of hidden ones is seen.
+    """
     joints = np.asarray(joints, float)
-    depth = np.stack([(joints - camera.center) @ camera.R[2] for camera in rig], axis=1)
-    return np.asarray(depth - depth[..., _TRUNK].mean(axis=-1, keepdims=True))
+    middle, left = joints[..., _TRUNK, :].mean(axis=-2), body_axes(joints)[..., 1, :]
+    result = []
+    for camera in rig:
+        view = unit(middle - camera.center)
+        depth = np.einsum("tpjc,tpc->tpj", joints - middle[..., None, :], view)
+        result.append(depth * (view * left).sum(axis=-1)[..., None] ** 2)
+    return np.stack(result, axis=1)
 
 
 _HIDDEN = (Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)

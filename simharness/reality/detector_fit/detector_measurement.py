@@ -23,6 +23,8 @@ _RULE_OF_THREE = 3.0
 count as fewer."""
 
 _COUNTED: Mapping[str, Callable[[FrameSums], Floats]] = {
+    "keypoints.inversion_uncovered": lambda sums: sums.classes["inversion"].k[:, 2],
+    "keypoints.swap_uncovered": lambda sums: sums.classes["swap"].k[:, 2],
     "keypoints.inversion_reach": lambda sums: sums.apart.k,
     "keypoints.drop.depth": lambda sums: sums.depth.n.sum(axis=-1),
     "keypoints.drop.edge.self_occluded": lambda sums: sums.edge.n[:, 0],

@@ -129,7 +129,7 @@ class FrameSums(NamedTuple):
     occluded, by kind, (..., 2, 9)."""
     depth: Trials
     """Self-occluded limb joints that may be dropped, and those dropped, by kind and depth behind the middle of the
-    trunk, (..., 9, B)."""
+    trunk, from the side, (..., 9, B)."""
     face: Trials
     """Joints of the face that nobody else hides, and those not reported, by kind and bearing, (..., 3, 24)."""
     size: Trials

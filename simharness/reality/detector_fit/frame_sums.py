@@ -42,7 +42,7 @@ APART = np.linspace(0.0, 0.6, 31)
 """Edges of the histogram of distances of left-right counterparts in the picture, heights of the box."""
 
 DEPTHS = np.linspace(-0.2, 0.5, 15)
-"""Edges of the histogram of depths of self-occluded joints behind the middle of the trunk, metres."""
+"""Edges of the histogram of depths of self-occluded joints behind the middle of the trunk from the side, metres."""
 
 _OUTLYING = 3.5  # deviations of a bone's length from which a joint is wrong
 _CELLS = 12  # in each direction, of the grid on a person's box

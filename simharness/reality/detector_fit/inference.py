@@ -35,7 +35,7 @@ SCALES: Scales = {
         *("keypoints.jitter", "keypoints.miss", "keypoints.inversion.", "keypoints.swap", "keypoints.stray"),
         *("keypoints.guess.self_occluded", "keypoints.guess.occluded", "correlation.scatter_noise"),
         *("keypoints.drop.edge", "keypoints.drop.self_occluded", "keypoints.drop.occluded"),
-        "boxes.missed_hidden",
+        *("boxes.missed_hidden", "keypoints.inversion_uncovered"),
         *("scores.good", "scores.jitter", "scores.miss", "scores.inversion", "scores.swap", "scores.hidden"),
         *("scores.guess", "scores.overconfident", "scores.underconfident"),
     ),

@@ -70,7 +70,7 @@ class LabelledJoints:
     bearing: NDArray[np.int64]
     """Bin of the bearing of the camera from the head, to the left of straight ahead, (T, V, P)."""
     depth: Floats
-    """Depth of the joints behind the middle of the trunk, (T, V, P, 17) metres."""
+    """Depth of the joints behind the middle of the trunk, as seen from the side, (T, V, P, 17) metres."""
     inside: Bools
     """Joints inside of the image, as the sample places them, (T, V, P, 17)."""
     beyond: Floats

@@ -56,9 +56,13 @@ def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> 
         for key in CLASSES:
             _put_by_kind(result, f"share.{key}", share[key])
         for key in ("swap", "inversion"):
-            _put_by_kind(result, f"keypoints.{key}", share[key])
+            uncovered = Trials(n[key][:, :2].sum(axis=1), k[key][:, :2].sum(axis=1))
+            factor = _factor_of(n[key].sum(axis=1), k[key].sum(axis=1), uncovered)
+            result[f"keypoints.{key}_uncovered"] = factor
+            as_covered = n[key][:, 2] + np.nan_to_num(factor, nan=1.0)[:, None] * uncovered.n
+            _put_by_kind(result, f"keypoints.{key}", np.clip(k[key].sum(axis=1) / as_covered, 0.0, 1.0))
         n_drop, k_drop = n["drop"].copy(), k["drop"]
-        edge = _edge(n_drop[:, 1:], k_drop[:, 1:], sums.edge)
+        edge = _factor_of(n_drop[:, 1:], k_drop[:, 1:], sums.edge)
         for index, (_, name) in enumerate(_HIDDEN):
             result[f"keypoints.drop.edge.{name}"] = edge[:, index]
         result["keypoints.drop.depth"] = _depth(sums.depth)
@@ -138,21 +142,21 @@ def _factors(observed: Floats, expected: Floats) -> Floats:
     return np.asarray(np.maximum((observed + _PRIOR_ERRORS) / (expected + _PRIOR_ERRORS / pooled), _LEAST_FACTOR))
 
 
-def _edge(n: Floats, k: Floats, edge: Trials) -> Floats:
-    """Return by which factors hidden joints beside a visible one are dropped less often than the others, (R, 2).
+def _factor_of(n: Floats, k: Floats, some: Trials) -> Floats:
+    """Return by which factors some of the joints err less often than the others, (...), 1 at most.
 
     The estimate of Mantel and Haenszel (1959), which kinds of joint with other shares do not bias; _PRIOR_ERRORS count
-    as half as often. NaN with few drops.
+    as half as often. NaN with few errors.
 
     Args:
-        n: hidden joints that may be dropped, (R, 2, 9) by occlusion class and kind.
-        k: those that are dropped, (R, 2, 9).
-        edge: both of joints beside a visible one, (R, 2, 9).
+        n: joints that may err, (..., 9) by kind.
+        k: those that do, (..., 9).
+        some: both of some of them, (..., 9).
     """
-    beside = (edge.k * (n - edge.n) / np.maximum(n, 1)).sum(axis=-1)
-    others = ((k - edge.k) * edge.n / np.maximum(n, 1)).sum(axis=-1)
-    ratio = (beside + _PRIOR_ERRORS / 2) / (others + _PRIOR_ERRORS)
-    return np.where(k.sum(axis=-1) >= _MIN_HIDDEN, np.minimum(ratio, 1.0), np.nan)
+    these = (some.k * (n - some.n) / np.maximum(n, 1)).sum(axis=-1)
+    others = ((k - some.k) * some.n / np.maximum(n, 1)).sum(axis=-1)
+    ratio = (these + _PRIOR_ERRORS / 2) / (others + _PRIOR_ERRORS)
+    return np.where(k.sum(axis=-1) >= _MIN_HIDDEN, np.clip(ratio, 0.0, 1.0), np.nan)
 
 
 def _depth(drops: Trials) -> Floats:

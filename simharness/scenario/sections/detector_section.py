@@ -149,7 +149,7 @@ class DropSection(Section):
     depth: float = key(
         0.0,
         "growth of the logit of the shares of self-occluded limb joints with their depth behind the middle of the "
-        "trunk, per metre; the shares are those of joints 0.2 m behind it",
+        "trunk as seen from the side, per metre; the shares are those of joints 0.2 m behind it",
         ge=0.0,
         le=100.0,
     )
@@ -195,6 +195,7 @@ class KeypointsSection(Section):
     miss_some: Shares | None = None  # the same for people with 6 to 10 visible joints; absent: as miss
     miss_few: Shares | None = None  # the same for at most 5 visible joints; absent: as miss_some
     inversion: Shares = Shares()  # at the left-right counterpart
+    inversion_uncovered: Share = key(1.0, "factor on inversions of joints that no other person or object hides")
     inversion_bearing: FactorsByBearing | None = key(
         None,
         "factors on inversion where the camera is 0, 30, ..., 180 degrees from straight ahead of the head, "
@@ -207,6 +208,7 @@ class KeypointsSection(Section):
     )
     swap: Shares = Shares()  # at the same joint of another person whose box overlaps
     swap_crowded: Shares | None = None  # the same in a crowd (PoseFix); absent: as swap
+    swap_uncovered: Share = key(1.0, "factor on swaps of joints that no other person or object hides")
     swap_reach: Factor = key(
         0.0,
         "distance of the other person's joint at which swaps are 1 / e of those at no distance, heights of "

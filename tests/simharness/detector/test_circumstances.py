@@ -6,6 +6,7 @@ from worlds import find, standing, within, world
 
 from simharness.detector.viewing_conditions import distance_factors, inversion_factors
 from simharness.types.truth import KeypointError
+from simharness.types.views import Visibility
 
 LEGS = slice(13, 17)  # knees and ankles: left and right are apart from all sides
 
@@ -26,6 +27,29 @@ def test_factors_of_one_change_no_draw():
     usual, same = (find(where, inversion=0.2, miss=0.1, **more) for more in ({}, {"inversion_bearing": [1.0] * 7}))
     np.testing.assert_array_equal(usual.pixels, same.pixels)
     assert (usual.error == KeypointError.INVERSION).any()
+
+
+@pytest.mark.parametrize(
+    ("error", "visibility", "factor"),
+    [
+        (error, *each)
+        for error in ("inversion", "swap")
+        for each in (
+            (Visibility.VISIBLE, 0.25),
+            (Visibility.SELF_OCCLUDED, 0.25),
+            (Visibility.OCCLUDED_BY_PERSON, 1.0),
+            (Visibility.OCCLUDED_BY_CLUTTER, 1.0),
+        )
+    ],
+)
+def test_joints_that_nothing_else_hides_are_taken_for_others_less_often(error, visibility, factor):
+    """Joints that are taken with the factor are a part of those that are taken without it."""
+    where = world(frames=1500, views=2, together=True, visibility=visibility)
+    wrong = {"inversion": KeypointError.INVERSION, "swap": KeypointError.SWAP}[error]
+    usual, rarer = (find(where, **{error: 0.4, f"{error}_uncovered": each}).error == wrong for each in (1.0, 0.25))
+    assert (rarer & ~usual).sum() == 0
+    assert rarer.sum() == pytest.approx(factor * usual.sum(), rel=0.08)
+    assert usual.sum() > 1000
 
 
 @pytest.mark.parametrize("reach", [0.1, 0.4])

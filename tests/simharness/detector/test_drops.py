@@ -119,12 +119,17 @@ class TestDepth:
             growth = 14.0 * (depth[view, joint] - 0.2) if joint > 4 else 0.0  # the face is told by its bearing
             assert within(gone[:, view, 0, joint].sum(), 3000, expit(logit(0.4) + growth)), (view, joint)
 
-    def test_depth_is_along_the_view_from_the_middle_of_the_trunk(self):
-        where = standing(1, cameras=(0.0, np.pi), facing=0.0)
-        front, back = trunk_depths(where.sequence.joints, where.rig)[0, :, 0]
-        np.testing.assert_allclose(front, -back, atol=1e-6)
-        np.testing.assert_allclose([front[[5, 6, 11, 12]].mean(), back[[5, 6, 11, 12]].mean()], 0.0, atol=1e-9)
-        assert front[0] < -0.03  # the nose is before the trunk
+    def test_depth_is_from_the_side(self):
+        """Of cameras in front, on both sides, and between front and left."""
+        where = standing(1, cameras=(0.0, np.pi / 2, -np.pi / 2, np.pi / 4), facing=0.0, distance=90.0)
+        joints = where.sequence.joints[0, 0]
+        front, left, right, between = trunk_depths(where.sequence.joints, where.rig)[0, :, 0]
+        away = joints - joints[[5, 6, 11, 12]].mean(axis=0)
+        np.testing.assert_allclose(front, 0.0, atol=0.01)
+        np.testing.assert_allclose(left, -away[:, 1], atol=0.01)
+        np.testing.assert_allclose(right, away[:, 1], atol=0.01)
+        np.testing.assert_allclose(between, -(away[:, 0] + away[:, 1]) / np.sqrt(8), atol=0.01)
+        assert left[6] > 0.1  # from the left, the right shoulder is on the far side
 
     @pytest.mark.parametrize("visibility", [Visibility.VISIBLE, Visibility.OCCLUDED_BY_PERSON])
     def test_others_keep_their_shares(self, visibility):

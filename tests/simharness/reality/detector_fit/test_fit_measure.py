@@ -145,6 +145,15 @@ class TestDrops:
         found = point_estimates(filmed.sample(staged=True, keypoints={"drop": drop}))["keypoints.drop.depth"]
         assert found == pytest.approx(growth, abs=within)
 
+    @pytest.mark.parametrize("error", ["inversion", "swap"])
+    @pytest.mark.parametrize("factor", [0.1, 0.5])
+    def test_factors_of_joints_that_nothing_else_hides(self, filmed, error, factor):
+        """Also where the shares of kinds of joint differ: some kinds are hidden more often than others."""
+        shares = {**dict.fromkeys(KINDS, 0.1), "wrists": 0.2}
+        found = point_estimates(filmed.sample(staged=True, keypoints={error: shares, f"{error}_uncovered": factor}))
+        assert found[f"keypoints.{error}_uncovered"] == pytest.approx(factor, abs=0.1)
+        assert found[f"keypoints.{error}.wrists"] == pytest.approx(0.2, abs=0.04)
+
     def test_few_drops_say_nothing_about_edges(self, filmed):
         measured = measure_detector(part(filmed.sample(keypoints={"drop": {"self_occluded": 0.01}}), 20), resamples=5)
         assert not measured["keypoints.drop.edge.self_occluded"].known
