@@ -28,7 +28,7 @@ from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 from types import MappingProxyType
-from typing import TypeVar, get_args
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 
@@ -54,19 +54,19 @@ class Activity:
 
     name: str
     """Name in scenario files."""
-    performers: int
-    """Number of people that it takes."""
-    track: type[Loop] | type[Spot] | type[Route]
-    """Kind of track: a :class:`Loop` to walk or run round, a :class:`Spot`, or the :class:`Route` of a visitor.
-    Performers share a spot: its place is in the middle, and its bearing points from the first to the second."""
-    clearance: float
-    """Radius in metres around the track's position that the performers' pelvises may use; their arms may reach beyond.
-    Tracks of other people stay ``people.spacing`` further away."""
     perform: Callable[..., Performance]
     """Function of the performers' ``Kinematics`` in order, the track, and the times (N,) in seconds at which to plan
     (ascending, at ``RATE``), with the keywords ``rng`` (random generator for the manner) and ``pace`` (cadence relative
     to the usual one); returns a :class:`Performance`. Apart from its ends, the result must not depend on the length of
     ``time``."""
+    performers: int = 1
+    """Number of people that it takes."""
+    track: type[Loop] | type[Spot] | type[Route] = Spot
+    """Kind of track: a :class:`Loop` to walk or run round, a :class:`Spot`, or the :class:`Route` of a visitor.
+    Performers share a spot: its place is in the middle, and its bearing points from the first to the second."""
+    clearance: float = 0.0
+    """Radius in metres around the track's position that the performers' pelvises may use; their arms may reach beyond.
+    Tracks of other people stay ``people.spacing`` further away."""
     froude: tuple[float, float] = _STROLL
     """Lowest and highest speed over sqrt(g x leg length), for activities on a loop."""
     fewest: int = 0
@@ -76,17 +76,8 @@ class Activity:
     of the scenario."""
 
 
-def activity(
-    name: str,
-    *,
-    performers: int = 1,
-    track: type[Loop] | type[Spot] | type[Route] = Spot,
-    clearance: float = 0.0,
-    froude: tuple[float, float] = _STROLL,
-    fewest: int = 0,
-    configured: Callable[[Activity, PeopleSection], Activity] = lambda each, people: each,
-) -> Callable[[Perform], Perform]:
-    """Register the decorated function as an activity; the arguments are the attributes of :class:`Activity`.
+def activity(name: str, **attributes: Any) -> Callable[[Perform], Perform]:
+    """Register the decorated function as an activity with the other attributes of :class:`Activity`.
 
     The function takes a sequence of ``Kinematics`` and returns a :class:`Performance`, see ``Activity.perform``.
     """
@@ -94,26 +85,20 @@ def activity(
     def register(perform: Perform) -> Perform:
         if name in _registered:
             raise ValueError(f"the activity {name!r} is registered twice: choose another name for one of them")
-        _registered[name] = Activity(name, performers, track, clearance, perform, froude, fewest, configured)
+        _registered[name] = Activity(name, perform, **attributes)
         return perform
 
     return register
 
 
-def solo_activity(
-    name: str,
-    *,
-    track: type[Loop] | type[Spot] | type[Route] = Spot,
-    clearance: float = 0.0,
-    froude: tuple[float, float] = _STROLL,
-) -> Callable[[Move], Move]:
+def solo_activity(name: str, **attributes: Any) -> Callable[[Move], Move]:
     """Register the decorated function as an activity of one person without props; arguments as for :func:`activity`.
 
     The function takes one ``Kinematics`` instead of a sequence and returns a :class:`Motion`.
     """
 
     def register(move: Move) -> Move:
-        activity(name, track=track, clearance=clearance, froude=froude)(solo(move))
+        activity(name, **attributes)(solo(move))
         return move
 
     return register

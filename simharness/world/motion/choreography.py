@@ -162,7 +162,7 @@ def _recorded(scenario: Scenario) -> Activity:
     def perform(mover: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
         return clip.perform(mover, time, place=spot.place, bearing=spot.bearing)
 
-    return Activity("mocap", 1, Spot, 0.0, solo(perform))
+    return Activity("mocap", solo(perform))
 
 
 def _reenacted(scenario: Scenario, cast: Sequence[Kinematics], time: Floats) -> tuple[Motion, ...]:

@@ -30,6 +30,7 @@ _VIGOUR = (0.3, 1.6)  # range of amplitudes, relative to the curves, in which a 
 # Amplitudes of the pelvis at full vigour, after Perry and Burnfield.
 _PELVIS_TURN, _PELVIS_LIST, _PELVIS_SWAY = np.radians(5.0), np.radians(3.5), 0.018
 
+TOE_OUT = np.radians(7.0)  # outward rotation of the toes of a walking person
 _EARLY = 0.03  # fraction of the stride by which feet land nearer; otherwise the leg would be too short at heel strike
 _HASTE = 1.02  # the foot is above its next footprint a little before it lands
 _CLEARANCE = 0.02  # metres between the swinging foot and the floor

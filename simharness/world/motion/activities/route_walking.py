@@ -21,7 +21,14 @@ from mvpose.arrays import Floats
 from simharness.scenario.sections.people_section import PeopleSection
 from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.activities.gait import PHASES, Gait, make_gait, similar_walk_ratio, walking_posture
+from simharness.world.motion.activities.gait import (
+    PHASES,
+    TOE_OUT,
+    Gait,
+    make_gait,
+    similar_walk_ratio,
+    walking_posture,
+)
 from simharness.world.motion.activity_registry import Activity, activity
 from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Spot
@@ -114,7 +121,6 @@ def walk_route(
     return solve_legs(kinematics, time, pelvis, height, feet, curves)
 
 
-_TOE_OUT = np.radians(7.0)
 _FULL_STEP = 0.12  # metres: a shorter step is lifted less
 _FLAT_LIFT = 0.01  # metres
 _TURNED = 0.25  # metres per radian: step that counts for a turn of a foot
@@ -182,7 +188,7 @@ class RouteSteps:
         gait, outward = self.gait, 1.0 if self.side == "left" else -1.0
         place = self.route.position(when + gait.lead / self.route.speed)
         middle = self.facing(when + gait.foot_off / 2 / gait.frequency)
-        return Footprints.beside(place, middle, left=outward * self.width, toes_left=outward * _TOE_OUT)
+        return Footprints.beside(place, middle, left=outward * self.width, toes_left=outward * TOE_OUT)
 
     def _lift(self, part: Floats, step: Floats, pitch: Floats, time: Floats) -> Floats:
         """Return the height of the lowest point of a foot above the floor, (T,) metres, 0 in stance."""
@@ -249,29 +255,24 @@ _ENDS = 1.45  # metres from the middle of the booth to the places where people t
 _FROUDE = 0.33
 _GRAVITY = 9.81
 _REST = (0.3, 2.0)  # seconds of standing beside the booth
+_HIDDEN = PeopleSection().hidden
 
 
 def _configured(each: Activity, people: PeopleSection) -> Activity:
-    return replace(each, perform=partial(_perform, hidden=people.hidden))
+    return replace(each, perform=partial(hide, hidden=people.hidden))
 
 
 @activity("hide", clearance=_ENDS, configured=_configured)
 def hide(
-    performers: Sequence[Kinematics], spot: Spot, time: np.ndarray, *, rng: np.random.Generator, pace: float
-) -> Performance:
-    """Walk through the booth, turn round on the other side, and come back, again and again."""
-    return _perform(performers, spot, time, rng=rng, pace=pace, hidden=PeopleSection().hidden)
-
-
-def _perform(
     performers: Sequence[Kinematics],
     spot: Spot,
-    time: np.ndarray,
+    time: Floats,
     *,
     rng: np.random.Generator,
     pace: float,
-    hidden: float,
+    hidden: float = _HIDDEN,
 ) -> Performance:
+    """Walk through the booth, turn round on the other side, and come back, again and again."""
     (mover,) = performers
     speed = _FROUDE * float(np.sqrt(_GRAVITY * mover.leg_length))
     offset, sense = rng.uniform(), rng.choice([-1.0, 1.0])

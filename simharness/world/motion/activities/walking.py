@@ -4,7 +4,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.activities.gait import Gait, make_gait, walking_posture
+from simharness.world.motion.activities.gait import TOE_OUT, Gait, make_gait, walking_posture
 from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
@@ -15,7 +15,6 @@ from simharness.world.motion.poses.timing import limbs
 
 _GRAVITY = 9.81
 _STRAIGHTEST = np.radians(4.0)
-_TOE_OUT = np.radians(7.0)
 _STEP_WIDTH = 0.55  # lateral distance of the feet relative to the neutral stance
 _EVERY, _SHIFTS = 0.03, 9  # seconds between samples of the loop, and number of stride phases at each
 
@@ -38,7 +37,7 @@ def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gen
     def stances(time: Floats, phase: Floats) -> tuple[Pelvis, dict[str, Foot]]:
         pelvis = gait.pelvis(loop.position(time), loop.heading(time), phase)
         feet = {
-            side: footsteps(loop, gait, side, phase - late, time, width=width, toe_out=_TOE_OUT)
+            side: footsteps(loop, gait, side, phase - late, time, width=width, toe_out=TOE_OUT)
             for side, late in zip(SIDES, (0.0, 0.5), strict=True)
         }
         return pelvis, feet

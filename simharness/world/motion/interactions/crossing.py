@@ -6,8 +6,9 @@ through each other. Who passes closer than shoulders are wide turns them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -33,54 +34,36 @@ _NARROW = 0.5  # metres at which they turn them fully
 _ABREAST, _TURNED = 0.3, 0.9  # metres from the middle up to which shoulders are turned, and in which they turn back
 
 
-@dataclass(frozen=True)
-class _Lane:
-    """Lane of one person in the frame of the spot: its distance to the left, and the first direction, 1 or -1."""
-
-    left: float
-    sense: float
-
-
-def _lanes(count: int, passing: float) -> list[_Lane]:
-    return [_Lane((k - (count - 1) / 2) * passing, 1.0 - 2.0 * (k % 2)) for k in range(count)]
-
-
 def _configured(each: Activity, people: PeopleSection) -> Activity:
     """Return the activity for the group and the distance of a scenario."""
     clearance = float(np.hypot(_LENGTH, (people.group - 1) * people.passing)) / 2
-    perform = partial(_perform, name=each.name, passing=people.passing)
+    perform = partial(each.perform, passing=people.passing)
     return replace(each, performers=people.group, fewest=2, clearance=clearance, perform=perform)
 
 
-_CLEARANCE = float(np.hypot(_LENGTH, PeopleSection().passing)) / 2
+_PASSING = PeopleSection().passing
+_PAIR: dict[str, Any] = {
+    "performers": 2,
+    "clearance": float(np.hypot(_LENGTH, _PASSING)) / 2,
+    "configured": _configured,
+}
 
 
-@activity("cross", performers=2, clearance=_CLEARANCE, configured=_configured)
+@activity("cross", **_PAIR)
 def cross(
-    performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
-) -> Performance:
-    """Walk to the other end of the lane, turn, and come back, again and again."""
-    return _perform(performers, spot, time, rng=rng, pace=pace, name="cross", passing=PeopleSection().passing)
-
-
-@activity("swap", performers=2, clearance=_CLEARANCE, configured=_configured)
-def swap(
-    performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
-) -> Performance:
-    """Swap places with those opposite, turn round, stand face to face for a while, and swap again."""
-    return _perform(performers, spot, time, rng=rng, pace=pace, name="swap", passing=PeopleSection().passing)
-
-
-def _perform(
     performers: Sequence[Kinematics],
     spot: Spot,
     time: Floats,
     *,
     rng: np.random.Generator,
     pace: float,
-    name: str,
-    passing: float,
+    name: str = "cross",
+    passing: float = _PASSING,
 ) -> Performance:
+    """Walk to the other end of the lane, turn, and come back, again and again.
+
+    As "swap": swap places with those opposite, turn round, stand face to face for a while, and swap again.
+    """
     count = len(performers)
     speeds = [_FROUDE * float(np.sqrt(_GRAVITY * mover.leg_length)) for mover in performers]
     durations = [walking_time(_LENGTH, speed) for speed in speeds]
@@ -90,9 +73,11 @@ def _perform(
     meetings = _meetings(max(durations), (offset + 1.0) / 2, float(time[-1]) + LOOKAHEAD, _REST[name], rests)
     yielded = float(np.clip((_WIDE - passing) / (_WIDE - _NARROW), 0.0, 1.0))
     motions = []
-    for k, (mover, lane) in enumerate(zip(performers, _lanes(count, passing), strict=True)):
-        bearing = spot.bearing + (0.0 if lane.sense > 0 else np.pi)
-        walker = Itinerary(spot_to_world(spot, [-lane.sense * _LENGTH / 2, lane.left]), bearing, speeds[k])
+    for k, mover in enumerate(performers):
+        left, forth = (k - (count - 1) / 2) * passing, k % 2 == 0  # lane of the person in the frame of the spot
+        bearing = spot.bearing + (0.0 if forth else np.pi)
+        start = spot_to_world(spot, [(-1.0 if forth else 1.0) * _LENGTH / 2, left])
+        walker = Itinerary(start, bearing, speeds[k])
         for number, meeting in enumerate(meetings):
             walker.time = meeting + _UNEVEN * uneven[k] - durations[k] / 2
             walker.walk(_LENGTH).turn(bearing + (number + 1) * np.pi, sense=sense[k])
@@ -105,6 +90,9 @@ def _perform(
 
         motions.append(walk_route(mover, route, time, rng=rng, pace=pace, yielding=yielding))
     return Performance(tuple(motions))
+
+
+activity("swap", **_PAIR)(partial(cross, name="swap"))
 
 
 def _meetings(

@@ -68,8 +68,7 @@ class _Course:
         forth = ease((u - self.go) / (self.meet - self.go)) + ease((u - self.part) / (self.handed - self.part))
         meet_back = self.back + (self.meet - self.go)
         back = ease((u - self.back) / (meet_back - self.back))
-        back = back + ease((u - self.part_back) / (self.home - self.part_back))
-        return forth - back - 1.0
+        return forth - (back + ease((u - self.part_back) / (self.home - self.part_back))) - 1.0
 
     def holding(self, person: int, u: Floats) -> Floats:
         """Return how far the hands of a person hold the object, (T,) from 0 to 1."""
@@ -142,11 +141,8 @@ def _hold(
         inward = palm_faces * _INWARD if item.kind == "bottle" else 0.0
         turn = handshake_orientation(home_spot.bearing + inward)
         out = item.size[1] / 2 * palm_faces
-        place = (
-            grip
-            - out * turn[:, 1]
-            - item.behind * np.array([np.cos(home_spot.bearing), np.sin(home_spot.bearing), 0.0])
-        )
+        ahead = np.array([np.cos(home_spot.bearing), np.sin(home_spot.bearing), 0.0])
+        place = grip - out * turn[:, 1] - item.behind * ahead
         turns = np.tile(turn, (len(path), 1, 1))
         motion = reach_with(mover, motion, side, place, turn=turns, weight=weight, guess=_HOLDING, turn_weight=0.02)
     return motion

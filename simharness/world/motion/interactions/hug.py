@@ -1,6 +1,6 @@
 """Activity "hug": two people step up to each other, close their arms, hold, let go and step back."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -43,33 +43,17 @@ _FLAT = {
 }
 
 
-@dataclass(frozen=True)
-class _Hold:
-    """Arm posture of one person of a hug; the angles are start values in degrees."""
-
-    raised: float
-    """Flexion of the shoulders."""
-    out: float
-    """Abduction of the shoulders."""
-    turned: float
-    """Rotation of the shoulders."""
-    bent: float
-    """Flexion of the elbows."""
-    height: float
-    """Height of the palms above the other's shoulders, metres."""
-    across: float
-    """Distance of the palms from the other's spine, metres."""
-
-
 # The arms of the taller person go over the shoulders, those of the other around the waist.
 _OPEN = {
     "over": limbs(shoulder_flexion=95.0, shoulder_abduction=50.0, shoulder_rotation=15.0, elbow_flexion=20.0),
     "under": limbs(shoulder_flexion=30.0, shoulder_abduction=50.0, shoulder_rotation=10.0, elbow_flexion=25.0),
 }
 _DETOUR = 30.0  # degrees
-_HOLDS: Mapping[Role, _Hold] = {
-    "over": _Hold(raised=122.0, out=40.0, turned=78.0, bent=97.0, height=0.02, across=0.16),
-    "under": _Hold(raised=50.0, out=52.0, turned=50.0, bent=65.0, height=-0.30, across=0.17),
+# Closed arms: start angles in the order of ``Kinematics.arm_order``; height of the palms above the other's shoulders,
+# and their distance from the other's spine, metres.
+_HOLDS: Mapping[Role, tuple[Floats, float, float]] = {
+    "over": (np.radians([122.0, 40.0, 78.0, 97.0, 15.0, 0.0]), 0.02, 0.16),
+    "under": (np.radians([50.0, 52.0, 50.0, 65.0, 15.0, 0.0]), -0.30, 0.17),
 }
 
 
@@ -118,16 +102,9 @@ def hug(
     distance, wraps = _fit_pair(performers, roles, course)
     approached = [
         _approach(mover, home, course, time, u, _attentive(time, rng), lean=lean)
-        for mover, home, lean in zip(
-            performers, _start_spots(performers, spot, distance), _leans(performers), strict=True
-        )
+        for mover, home, lean in _places(performers, spot, distance)
     ]
-    return Performance(
-        tuple(
-            _embrace(performers[k], approached[k], performers[1 - k], approached[1 - k], roles[k], wraps[k], course, u)
-            for k in (0, 1)
-        )
-    )
+    return Performance(tuple(_embrace(performers, approached, k, roles[k], wraps[k], course, u) for k in (0, 1)))
 
 
 def _fit_pair(
@@ -139,10 +116,9 @@ def _fit_pair(
     arms stay open.
     """
     contacts, instants = ContactModel(performers), course.instants(30)
-    homes, leans = _start_spots(performers, Spot(np.zeros(2), 0.0), _DISTANCES[0]), _leans(performers)
     approached = [
         _approach(mover, home, course, instants, instants, {}, lean=lean)
-        for mover, home, lean in zip(performers, homes, leans, strict=True)
+        for mover, home, lean in _places(performers, Spot(np.zeros(2), 0.0), _DISTANCES[0])
     ]
     bare = [blend_angles(motion, 1.0, **_ARMS_BACK) for motion in approached]
     present = contacts.sample(0, bare[0], instants)
@@ -151,18 +127,10 @@ def _fit_pair(
         if contacts.penetration(present, contacts.sample(1, nearer, instants)).max() > _DEEPEST:
             break
     approached[1], bare[1] = _shifted(approached[1], distance - _DISTANCES[0]), nearer
-
-    def around(person: int, wrap: float | None) -> Motion:
-        other = 1 - person
-        role = roles[person]
-        return _embrace(
-            performers[person], approached[person], performers[other], approached[other], role, wrap, course, instants
-        )
-
     wraps, posed = [], bare
     for person in (0, 1):
         other = contacts.sample(1 - person, posed[1 - person], instants)
-        tried = [around(person, wrap) for wrap in _WRAPS]
+        tried = [_embrace(performers, approached, person, roles[person], wrap, course, instants) for wrap in _WRAPS]
         depths = [contacts.penetration(contacts.sample(person, motion, instants), other).max() for motion in tried]
         free = np.flatnonzero(np.array(depths) < _PRESSED)
         best = int(free[0] if len(free) else np.argmin(depths[:-1]))
@@ -178,18 +146,16 @@ def _shifted(motion: Motion, ahead: float) -> Motion:
     return Motion(motion.time, root, motion.angles)
 
 
-def _start_spots(performers: Sequence[Kinematics], middle: Spot, distance: float) -> tuple[Spot, Spot]:
-    """Return the spots from which both step up to the pelvis distance ``distance`` in metres."""
+def _places(
+    performers: Sequence[Kinematics], middle: Spot, distance: float
+) -> Iterator[tuple[Kinematics, Spot, float]]:
+    """Yield both with the spots from which they step up to a pelvis distance in metres, and their leans in degrees."""
     first, second = (_STEP * mover.leg_length for mover in performers)
     apart = distance + first + second
-    return face_to_face(middle, apart, share=(distance / 2 + first) / apart, aside=_ASIDE)
-
-
-def _leans(performers: Sequence[Kinematics]) -> list[float]:
-    """Return the lean of each trunk, degrees."""
+    spots = face_to_face(middle, apart, share=(distance / 2 + first) / apart, aside=_ASIDE)
     heights = np.array([mover.standing_height + mover.arms["left"].anchors[0][2] for mover in performers])
-    higher = np.maximum(heights - heights[::-1], 0.0)
-    return [float(lean) for lean in np.minimum(_LEAN + _LEAN_MORE * higher, _MOST_LEAN)]
+    leans = np.minimum(_LEAN + _LEAN_MORE * np.maximum(heights - heights[::-1], 0.0), _MOST_LEAN)
+    yield from zip(performers, spots, leans.tolist(), strict=True)
 
 
 def _attentive(time: Floats, rng: np.random.Generator) -> Curves:
@@ -231,17 +197,18 @@ def _steps(
 
 
 def _embrace(
-    mover: Kinematics,
-    motion: Motion,
-    other: Kinematics,
-    others: Motion,
+    performers: Sequence[Kinematics],
+    approached: Sequence[Motion],
+    person: int,
     role: Role,
     wrap: float | None,
     course: _Course,
     u: Floats,
 ) -> Motion:
     """Return the motion with both arms closed around the other person, palms on the back."""
-    hold = _HOLDS[role]
+    mover, motion = performers[person], approached[person]
+    other, others = performers[1 - person], approached[1 - person]
+    guess, above, across = _HOLDS[role]
     opened = course.open(u)
     motion = blend_angles(motion, opened, **_OPEN[role], **limbs(forearm_pronation=10.0, wrist_flexion=0.0))
     if role == "over":  # outside the other's arms, which rise at the same time
@@ -249,15 +216,14 @@ def _embrace(
         motion = offset_angles(motion, left_shoulder_abduction=out, right_shoulder_abduction=out)
     if wrap is None:
         return motion
-    guess = np.radians([hold.raised, hold.out, hold.turned, hold.bent, 15.0, 0.0])
     # Palms are not placed higher than the holder's shoulders.
     shoulder = other.arms["left"].anchors[0][2]
     highest = mover.standing_height + mover.arms["left"].anchors[0][2] - other.standing_height
-    height = min(shoulder + hold.height, highest)
+    height = min(shoulder + above, highest)
     inward = Rotation.from_quat(motion.root[:, 3:], scalar_first=True).as_matrix()
     for side, sign in (("right", 1.0), ("left", -1.0)):
         turn, place = inverse_kinematics.shoulder_girdle(other, others, "left" if sign > 0 else "right")
-        palm = turn @ _palm_on_trunk(other, height, sign * hold.across, wrap) + place
+        palm = turn @ _palm_on_trunk(other, height, sign * across, wrap) + place
         motion = inverse_kinematics.reach_with(
             mover,
             motion,

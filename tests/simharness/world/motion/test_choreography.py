@@ -22,8 +22,8 @@ def cast(count):
 
 
 def test_activities_are_assigned_in_turn_and_pairs_take_two():
-    one, two = (Activity(name, n, Spot, 0.0, solo(lambda: None)) for name, n in (("one", 1), ("two", 2)))
-    spare = Activity("stand", 1, Spot, 0.0, solo(lambda: None))
+    one, two = (Activity(name, solo(lambda: None), n) for name, n in (("one", 1), ("two", 2)))
+    spare = Activity("stand", solo(lambda: None))
     groups = assign_activities([one, two], 7, fallback=spare)
     assert [(group.people, group.activity.name) for group in groups] == [
         ((0,), "one"),
