@@ -35,9 +35,8 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.scenario.sections.people_section import ActivityName, PeopleSection
 from simharness.world.motion.motion import Motion, Performance
-from simharness.world.motion.paths import Loop, Spot, Track
+from simharness.world.motion.paths import Loop, Route, Spot, Track
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.routes import Route
 
 _PACKAGES = ("simharness.world.motion.activities", "simharness.world.motion.interactions")
 _STROLL = (0.28, 0.39)  # Froude numbers: people stroll in a room; 0.42 is comfortable outdoors

@@ -14,9 +14,8 @@ from simharness.world.motion import track_planning
 from simharness.world.motion.activity_registry import Activity, configured_activities, solo
 from simharness.world.motion.contact import ContactModel, SampledBody
 from simharness.world.motion.motion import Motion, Performance, Prop
-from simharness.world.motion.paths import Loop, RecordedPath, Spot, Track, rotation_2d
+from simharness.world.motion.paths import Loop, RecordedPath, Route, Spot, Track, rotation_2d
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.routes import Route
 from simharness.world.motion.visits import Door, Visitor, draw_doors
 
 _PACE = (1.05, 1.25)  # steps in a room are short and quick

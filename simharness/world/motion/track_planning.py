@@ -8,7 +8,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.types.random_streams import stream
 from simharness.world.motion import paths
-from simharness.world.motion.routes import Route
+from simharness.world.motion.paths import Route
 from simharness.world.motion.visits import Visitor
 
 _NARROWEST = 0.45  # metres: half side of the smallest square to walk round in

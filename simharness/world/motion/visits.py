@@ -11,7 +11,7 @@ from simharness.scenario.sections.people_section import TrafficSection
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.random_streams import stream
 from simharness.world.motion.motion import Presence, Prop
-from simharness.world.motion.routes import Itinerary, Route, turning_time, walking_time
+from simharness.world.motion.paths import Itinerary, Route, turning_time, walking_time
 
 DOOR = (0.06, 1.1, 2.15)
 """Depth, width and height of a door, metres."""

@@ -128,7 +128,7 @@ SHIPPED = {
     "simharness/capture/outer_views.py", "simharness/world/scene/rooms/kinds.py",
     "simharness/world/humans/face_colors.py", "simharness/world/humans/population.py",
     "simharness/world/humans/anatomy.py", "simharness/world/scene/rooms/fittings.py",
-    "simharness/world/scene/rooms/textures.py", "mvpose/calibration/findings.py",
+    "simharness/world/scene/objects/materials.py", "mvpose/calibration/findings.py",
     "simharness/outputs/study/curves.py", "simharness/outputs/validation/tables.py",
     "simharness/reality/detector_fit/fit_table.py",
     "simharness/reality/detector_fit/profile.py", "simharness/study/causes/cause_catalogue.py",

@@ -31,7 +31,7 @@ from simharness.world.motion.activities.gait import (
 )
 from simharness.world.motion.activity_registry import Activity, activity
 from simharness.world.motion.motion import Motion, Performance, Prop
-from simharness.world.motion.paths import Spot
+from simharness.world.motion.paths import Itinerary, Route, Spot, turning_time
 from simharness.world.motion.poses.foot_placement import Footprints, spot_to_world
 from simharness.world.motion.poses.inverse_kinematics import (
     Foot,
@@ -42,7 +42,6 @@ from simharness.world.motion.poses.inverse_kinematics import (
 )
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import blend, limbs, relaxed_posture, smoothstep
-from simharness.world.motion.routes import Itinerary, Route, turning_time
 
 LOOKAHEAD = 3.0
 """Seconds for which a route must be known beyond the last time: poses depend on the steps that follow."""

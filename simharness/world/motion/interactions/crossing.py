@@ -18,11 +18,10 @@ from simharness.types.random_streams import stream
 from simharness.world.motion.activities.route_walking import LOOKAHEAD, walk_route
 from simharness.world.motion.activity_registry import Activity, activity
 from simharness.world.motion.motion import Performance
-from simharness.world.motion.paths import Spot
+from simharness.world.motion.paths import Itinerary, Route, Spot, turning_time, walking_time
 from simharness.world.motion.poses.foot_placement import spot_to_world
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease
-from simharness.world.motion.routes import Itinerary, Route, turning_time, walking_time
 
 _LENGTH = 3.0  # metres of a lane
 _FROUDE = 0.33  # of the stroll: speed over sqrt(g x leg length)

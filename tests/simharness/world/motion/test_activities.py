@@ -12,9 +12,8 @@ from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.activity_registry import activities, solo_activity
 from simharness.world.motion.motion import Motion, Performance, motion_clock
-from simharness.world.motion.paths import SWAY, Loop, Spot, make_loop
+from simharness.world.motion.paths import SWAY, Itinerary, Loop, Route, Spot, make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.routes import Itinerary, Route
 
 SOLO = {name: each for name, each in activities().items() if each.performers == 1}
 TIME = motion_clock(8.0, margin=1.0)

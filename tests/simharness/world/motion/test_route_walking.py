@@ -10,6 +10,7 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.motion.activities.gait import make_gait, similar_walk_ratio
 from simharness.world.motion.activities.route_walking import following_height, walk_route
+from simharness.world.motion.paths import Itinerary
 from simharness.world.motion.poses.inverse_kinematics import (
     Foot,
     Pelvis,
@@ -18,7 +19,6 @@ from simharness.world.motion.poses.inverse_kinematics import (
     pelvis_height,
     solve_legs,
 )
-from simharness.world.motion.routes import Itinerary
 
 TIME = np.arange(-0.5, 11.0, 1 / 60)
 BENT = np.radians(6.0)

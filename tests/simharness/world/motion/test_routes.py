@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simharness.world.motion.routes import Itinerary, turning_time, walking_time
+from simharness.world.motion.paths import Itinerary, turning_time, walking_time
 
 TIME = np.arange(-2.0, 20.0, 1 / 240)
 

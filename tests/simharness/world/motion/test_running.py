@@ -6,7 +6,7 @@ from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.activities.gait import RUN
-from simharness.world.motion.activities.running import make_stride, run
+from simharness.world.motion.activities.round_loops import make_stride, run
 from simharness.world.motion.paths import make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
 

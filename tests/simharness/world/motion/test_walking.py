@@ -10,7 +10,7 @@ from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.activities.gait import WALK, make_gait
-from simharness.world.motion.activities.walking import walk
+from simharness.world.motion.activities.round_loops import walk
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import SWAY, Loop, make_loop
 from simharness.world.motion.poses.kinematics import Kinematics

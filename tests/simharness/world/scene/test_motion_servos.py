@@ -14,7 +14,7 @@ from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.mujoco_model import person_spec
 from simharness.world.humans.shape import Shape
-from simharness.world.motion.activities.walking import walk
+from simharness.world.motion.activities.round_loops import walk
 from simharness.world.motion.motion import RATE, Motion, Trajectory, motion_clock
 from simharness.world.motion.paths import make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
