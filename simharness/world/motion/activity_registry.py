@@ -3,7 +3,7 @@
 How to add an activity:
 
 1. Write one module in ``activities/`` (one person) or ``interactions/`` (two people). Decorate its function with
-   :func:`solo_activity` if it moves one body and uses no props, otherwise with :func:`activity`::
+   :func:`solo_activity` if it moves one body, otherwise with :func:`activity`::
 
        @solo_activity("squat", clearance=0.2)
        def squat(kinematics, spot, time, *, rng, pace) -> Motion: ...
@@ -22,7 +22,7 @@ A gesture of a standing person is shorter still: one function in ``activities/ge
 curves, with the decorator that is defined there, and its name as in step 2.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -36,7 +36,7 @@ from mvpose.arrays import Floats
 from simharness.scenario.sections.people_section import ActivityName, PeopleSection
 from simharness.world.motion.motion import Motion, Performance
 from simharness.world.motion.paths import Loop, Route, Spot, Track
-from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.kinematics import Cast
 
 _PACKAGES = ("simharness.world.motion.activities", "simharness.world.motion.interactions")
 _STROLL = (0.28, 0.39)  # Froude numbers: people stroll in a room; 0.42 is comfortable outdoors
@@ -44,7 +44,7 @@ _ON_THE_WAY = frozenset({"cross", "swap", "hide", "visit"})
 _registered: "dict[str, Activity]" = {}
 
 Perform = TypeVar("Perform", bound=Callable[..., Performance])
-Move = TypeVar("Move", bound=Callable[..., Motion])
+Move = TypeVar("Move", bound=Callable[..., Motion | Performance])
 
 
 @dataclass(frozen=True)
@@ -91,9 +91,9 @@ def activity(name: str, **attributes: Any) -> Callable[[Perform], Perform]:
 
 
 def solo_activity(name: str, **attributes: Any) -> Callable[[Move], Move]:
-    """Register the decorated function as an activity of one person without props; arguments as for :func:`activity`.
+    """Register the decorated function as an activity of one person; arguments as for :func:`activity`.
 
-    The function takes one ``Kinematics`` instead of a sequence and returns a :class:`Motion`.
+    The function takes one ``Kinematics`` instead of a sequence; without props it may return the :class:`Motion` alone.
     """
 
     def register(move: Move) -> Move:
@@ -103,14 +103,13 @@ def solo_activity(name: str, **attributes: Any) -> Callable[[Move], Move]:
     return register
 
 
-def solo(move: Callable[..., Motion]) -> Callable[..., Performance]:
-    """Return ``move``, a function of one ``Kinematics`` that returns a motion, as an ``Activity.perform``."""
+def solo(move: Callable[..., Motion | Performance]) -> Callable[..., Performance]:
+    """Return ``move``, a function of one ``Kinematics``, as an ``Activity.perform``."""
 
-    def perform(
-        performers: Sequence[Kinematics], track: Track, time: Floats, *, rng: np.random.Generator, pace: float
-    ) -> Performance:
+    def perform(performers: Cast, track: Track, time: Floats, *, rng: np.random.Generator, pace: float) -> Performance:
         (kinematics,) = performers
-        return Performance((move(kinematics, track, time, rng=rng, pace=pace),))
+        made = move(kinematics, track, time, rng=rng, pace=pace)
+        return made if isinstance(made, Performance) else Performance((made,))
 
     return perform
 

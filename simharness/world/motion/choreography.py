@@ -15,7 +15,7 @@ from simharness.world.motion.activity_registry import Activity, configured_activ
 from simharness.world.motion.contact import ContactModel, SampledBody
 from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Loop, RecordedPath, Route, Spot, Track, rotation_2d
-from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.kinematics import Cast, Kinematics
 from simharness.world.motion.visits import Door, Visitor, draw_doors
 
 _PACE = (1.05, 1.25)  # steps in a room are short and quick
@@ -41,7 +41,7 @@ class Group:
 
 def choreograph(
     scenario: Scenario,
-    cast: Sequence[Kinematics],
+    cast: Cast,
     time: Floats,
     *,
     widest: float | None = None,
@@ -164,7 +164,7 @@ def _recorded(scenario: Scenario) -> Activity:
     return Activity("mocap", solo(perform))
 
 
-def _reenacted(scenario: Scenario, cast: Sequence[Kinematics], time: Floats) -> tuple[Motion, ...]:
+def _reenacted(scenario: Scenario, cast: Cast, time: Floats) -> tuple[Motion, ...]:
     """Return the motions of people who re-enact recorded ones.
 
     Raises:
@@ -202,7 +202,7 @@ class _Stage:
         self,
         scenario: Scenario,
         groups: Sequence[Group],
-        cast: Sequence[Kinematics],
+        cast: Cast,
         time: Floats,
         doors: tuple[Door, ...],
     ) -> None:

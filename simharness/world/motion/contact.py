@@ -1,6 +1,5 @@
 """Interpenetration of people, measured by MuJoCo with the contact geometry of their bodies."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -9,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Bools, Floats
 from simharness.world.motion.motion import ALWAYS, Motion, Presence
-from simharness.world.motion.poses.kinematics import Addresses, Kinematics
+from simharness.world.motion.poses.kinematics import Addresses, Cast, Kinematics
 
 _FLESH = 0.15  # metres: largest extent of a body beyond the heads of its bones
 
@@ -42,7 +41,7 @@ class ContactModel:
         cast: bodies, in the order of the people.
     """
 
-    def __init__(self, cast: Sequence[Kinematics]) -> None:
+    def __init__(self, cast: Cast) -> None:
         self._cast = tuple(cast)
         self._pairs: dict[tuple[int, int], _Pair] = {}
 

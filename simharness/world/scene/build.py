@@ -29,7 +29,7 @@ from simharness.world.humans.wardrobe import Look, camouflaged, draw_looks
 from simharness.world.motion.choreography import choreograph
 from simharness.world.motion.mocap import load_people, recorded_shape
 from simharness.world.motion.motion import Motion, Presence, held, motion_clock
-from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.kinematics import Cast, Kinematics
 from simharness.world.scene.dynamics.motion_servos import planned_push, track
 from simharness.world.scene.objects.laboratory import make_prop
 from simharness.world.scene.objects.solids import Solid
@@ -165,7 +165,7 @@ def _shapes(scenario: Scenario) -> list[Shape]:
     return [recorded_shape(shape, recorded, i) for i, shape in enumerate(shapes)]
 
 
-def compile_model(cast: Sequence[Kinematics], solids: Sequence[Solid]) -> mujoco.MjModel:
+def compile_model(cast: Cast, solids: Sequence[Solid]) -> mujoco.MjModel:
     """Compile people and solids to one MuJoCo model: see :class:`Scene`."""
     spec = mujoco.MjSpec()
     spec.modelname = "scene"

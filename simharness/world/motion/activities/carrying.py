@@ -1,14 +1,14 @@
 """Activity "carry": lift a box, step aside with it, and put it down."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.activity_registry import activity
+from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion, Performance, Prop, Trajectory
-from simharness.world.motion.paths import Spot, Track
+from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import (
     Footprint,
     foot_path,
@@ -33,13 +33,9 @@ _TOE_ROOM = 0.02  # metres between the toes and the box
 _CARRIED = (0.62, -0.58)  # hands while carrying: ahead of and above the shoulders, as fractions of the arm length
 
 
-@activity("carry", clearance=0.5)
-def carry(
-    performers: Sequence[Kinematics], track: Track, time: Floats, *, rng: np.random.Generator, pace: float
-) -> Performance:
+@solo_activity("carry", clearance=0.5)
+def carry(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Performance:
     """Lift a box from the floor, step aside with it, put it down, straighten up; then carry it back."""
-    (kinematics,) = performers
-    assert isinstance(track, Spot)
     sense, big, tall, far = rng.uniform(size=4)
     stature = kinematics.body.stature
     depth, width = 0.14 * stature, (0.19 + 0.05 * big) * stature
@@ -64,13 +60,13 @@ def carry(
         for side, starts in zip(order, (lifted + 0.05, lifted + half), strict=True):
             steps[side].append((starts, starts + 0.9 * half, prints[side].moved(0.0, target + shift / 2)))
     low, up, hold, aside = (minimum_jerk(u, *keys) for keys in (low_keys, up_keys, hold_keys, aside_keys))
-    feet = {side: foot_path(kinematics, track, u, prints[side], steps[side], lift=0.04) for side in SIDES}
-    motion = _bend(kinematics, track, time, prints["left"], low, up, aside, feet, relaxed_posture(time, rng))
+    feet = {side: foot_path(kinematics, spot, u, prints[side], steps[side], lift=0.04) for side in SIDES}
+    motion = _bend(kinematics, spot, time, prints["left"], low, up, aside, feet, relaxed_posture(time, rng))
 
     once = np.zeros(1)
-    standing = {side: foot_path(kinematics, track, once, prints[side]) for side in SIDES}
-    lowest = _bend(kinematics, track, once, prints["left"], once + 1, once, once - shift / 2, standing, {})
-    (shoulders,) = _in_spot(track, _shoulders(kinematics, lowest))
+    standing = {side: foot_path(kinematics, spot, once, prints[side]) for side in SIDES}
+    lowest = _bend(kinematics, spot, once, prints["left"], once + 1, once, once - shift / 2, standing, {})
+    (shoulders,) = _in_spot(spot, _shoulders(kinematics, lowest))
     arm = kinematics.arms["left"]
     length, apart = np.linalg.norm(arm.end - arm.anchors[0]), width / 2 - arm.anchors[0, 1]
     toes = kinematics.soles["left"][:, 0].max() + prints["left"].place[0]
@@ -83,17 +79,17 @@ def carry(
     # In the air the box moves with the shoulders, because the arms that hold it do.
     below = np.append(held, grip[2]) - shoulders
     ahead = np.array([_CARRIED[0] * length, 0.0, _CARRIED[1] * length])
-    hung = _in_spot(track, _shoulders(kinematics, motion)) + below + up[:, None] * (ahead - below) - grip
+    hung = _in_spot(spot, _shoulders(kinematics, motion)) + below + up[:, None] * (ahead - below) - grip
     on_floor = np.stack([np.full(len(time), held[0] - grip[0]), aside, np.zeros(len(time))], axis=-1)
     box = np.where(aloft[:, None], hung, on_floor)
     stretched = arm_angles(kinematics, shoulder_flexion=70.0, shoulder_abduction=5.0, elbow_flexion=25.0)
     close = arm_angles(kinematics, shoulder_flexion=20.0, shoulder_abduction=8.0, elbow_flexion=75.0)
     grasp = stretched + up[:, None] * (close - stretched)
     for side, outward in zip(SIDES, (1.0, -1.0), strict=True):
-        place = spot_to_world(track, box + grip + [0.0, outward * width / 2, 0.0])
+        place = spot_to_world(spot, box + grip + [0.0, outward * width / 2, 0.0])
         motion = reach_with(kinematics, motion, side, place, weight=hold, guess=grasp)
-    turn = np.tile([np.cos(track.bearing / 2), 0.0, 0.0, np.sin(track.bearing / 2)], (len(time), 1))
-    pose = np.concatenate([spot_to_world(track, box), turn], axis=1)
+    turn = np.tile([np.cos(spot.bearing / 2), 0.0, 0.0, np.sin(spot.bearing / 2)], (len(time), 1))
+    pose = np.concatenate([spot_to_world(spot, box), turn], axis=1)
     return Performance((motion,), (Prop("box", (float(depth), float(width), float(height)), Trajectory(time, pose)),))
 
 

@@ -9,7 +9,7 @@ Activities: "visit", coming in, walking from place to place, and going out again
 with curtains, in which no camera sees the person for a while.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -29,7 +29,7 @@ from simharness.world.motion.activities.gait import (
     similar_walk_ratio,
     walking_posture,
 )
-from simharness.world.motion.activity_registry import Activity, activity
+from simharness.world.motion.activity_registry import Activity, solo, solo_activity
 from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Itinerary, Route, Spot, turning_time
 from simharness.world.motion.poses.foot_placement import Footprints, spot_to_world
@@ -238,12 +238,9 @@ def following_height(
     return np.asarray(BSpline(knots, lowest, 3)(time))
 
 
-@activity("visit", track=Route)
-def visit(
-    performers: Sequence[Kinematics], route: Route, time: Floats, *, rng: np.random.Generator, pace: float
-) -> Performance:
+@solo_activity("visit", track=Route)
+def visit(mover: Kinematics, route: Route, time: Floats, *, rng: np.random.Generator, pace: float) -> Performance:
     """Walk along a route and stand where it stops; absent where the route is outside of the room."""
-    (mover,) = performers
     return Performance((walk_route(mover, route, time, rng=rng, pace=pace),), presence=(route.presence,))
 
 
@@ -258,21 +255,14 @@ _HIDDEN = PeopleSection().hidden
 
 
 def _configured(each: Activity, people: PeopleSection) -> Activity:
-    return replace(each, perform=partial(hide, hidden=people.hidden))
+    return replace(each, perform=solo(partial(hide, hidden=people.hidden)))
 
 
-@activity("hide", clearance=_ENDS, configured=_configured)
+@solo_activity("hide", clearance=_ENDS, configured=_configured)
 def hide(
-    performers: Sequence[Kinematics],
-    spot: Spot,
-    time: Floats,
-    *,
-    rng: np.random.Generator,
-    pace: float,
-    hidden: float = _HIDDEN,
+    mover: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float, hidden: float = _HIDDEN
 ) -> Performance:
     """Walk through the booth, turn round on the other side, and come back, again and again."""
-    (mover,) = performers
     speed = _FROUDE * float(np.sqrt(_GRAVITY * mover.leg_length))
     offset, sense = rng.uniform(), rng.choice([-1.0, 1.0])
     rests = stream(int(rng.integers(1 << 31)), "hide")  # a longer time takes more draws, and changes no other

@@ -1,15 +1,14 @@
 """Activity "sit": sit down on a chair, and stand up again."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.activity_registry import activity
+from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Performance, Prop
-from simharness.world.motion.paths import Spot, Track
+from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses import foot_placement
 from simharness.world.motion.poses.inverse_kinematics import reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
@@ -49,13 +48,9 @@ class Seat:
         return np.stack([np.interp(lean, self.lean, self.hip[:, k]) for k in range(2)], axis=-1)
 
 
-@activity("sit", clearance=0.5)
-def sit(
-    performers: Sequence[Kinematics], track: Track, time: Floats, *, rng: np.random.Generator, pace: float
-) -> Performance:
+@solo_activity("sit", clearance=0.5)
+def sit(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Performance:
     """Sit down on a chair behind, stay, lean forward and stand up, repeatedly."""
-    (kinematics,) = performers
-    assert isinstance(track, Spot)
     low, wide, slouch, along = rng.uniform(size=4)
     u, marks = cycle_time(time, (1.4, 2.2, 1.4, 0.8), rng=rng, pace=pace)
     seat = fit_seat(kinematics, below_knee=0.05 + 0.04 * low)
@@ -71,22 +66,22 @@ def sit(
     prints = {side: foot_placement.stance(kinematics, side, apart=1.0 + 0.25 * wide).moved(-half) for side in SIDES}
     ankle = prints["left"].place[0]
     hip[:, 0] += ankle
-    pelvis, height = foot_placement.pelvis_from_hips(kinematics, track, hip, lean=lean)
+    pelvis, height = foot_placement.pelvis_from_hips(kinematics, spot, hip, lean=lean)
     curves = relaxed_posture(time, rng)
     blend(curves, seated, lumbar_flexion=6.0 + 6 * slouch, thorax_flexion=4.0 + 6 * slouch, neck_flexion=2.0)
     blend(curves, bow, lumbar_flexion=14.0, thorax_flexion=10.0, neck_flexion=-10.0)
     blend(curves, np.maximum(seated, bow), **limbs(shoulder_flexion=24.0, shoulder_abduction=10.0, elbow_flexion=58.0))
-    feet = {side: foot_placement.foot_path(kinematics, track, time, prints[side]) for side in SIDES}
+    feet = {side: foot_placement.foot_path(kinematics, spot, time, prints[side]) for side in SIDES}
     motion = solve_legs(kinematics, time, pelvis, height, feet, curves)
     lap = _knee(kinematics)[0] + ankle - (0.2 + 0.35 * along) * kinematics.leg_parts[0]
     for side in SIDES:
         place = foot_placement.spot_to_world(
-            track, [lap, prints[side].place[1], seat.height + _THIGH * kinematics.body.stature]
+            spot, [lap, prints[side].place[1], seat.height + _THIGH * kinematics.body.stature]
         )
         rested = ease((seated - 0.6) / 0.4)
         motion = reach_with(kinematics, motion, side, np.tile(place, (len(time), 1)), weight=rested)
-    middle = foot_placement.spot_to_world(track, [(seat.front + seat.back) / 2 + ankle, 0.0])
-    return Performance((motion,), (seat.chair(middle, track.bearing),))
+    middle = foot_placement.spot_to_world(spot, [(seat.front + seat.back) / 2 + ankle, 0.0])
+    return Performance((motion,), (seat.chair(middle, spot.bearing),))
 
 
 def _sitting_down(kinematics: Kinematics, seat: Seat, d: Floats, lean: Floats) -> Floats:

@@ -1,14 +1,14 @@
 """Activities by steps: "turn" on the spot, "step" onto a low block and down again, and "dance" from side to side."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import OTHER, SIDES
-from simharness.world.motion.activity_registry import activity, solo_activity
+from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion, Performance, Prop
-from simharness.world.motion.paths import Spot, Track
+from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import (
     Footprint,
     foot_path,
@@ -85,13 +85,9 @@ def turn(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gen
     return solve_standing(kinematics, time, pelvis, feet, curves, straightest=_STRAIGHTEST, fit=whole)
 
 
-@activity("step", clearance=0.3)
-def step(
-    performers: Sequence[Kinematics], track: Track, time: Floats, *, rng: np.random.Generator, pace: float
-) -> Performance:
+@solo_activity("step", clearance=0.3)
+def step(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Performance:
     """Step up onto a block ahead, one foot after the other, stand, and step down backwards."""
-    (kinematics,) = performers
-    assert isinstance(track, Spot)
     handed, tall, swing = rng.uniform(size=3)
     lead = "right" if handed < 0.6 else "left"
     trail = OTHER[lead]
@@ -129,16 +125,15 @@ def step(
     )
     aside = _over_standing_foot(u, steps, by=0.03)
     lean = np.radians(2.0) + np.radians(9.0) * (bump(u, 0.2, up) + 0.6 * bump(u, stood, down))
-    ground = spot_to_world(track, np.stack([ahead - forward / 2, aside], axis=-1))
-    pelvis = Pelvis.along(ground, track.bearing, lean=lean, list=0.8 * aside)
+    ground = spot_to_world(spot, np.stack([ahead - forward / 2, aside], axis=-1))
+    pelvis = Pelvis.along(ground, spot.bearing, lean=lean, list=0.8 * aside)
     # The trailing foot rises onto its toes, and lands on them when it steps down first.
     rolled = {
         lead: 0.0 * u,
         trail: -np.radians(38.0) * (bump(u, 0.6 * lead_up, up) + bump(u, stood + 0.2, lowered + 0.5)),
     }
     feet = {
-        side: foot_path(kinematics, track, u, prints[side], steps[side], pitch=rolled[side], lift=0.07)
-        for side in SIDES
+        side: foot_path(kinematics, spot, u, prints[side], steps[side], pitch=rolled[side], lift=0.07) for side in SIDES
     }
     curves = relaxed_posture(time, rng)
     moving = bump(u, 0.1, lead_up + 0.2) - bump(u, lead_up, up + 0.2)
@@ -149,8 +144,8 @@ def step(
     foot = kinematics.soles["left"]
     front, back = above["left"].place[0] + foot[:, 0].max(), above["left"].place[0] + foot[:, 0].min()
     depth = float(front - back) + 0.08
-    middle = spot_to_world(track, [(front + back) / 2, 0.0])
-    return Performance((motion,), (Prop.at_rest("step", (depth, 0.6, float(height)), middle, track.bearing),))
+    middle = spot_to_world(spot, [(front + back) / 2, 0.0])
+    return Performance((motion,), (Prop.at_rest("step", (depth, 0.6, float(height)), middle, spot.bearing),))
 
 
 def _over_standing_foot(u: Floats, steps: Steps, *, by: float) -> Floats:

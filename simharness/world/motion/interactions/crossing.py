@@ -5,7 +5,6 @@ half at the other, and all are in the middle at the same time: two people pass e
 through each other. Who passes closer than shoulders are wide turns them.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -20,7 +19,7 @@ from simharness.world.motion.activity_registry import Activity, activity
 from simharness.world.motion.motion import Performance
 from simharness.world.motion.paths import Itinerary, Route, Spot, turning_time, walking_time
 from simharness.world.motion.poses.foot_placement import spot_to_world
-from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.kinematics import Cast
 from simharness.world.motion.poses.timing import ease
 
 _LENGTH = 3.0  # metres of a lane
@@ -50,7 +49,7 @@ _PAIR: dict[str, Any] = {
 
 @activity("cross", **_PAIR)
 def cross(
-    performers: Sequence[Kinematics],
+    performers: Cast,
     spot: Spot,
     time: Floats,
     *,

@@ -3,7 +3,6 @@
 They pass an object back and forth, a bottle with one hand or a box with both, or shake their right hands.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +16,7 @@ from simharness.world.motion.motion import Motion, Performance, Prop, PropKind, 
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import spot_to_world
 from simharness.world.motion.poses.inverse_kinematics import reach_with
-from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.kinematics import Cast, Kinematics
 from simharness.world.motion.poses.timing import cycle_time, ease
 
 _BOX_CHANCE = 0.5
@@ -81,9 +80,7 @@ class _Course:
 
 
 @activity("hand_over", performers=2, clearance=0.5)
-def hand_over(
-    performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
-) -> Performance:
+def hand_over(performers: Cast, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Performance:
     """The first person holds out an object and the second takes it; then it is returned the same way."""
     box, bulk = rng.uniform() < _BOX_CHANCE, rng.uniform(size=3)
     item = _box(bulk) if box else _bottle(bulk)
@@ -115,7 +112,7 @@ def _box(bulk: Floats) -> _Item:
     return _Item("box", (float(deep), float(wide), float(tall)), (0.25 * tall, 0.75 * tall), 0.3 * deep)
 
 
-def _item_path(performers: Sequence[Kinematics], meeting: Meeting, item: _Item, given: Floats) -> Floats:
+def _item_path(performers: Cast, meeting: Meeting, item: _Item, given: Floats) -> Floats:
     """Return the centre of the underside of the object, (T, 3) metres, from its position ``given`` (T,)."""
     tall = item.size[2]
     middle = meeting.point - [0.0, 0.0, tall / 2]
@@ -156,9 +153,7 @@ _HELD_OUT = np.radians([40.0, 6.0, 15.0, 50.0, 5.0, 0.0])
 
 
 @activity("shake_hands", performers=2, clearance=0.5)
-def shake_hands(
-    performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
-) -> Performance:
+def shake_hands(performers: Cast, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Performance:
     """Hold out the right hands, shake them a few times and let go, repeatedly."""
     meeting = plan_meeting(performers, spot)
     amplitude, rate, phase = rng.uniform(*_SHAKEN), rng.uniform(*_SHAKE_RATE), rng.uniform(0, 2 * np.pi)

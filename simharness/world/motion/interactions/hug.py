@@ -15,7 +15,7 @@ from simharness.world.motion.motion import Motion, Performance
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses import inverse_kinematics
 from simharness.world.motion.poses.foot_placement import foot_path, spot_to_world, stance
-from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.kinematics import Cast, Kinematics
 from simharness.world.motion.poses.timing import Curves, bump, cycle_time, ease, limbs, relaxed_posture
 
 Role = Literal["over", "under"]
@@ -91,9 +91,7 @@ class _Course:
 
 
 @activity("hug", performers=2, clearance=0.4)
-def hug(
-    performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
-) -> Performance:
+def hug(performers: Cast, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Performance:
     """Step up to each other, hug and step back; the taller person's arms go over the other's shoulders."""
     u, marks = cycle_time(time, (1.5, 2.1, 0.8, 1.5, 0.6), rng=rng, pace=pace)
     course = _Course(*marks[1:])
@@ -108,7 +106,7 @@ def hug(
 
 
 def _fit_pair(
-    performers: Sequence[Kinematics], roles: tuple[Role, Role], course: _Course
+    performers: Cast, roles: tuple[Role, Role], course: _Course
 ) -> tuple[float, tuple[float | None, float | None]]:
     """Return the pelvis distance in metres at which the bodies just touch, and the wrap of each person.
 
@@ -146,9 +144,7 @@ def _shifted(motion: Motion, ahead: float) -> Motion:
     return Motion(motion.time, root, motion.angles)
 
 
-def _places(
-    performers: Sequence[Kinematics], middle: Spot, distance: float
-) -> Iterator[tuple[Kinematics, Spot, float]]:
+def _places(performers: Cast, middle: Spot, distance: float) -> Iterator[tuple[Kinematics, Spot, float]]:
     """Yield both with the spots from which they step up to a pelvis distance in metres, and their leans in degrees."""
     first, second = (_STEP * mover.leg_length for mover in performers)
     apart = distance + first + second
@@ -197,7 +193,7 @@ def _steps(
 
 
 def _embrace(
-    performers: Sequence[Kinematics],
+    performers: Cast,
     approached: Sequence[Motion],
     person: int,
     role: Role,

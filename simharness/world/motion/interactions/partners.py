@@ -1,6 +1,5 @@
 """Two people face to face: distance, lean, gaze and reach, so that their hands meet."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,7 @@ from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import spot_to_world
 from simharness.world.motion.poses.inverse_kinematics import shoulder_girdle
-from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.kinematics import Cast, Kinematics
 
 _SAG = 0.02  # metres: height difference between standing upright and relaxed
 _STRETCHED = 0.93  # comfortable distance of a hand from the shoulder, in arm lengths
@@ -47,9 +46,7 @@ def face_to_face(middle: Spot, distance: float, *, share: float = 0.5, aside: fl
     return Spot(first, middle.bearing), Spot(second, middle.bearing + np.pi)
 
 
-def plan_meeting(
-    performers: Sequence[Kinematics], middle: Spot, *, raised: float = 0.5, stretched: float = _STRETCHED
-) -> Meeting:
+def plan_meeting(performers: Cast, middle: Spot, *, raised: float = 0.5, stretched: float = _STRETCHED) -> Meeting:
     """Return spots of two people, such that their right hands, or both hands, meet at one point between them.
 
     The height of the point is the mean of the heights that are natural for both; a person too tall for it bends.

@@ -16,7 +16,7 @@ from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.foot_placement import foot_path, pelvis_from_hips, spot_to_world, stance
 from simharness.world.motion.poses.inverse_kinematics import PALM_DOWN, reach_with, solve_legs
-from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.kinematics import Cast, Kinematics
 from simharness.world.motion.poses.timing import blend, draw_side, gesture_envelope, relaxed_posture, smooth_noise
 
 _SEATED = 0.65  # probability that they sit
@@ -47,9 +47,7 @@ class _Place:
 
 
 @activity("table", performers=2, clearance=0.7)
-def table(
-    performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
-) -> Performance:
+def table(performers: Cast, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Performance:
     """Sit or stand at opposite sides of a table; each person talks, writes or reaches, and they differ."""
     seated = rng.uniform() < _SEATED
     depth, width = rng.uniform(*_DEPTH), rng.uniform(*_WIDTH)
@@ -78,7 +76,7 @@ def table(
     return Performance(tuple(motions), tuple(props))
 
 
-def _top(performers: Sequence[Kinematics], seats: Sequence[Seat]) -> float:
+def _top(performers: Cast, seats: Sequence[Seat]) -> float:
     """Return the height of a table that suits both people, metres."""
     if seats:
         heights = [seat.height for seat in seats]

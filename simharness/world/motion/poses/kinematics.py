@@ -194,6 +194,10 @@ class Kinematics:
         )
 
 
+Cast = Sequence[Kinematics]
+"""Bodies in the order of the people."""
+
+
 @dataclass(frozen=True)
 class LinearPose:
     """Joints and feet over T frames, and their derivatives by the pose.

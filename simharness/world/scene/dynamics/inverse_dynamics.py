@@ -24,16 +24,15 @@ class InverseDynamics:
 
     Args:
         model: MuJoCo model of all people and solids; it is copied.
-        root_dofs, hinge_dofs: indices of the degrees of freedom of each person in ``qvel``, (6,) and (D,).
+        root_dofs, hinge_dofs: indices of the degrees of freedom of each person in ``qvel``, (P, 6) and (P, D).
     """
 
-    def __init__(self, model: mujoco.MjModel, root_dofs: Sequence[Integers], hinge_dofs: Sequence[Integers]) -> None:
+    def __init__(self, model: mujoco.MjModel, root_dofs: Integers, hinge_dofs: Integers) -> None:
         self._model = copy(model)
         self._model.geom_margin[:] = _NEAR
         self._data = mujoco.MjData(self._model)
         self._root_dofs, self._hinge_dofs = root_dofs, hinge_dofs
-        pelvises = [int(model.dof_bodyid[dofs[0]]) for dofs in root_dofs]
-        owner = {int(model.body_rootid[pelvis]): i for i, pelvis in enumerate(pelvises)}
+        owner = {int(root): i for i, root in enumerate(model.body_rootid[model.dof_bodyid[root_dofs[:, 0]]])}
         self._owner = np.array([owner.get(int(root), -1) for root in model.body_rootid])
         self._all = np.empty(model.nv)
         # Degrees of freedom that move each body: those of its joints and of the joints of its ancestors.
@@ -41,7 +40,7 @@ class InverseDynamics:
         for body in range(1, model.nbody):
             self._moves[body] = self._moves[model.body_parentid[body]]
             self._moves[body, model.body_dofadr[body] :][: model.body_dofnum[body]] = 1.0
-        self._dofs = [np.concatenate([root, hinges]) for root, hinges in zip(root_dofs, hinge_dofs, strict=True)]
+        self._dofs = np.concatenate([root_dofs, hinge_dofs], axis=1)
 
     def torques(self, qpos: Floats, qvel: Floats, qacc: Floats, mocap: Sequence[tuple[int, Floats]]) -> Floats:
         """Return the hinge torques at one time, (P, D), N m.
@@ -61,7 +60,7 @@ class InverseDynamics:
         mujoco.mj_collision(model, data)
         mujoco.mj_comVel(model, data)
         mujoco.mj_rne(model, data, 1, self._all)
-        result = np.stack([self._all[hinges] for hinges in self._hinge_dofs])
+        result = self._all[self._hinge_dofs]
         contact = data.contact
         bodies = model.geom_bodyid[contact.geom]
         carries = np.clip(1 - contact.dist / _NEAR, 0.0, 1.0) ** 2

@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mvpose.arrays import Floats, Integers
+from mvpose.arrays import Floats
 from simharness.scenario.sections.people_section import PushSection
 from simharness.world.humans.anatomy import ANATOMY, DOFS
 from simharness.world.humans.body import Body
@@ -116,32 +116,8 @@ def track(
         return ()
     tracker = MotionServos(model, bodies, motions, assist=assist, solids=solids, pushes=pushes)
     configurations = np.array(list(tracker.run()))
-    return tuple(
-        Motion(tracker.time, configurations[:, person.root], configurations[:, person.hinges])
-        for person in tracker.people
-    )
-
-
-@dataclass(frozen=True)
-class _Person:
-    """Indices of one person in the arrays of MuJoCo, and strength of the joints.
-
-    Attributes:
-        pelvis: body index of the pelvis.
-        mass: mass in kilograms.
-        root, hinges: indices in ``qpos``, (7,) and (D,).
-        root_dofs, hinge_dofs: indices in ``qvel``, (6,) and (D,).
-        stiffness, strength: stiffness and maximum torque of the hinges, (D,).
-    """
-
-    pelvis: int
-    mass: float
-    root: Integers
-    hinges: Integers
-    root_dofs: Integers
-    hinge_dofs: Integers
-    stiffness: Floats
-    strength: Floats
+    people = zip(tracker.roots, tracker.hinges, strict=True)
+    return tuple(Motion(tracker.time, configurations[:, root], configurations[:, hinges]) for root, hinges in people)
 
 
 class MotionServos:
@@ -149,7 +125,10 @@ class MotionServos:
 
     Attributes:
         time: times of the plans, (T,), seconds.
-        people: indices of the people in the arrays of MuJoCo.
+        roots, hinges: indices of the people in ``qpos``, (P, 7) and (P, D).
+        root_dofs, hinge_dofs: their indices in ``qvel``, (P, 6) and (P, D).
+        pelvises: body indices of their pelvises, (P,).
+        masses: kilograms, (P, 1).
         model: copy of the model, with the damping of the servos.
         data: MuJoCo state; ``xfrc_applied`` is the assistance of the pelvises and the pushes.
     """
@@ -173,7 +152,16 @@ class MotionServos:
         self._assist = assist
         self._pushes = tuple(pushes)
         self._pushed = [int(self.model.body(f"person{push.person}/{push.bone}").id) for push in pushes]
-        self.people = tuple(_person(self.model, body, f"person{i}/") for i, body in enumerate(bodies))
+        people = [[self.model.joint(f"person{i}/{name}") for name in ("root", *DOFS)] for i in range(len(bodies))]
+        self.roots = np.stack([root.qposadr[0] + np.arange(7) for root, *_ in people])
+        self.root_dofs = np.stack([root.dofadr[0] + np.arange(6) for root, *_ in people])
+        self.hinges = np.array([[hinge.qposadr[0] for hinge in hinges] for _, *hinges in people])
+        self.hinge_dofs = np.array([[hinge.dofadr[0] for hinge in hinges] for _, *hinges in people])
+        self.pelvises = np.array([self.model.body(f"person{i}/{each.bones[0]}").id for i, each in enumerate(bodies)])
+        self.masses = self.model.body_subtreemass[self.pelvises][:, None]
+        sizes = self.masses * [[each.stature] for each in bodies] / _ADULT
+        servos = [servo for dof in DOFS for joint, servo in ANATOMY["servos"].items() if joint in dof.split("_")]
+        self._stiffness, self._strength = (sizes * each for each in np.array(servos).T)
         self._moving = [solid for solid in solids if solid.trajectory is not None]
         self._mocap = [int(self.model.body(solid.name).mocapid[0]) for solid in self._moving]
         for solid in self._moving:
@@ -188,20 +176,9 @@ class MotionServos:
         self.model.opt.o_solref[:] = _CONTACT_TIME, 1.0
         self.model.opt.impratio = 10.0  # otherwise feet slide slowly
         self.model.opt.o_solimp[:3] = 0.95, 0.99, 0.001
-        for person in self.people:
-            self.model.dof_damping[person.hinge_dofs] = _DAMPING * person.stiffness
-        self._pelvises = np.array([person.pelvis for person in self.people])
-        self._masses = np.array([[person.mass] for person in self.people])
-        self._roots = np.stack([person.root for person in self.people])
-        self._root_dofs = np.stack([person.root_dofs for person in self.people])
-        self._hinges = np.concatenate([person.hinges for person in self.people])
-        self._hinge_dofs = np.concatenate([person.hinge_dofs for person in self.people])
-        self._stiffness = np.concatenate([person.stiffness for person in self.people])
-        self._strength = np.concatenate([person.strength for person in self.people])
+        self.model.dof_damping[self.hinge_dofs] = _DAMPING * self._stiffness
         self.data = mujoco.MjData(self.model)
-        self._inverse_dynamics = InverseDynamics(
-            self.model, [person.root_dofs for person in self.people], [person.hinge_dofs for person in self.people]
-        )
+        self._inverse_dynamics = InverseDynamics(self.model, self.root_dofs, self.hinge_dofs)
 
     def run(self) -> Iterator[Floats]:
         """Yield the configuration ``qpos`` at each time: as planned at the first, then as simulated."""
@@ -229,27 +206,26 @@ class MotionServos:
     def _configuration(self, plan: "_Plan", k: int) -> tuple[Floats, Floats]:
         """Return the planned ``qpos`` and ``qvel`` of all people at index ``k`` of the plan."""
         qpos, qvel = np.empty(self.model.nq), np.empty(self.model.nv)
-        for i, person in enumerate(self.people):
-            qpos[person.root], qpos[person.hinges] = plan.roots[k, i], plan.angles[k, i]
-            qvel[person.root_dofs[:3]], qvel[person.root_dofs[3:]] = plan.velocities[k, i], plan.spins[k, i]
-            qvel[person.hinge_dofs] = plan.speeds[k, i]
+        qpos[self.roots], qpos[self.hinges] = plan.roots[k], plan.angles[k]
+        qvel[self.root_dofs[:, :3]], qvel[self.root_dofs[:, 3:]] = plan.velocities[k], plan.spins[k]
+        qvel[self.hinge_dofs] = plan.speeds[k]
         return qpos, qvel
 
     def _feedforward(self, frames: Floats, plan: "_Plan", placements: list[Floats]) -> Floats:
-        """Return hinge torques of the plan, (n, P D); computed at the times ``frames``, interpolated in between."""
+        """Return hinge torques of the plan, (n, P, D); computed at the times ``frames``, interpolated in between."""
         count, every = len(plan.angles), self._substeps
         states = [self._configuration(plan, k) for k in range(0, count, every)]
         speeds = np.array([qvel for _, qvel in states])
         accelerations = np.gradient(speeds, frames, axis=0) if len(frames) > 1 else np.zeros_like(speeds)
         known = np.array(
             [
-                self._inverse_dynamics.torques(*state, accelerations[k], self._placed(placements, k * every)).ravel()
+                self._inverse_dynamics.torques(*state, accelerations[k], self._placed(placements, k * every))
                 for k, state in enumerate(states)
             ]
         )
         at = np.minimum(np.arange(count) / every, len(known) - 1)
         before = np.minimum(at.astype(int), max(len(known) - 2, 0))
-        share = (at - before)[:, None]
+        share = (at - before)[:, None, None]
         return (1 - share) * known[before] + share * known[np.minimum(before + 1, len(known) - 1)]
 
     def _place(self, placements: list[Floats], k: int) -> None:
@@ -264,17 +240,16 @@ class MotionServos:
         """Advance by one step to index ``k`` of the plan."""
         data = self.data
         self._place(placements, k)
-        speed = data.qvel[self._hinge_dofs]
-        off = plan.angles[k].ravel() - data.qpos[self._hinges] - self.model.opt.timestep * speed
+        speed = data.qvel[self.hinge_dofs]
+        off = plan.angles[k] - data.qpos[self.hinges] - self.model.opt.timestep * speed
         adherence = self._adherence(plan, k)
-        wanted = np.repeat(adherence, len(DOFS)) * feedforward + self._stiffness * (
-            off + _DAMPING * (plan.speeds[k].ravel() - speed)
-        )
+        servo = self._stiffness * (off + _DAMPING * (plan.speeds[k] - speed))
+        wanted = adherence[:, None] * feedforward + servo
         torque = np.clip(wanted, -self._strength, self._strength)
         # The damping of the model, which MuJoCo integrates implicitly, is part of the servo: compensate for it here.
-        data.qfrc_applied[self._hinge_dofs] = torque + _DAMPING * self._stiffness * speed
+        data.qfrc_applied[self.hinge_dofs] = torque + _DAMPING * self._stiffness * speed
         data.xfrc_applied[self._pushed] = 0.0
-        data.xfrc_applied[self._pelvises] = self._assistance(plan, adherence, k)
+        data.xfrc_applied[self.pelvises] = self._assistance(plan, adherence, k)
         for push, bone in zip(self._pushes, self._pushed, strict=True):
             if share := push.share(time, self.model.opt.timestep):
                 data.xfrc_applied[bone, :3] += share * np.array(push.force)
@@ -282,18 +257,18 @@ class MotionServos:
 
     def _adherence(self, plan: "_Plan", k: int) -> Floats:
         """Return the weight of the plan of each person, (P,): 1 near the planned pelvis, 0 out of reach of it."""
-        off = np.linalg.norm(plan.roots[k, :, :3] - self.data.qpos[self._roots[:, :3]], axis=1)
+        off = np.linalg.norm(plan.roots[k, :, :3] - self.data.qpos[self.roots[:, :3]], axis=1)
         near, far = _REACH
         return np.clip((far - off) / (far - near), 0.0, 1.0)
 
     def _assistance(self, plan: "_Plan", adherence: Floats, k: int) -> Floats:
         """Return bounded forces and torques (P, 6) that pull the pelvises towards their planned poses."""
-        root, speed = self.data.qpos[self._roots], self.data.qvel[self._root_dofs]  # (P, 7), (P, 6)
-        force = self._masses * _pull(plan.roots[k, :, :3] - root[:, :3], plan.velocities[k] - speed[:, :3])
+        root, speed = self.data.qpos[self.roots], self.data.qvel[self.root_dofs]  # (P, 7), (P, 6)
+        force = self.masses * _pull(plan.roots[k, :, :3] - root[:, :3], plan.velocities[k] - speed[:, :3])
         # Rotations and spins are about the axes of the pelvis, as in MuJoCo; the torque acts in world axes.
         turn = _between(root[:, 3:], plan.roots[k, :, 3:])
-        torque = self._masses * _GYRATION**2 * _pull(turn, plan.spins[k] - speed[:, 3:])
-        torque = (self.data.xmat[self._pelvises].reshape(-1, 3, 3) @ torque[..., None])[..., 0]
+        torque = self.masses * _GYRATION**2 * _pull(turn, plan.spins[k] - speed[:, 3:])
+        torque = (self.data.xmat[self.pelvises].reshape(-1, 3, 3) @ torque[..., None])[..., 0]
         return np.concatenate(
             [_bounded(force, adherence * self._assist), _bounded(torque, adherence * self._assist * LEVER)], axis=1
         )
@@ -339,26 +314,6 @@ def _bounded(vectors: Floats, most: Floats) -> Floats:
     """Return vectors (P, 3) shortened to a length of at most ``most`` (P,)."""
     length = np.sqrt((vectors**2).sum(axis=1))
     return np.asarray(vectors * np.minimum(1.0, most / np.maximum(length, 1e-12))[:, None])
-
-
-def _person(model: mujoco.MjModel, body: Body, prefix: str) -> _Person:
-    root = model.joint(f"{prefix}root")
-    hinges = [model.joint(f"{prefix}{name}") for name in DOFS]
-    pelvis = int(model.body(f"{prefix}{body.bones[0]}").id)
-    mass = float(model.body_subtreemass[pelvis])
-    size = mass * body.stature / _ADULT
-    servos = [servo for dof in DOFS for joint, servo in ANATOMY["servos"].items() if joint in dof.split("_")]
-    stiffness, strength = size * np.array(servos).T
-    return _Person(
-        pelvis=pelvis,
-        mass=mass,
-        root=root.qposadr[0] + np.arange(7),
-        hinges=np.array([hinge.qposadr[0] for hinge in hinges]),
-        root_dofs=root.dofadr[0] + np.arange(6),
-        hinge_dofs=np.array([hinge.dofadr[0] for hinge in hinges]),
-        stiffness=stiffness,
-        strength=strength,
-    )
 
 
 def _replace_foot_capsules(model: mujoco.MjModel) -> None:

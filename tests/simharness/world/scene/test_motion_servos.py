@@ -69,13 +69,13 @@ def test_only_gravity_moves_the_centre_of_mass_in_the_air():
     plan = standing(MAN, height=3.0, duration=0.5, left_elbow_flexion=40.0)
     waving = replace(plan, angles=plan.angles + 0.8 * np.sin(9 * plan.time[:, None]) * (plan.angles > 0))
     servos = MotionServos(room([MAN]), [MAN.body], [waving], assist=1e-9)
-    pelvis = servos.people[0].pelvis
+    pelvis = servos.pelvises[0]
     heights, elbow = [], []
     for qpos in servos.run():
         mujoco.mj_kinematics(servos.model, servos.data)
         mujoco.mj_comPos(servos.model, servos.data)
         heights.append(servos.data.subtree_com[pelvis, 2])
-        elbow.append(qpos[servos.people[0].hinges[DOFS.index("left_elbow_flexion")]])
+        elbow.append(qpos[servos.hinges[0, DOFS.index("left_elbow_flexion")]])
     fallen = heights[0] - np.array(heights)
     time = plan.time - plan.time[0]
     # The elbow's first velocity lifts a little; and MuJoCo moves by the velocity at the end of a step.
@@ -113,7 +113,7 @@ def test_a_walk_without_assistance_falls():
 def test_assistance_stays_within_its_bound():
     push = Push(person=0, start=0.3, duration=0.2, force=(1200.0, 0.0, 0.0))
     servos = MotionServos(room([MAN]), [MAN.body], [standing(MAN)], assist=150.0, pushes=[push])
-    pelvis = servos.people[0].pelvis
+    pelvis = servos.pelvises[0]
     forces, torques = [], []
     for _ in servos.run():
         if not 0.25 < servos.data.time + servos.time[0] < 0.55:
@@ -147,7 +147,7 @@ def test_a_push_changes_the_momentum_by_its_impulse(place):
     section = PushSection(time=0.1, duration=0.1037, impulse=40.0, direction=90.0, place=place)
     plan = standing(MAN, height=3.0, duration=0.5)
     servos = MotionServos(room([MAN]), [MAN.body], [plan], assist=1e-9, pushes=planned_push(section, [plan]))
-    pelvis, way, time = servos.people[0].pelvis, [], []
+    pelvis, way, time = servos.pelvises[0], [], []
     for _ in servos.run():
         mujoco.mj_kinematics(servos.model, servos.data)
         mujoco.mj_comPos(servos.model, servos.data)
@@ -156,7 +156,7 @@ def test_a_push_changes_the_momentum_by_its_impulse(place):
     moved, after = np.array(way) - way[0], np.array(time) - (0.1 + 0.1037 / 2)
     late = after > 0.1
     assert late.any()
-    expected = section.impulse / servos.people[0].mass * after[late]
+    expected = section.impulse / servos.masses[0, 0] * after[late]
     np.testing.assert_allclose(moved[late, 1], expected, rtol=0.03)  # MuJoCo moves by the velocity at a step's end
     assert np.abs(moved[:, 0]).max() < 2e-3
     assert np.abs(moved[np.array(time) < 0.1]).max() < 1e-3
@@ -221,7 +221,7 @@ def test_people_whose_plans_intersect_collide():
     deepest, met = 0.0, False
     happened = []
     for qpos in servos.run():
-        happened.append([qpos[person.root[:2]] for person in servos.people])
+        happened.append([qpos[root[:2]] for root in servos.roots])
         for contact in servos.data.contact:
             if 0 not in owner[contact.geom]:
                 met = True
