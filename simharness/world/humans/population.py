@@ -84,14 +84,8 @@ _ENDS = {
     "knee": ("left_knee", "left_ankle"),
 }
 # For every measure: the shape parameter with the largest effect on it.
-_PARAMETER = {
-    "stature": "height",
-    "bmi": "weight",
-    "upper_arm": "upper_arm",
-    "forearm": "forearm",
-    "thigh": "thigh",
-    "knee": "shank",
-}
+_PARAMETER = {"stature": "height", "bmi": "weight"} | {name: name for name in ("upper_arm", "forearm", "thigh")}
+_PARAMETER |= {"knee": "shank"}
 _UNITS = {"bmi": 50.0}  # kg/m2 that count as much as a metre
 _TOLERANCE, _ROUNDS = 2e-4, 25
 

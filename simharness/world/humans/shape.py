@@ -17,21 +17,17 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 
 # For every limb: its first bone, further bones that move its far half, and the bone at its end.
-_CHAINS: Mapping[str, tuple[str, tuple[str, ...], str]] = MappingProxyType(
-    {
-        "upper_arm": ("Arm", ("ArmTwist",), "ForeArm"),
-        "forearm": ("ForeArm", ("ForeArmTwist",), "Hand"),
-        "thigh": ("UpLeg", (), "Leg"),
-        "shank": ("Leg", (), "Foot"),
-    }
-)
+_CHAINS: Mapping[str, tuple[str, tuple[str, ...], str]] = {
+    "upper_arm": ("Arm", ("ArmTwist",), "ForeArm"),
+    "forearm": ("ForeArm", ("ForeArmTwist",), "Hand"),
+    "thigh": ("UpLeg", (), "Leg"),
+    "shank": ("Leg", (), "Foot"),
+}
 # For every width: the bones that are stretched sideways, and the bone at its ends.
-_WIDTHS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
-    {
-        "shoulders": (("Spine1", "LeftShoulder", "RightShoulder"), "Arm"),
-        "hips": (("Hips", "LHipJoint", "RHipJoint"), "UpLeg"),
-    }
-)
+_WIDTHS: Mapping[str, tuple[tuple[str, ...], str]] = {
+    "shoulders": (("Spine1", "LeftShoulder", "RightShoulder"), "Arm"),
+    "hips": (("Hips", "LHipJoint", "RHipJoint"), "UpLeg"),
+}
 STRETCHED: tuple[str, ...] = (*_CHAINS, *_WIDTHS)
 """Limbs and widths with a length factor, which holds for both sides."""
 
@@ -72,15 +68,9 @@ def _stretch(axis: Floats, factor: float) -> Floats:
 
 
 LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
-    {
-        "gender": (0.0, 1.0),
-        "age": (0.2, 1.0),
-        "muscle": (0.0, 1.0),
-        "weight": (-0.5, 2.5),
-        "height": (0.0, 1.0),
-        "proportions": (0.0, 1.0),
-        **dict.fromkeys(STRETCHED, (0.6, 1.6)),
-    }
+    dict.fromkeys(("gender", "muscle", "height", "proportions"), (0.0, 1.0))
+    | {"age": (0.2, 1.0), "weight": (-0.5, 2.5)}
+    | dict.fromkeys(STRETCHED, (0.6, 1.6))
 )
 """Least and greatest value of every shape parameter."""
 

@@ -10,7 +10,7 @@ Shares of accessories and their sources:
 - Which kind of hat, masks (3 %), hair styles and all colours are assumptions.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -72,20 +72,9 @@ HAIR_STYLES = ("short", "long", "bun", "bob", "ponytail", "curly")
 REPEATS = (6, 24)
 """Least and greatest number of repeats of a pattern around the body; a multiple of six closes around limbs too."""
 
-_CHOICES = {
-    "sleeves": tuple(SLEEVES),
-    "legs": tuple(LEGS),
-    "hem": tuple(HEMS),
-    "top_pattern": PATTERNS,
-    "bottom_pattern": PATTERNS,
-    "lower_garment": LOWER_GARMENTS,
-    "hair_style": HAIR_STYLES,
-    "expression": EXPRESSIONS,
-    "glasses": GLASSES,
-    "hat": HATS,
-    "mask": MASKS,
-    "bag": BAGS,
-}
+_CHOICES: dict[str, Collection[str]] = {"sleeves": SLEEVES, "legs": LEGS, "hem": HEMS, "lower_garment": LOWER_GARMENTS}
+_CHOICES |= {"top_pattern": PATTERNS, "bottom_pattern": PATTERNS, "hair_style": HAIR_STYLES, "expression": EXPRESSIONS}
+_CHOICES |= {"glasses": GLASSES, "hat": HATS, "mask": MASKS, "bag": BAGS}
 _NUMBERS = {"volume": (0.0, 2.0), "fit": (0.0, 1.0), "length": (0.3, 1.0), "beard": (0.0, 1.0), "bald": (0.0, 1.0)}
 
 

@@ -115,6 +115,11 @@ class LoopLimits:
     tightest: float
     """Smallest turning radius in metres."""
 
+    @property
+    def suffices(self) -> bool:
+        """Whether there is room for a speed that the person accepts."""
+        return self.speed >= self.slowest
+
 
 def loop_limits(speed: float, *, slowest: float, fastest: float, half: float, running: bool) -> LoopLimits:
     """Return the speeds that a square with half side ``half`` (metres) allows of the given ones (metres per second).

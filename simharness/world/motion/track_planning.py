@@ -352,12 +352,9 @@ def _check_room(request: TrackRequest, half: float, limit: float) -> None:
         least = max(request.clearance, paths.SWAY) + paths.SWAY
     elif isinstance(request, LoopRequest) and half < _NARROWEST:
         least = _NARROWEST + paths.SWAY
-    elif isinstance(request, LoopRequest) and _limits(request, half).speed < _limits(request, half).slowest:
+    elif isinstance(request, LoopRequest) and not _limits(request, half).suffices:
         grown = np.arange(half, half + 100.0, 0.05)
-        least = (
-            next((float(h) for h in grown if _limits(request, h).speed >= _limits(request, h).slowest), grown[-1])
-            + paths.SWAY
-        )
+        least = next((float(h) for h in grown if _limits(request, h).suffices), grown[-1]) + paths.SWAY
     elif isinstance(request, RecordedRequest):
         _check_recorded(request, half, limit)
     if least is not None:

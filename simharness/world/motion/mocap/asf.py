@@ -23,12 +23,12 @@ _MOST_BONES = 1000
 
 @dataclass
 class _Bone:
-    """Bone as given in the file; for the root, ``offset`` is its position."""
+    """Bone as given in the file, in whose ``line`` its name is."""
 
     line: Line
     offset: Floats
     frame: Rotation
-    dofs: tuple[str, ...] = ()
+    dofs: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -54,37 +54,30 @@ def read_asf(path: Path) -> Acclaim:
         ValueError: not a valid ASF file; the message names file and line.
     """
     reader = Reader(path)
-    degrees = True
-    root: _Bone | None = None
-    bones: dict[str, _Bone] = {}
-    parents: dict[str, str] = {}
-    while (line := reader.peek()) is not None:
-        reader.take("")
-        section = line.words[0].lower()
-        if not section.startswith(":"):
+    sections: dict[str, list[Line]] = {}
+    section: list[Line] = []
+    for line in reader.rest():
+        if line.words[0].startswith(":"):
+            section = sections[line.words[0].lower()] = []
+        elif not sections:
             raise line.error(f"expected a section such as :bonedata, got {quoted(line.words[0])}")
-        if section == ":units":
-            degrees = _units(reader)
-        elif section == ":root":
-            root = _root(reader, line, degrees)
-        elif section == ":bonedata":
-            bones = _bones(reader, degrees)
-        elif section == ":hierarchy":
-            parents = _hierarchy(reader, bones)
-        else:  # version, name, documentation, skin
-            _body(reader)
-    for missing, content in ((":root", root), (":bonedata", bones), (":hierarchy", parents)):
-        if not content:
+        else:
+            section.append(line)
+    for missing in (":root", ":bonedata", ":hierarchy"):
+        if missing not in sections:
             raise reader.error(f"has no section {missing}; is it an ASF file?")
-    assert root is not None
-    orphan = next((bone for name, bone in bones.items() if name not in parents), None)
+    degrees = _units(sections.get(":units", []))
+    origin, frame, dofs = _root(sections[":root"], degrees)
+    bones = _bones(sections[":bonedata"], degrees)
+    parents = _hierarchy(sections[":hierarchy"], bones)
+    orphan = next((name for name in bones if name not in parents), None)
     if orphan is not None:
-        raise orphan.line.error(f"bone {quoted(orphan.line.words[-1])} has no parent in :hierarchy")
+        raise bones[orphan].line.error(f"bone {quoted(orphan)} has no parent in :hierarchy")
     return Acclaim(
         skeleton=_skeleton(bones, parents),
-        frames={_ROOT: root.frame} | {name: bone.frame for name, bone in bones.items()},
-        dofs={_ROOT: root.dofs} | {name: bone.dofs for name, bone in bones.items()},
-        origin=root.offset,
+        frames={_ROOT: frame} | {name: bone.frame for name, bone in bones.items()},
+        dofs={_ROOT: dofs} | {name: bone.dofs for name, bone in bones.items()},
+        origin=origin,
         degrees=degrees,
     )
 
@@ -176,18 +169,10 @@ def _skeleton(bones: dict[str, _Bone], parents: dict[str, str]) -> MocapSkeleton
     return MocapSkeleton(tuple(names), np.array(above), np.array(offsets))
 
 
-def _body(reader: Reader) -> list[Line]:
-    """Return the lines up to the next section."""
-    lines = []
-    while (line := reader.peek()) is not None and not line.words[0].startswith(":"):
-        lines.append(reader.take(""))
-    return lines
-
-
-def _units(reader: Reader) -> bool:
+def _units(lines: list[Line]) -> bool:
     """Read the section :units; return whether angles are in degrees."""
     degrees = True
-    for line in _body(reader):
+    for line in lines:
         if line.words[0].lower() == "angle":
             unit = line.words[1].lower() if len(line.words) > 1 else ""
             if unit not in ("deg", "rad"):
@@ -196,15 +181,14 @@ def _units(reader: Reader) -> bool:
     return degrees
 
 
-def _root(reader: Reader, head: Line, degrees: bool) -> _Bone:
-    order: tuple[str, ...] = (*_SHIFTS, *_TURNS)
+def _root(lines: list[Line], degrees: bool) -> tuple[Floats, Rotation, tuple[str, ...]]:
+    """Read the section :root; return its position, its axes and the kinds of its values."""
+    kinds: tuple[str, ...] = (*_SHIFTS, *_TURNS)
     place, values, axis = np.zeros(3), [0.0, 0.0, 0.0], "xyz"
-    for line in _body(reader):
+    for line in lines:
         key, *_ = line.words
         if key.lower() == "order":
-            order = tuple(word.lower() for word in line.words[1:])
-            if set(order) - {*_SHIFTS, *_TURNS} or len(set(order)) != len(order):
-                raise line.error(f"expected an order of TX TY TZ RX RY RZ, got {quoted(' '.join(line.words[1:]))}")
+            kinds = _kinds(line, (*_SHIFTS, *_TURNS), "an order of TX TY TZ RX RY RZ")
         elif key.lower() == "axis":
             axis = _axis(line, line.words[1:])
         elif key.lower() == "position":
@@ -213,63 +197,62 @@ def _root(reader: Reader, head: Line, degrees: bool) -> _Bone:
             values = line.numbers(line.words[1:], 3, "the root's orientation")
         else:
             raise line.error(f"expected order, axis, position or orientation, got {quoted(key)}")
-    return _Bone(head, place, Rotation.from_euler(axis, values, degrees=degrees), order)
+    return place, Rotation.from_euler(axis, values, degrees=degrees), kinds
 
 
-def _bones(reader: Reader, degrees: bool) -> dict[str, _Bone]:
+def _bones(lines: list[Line], degrees: bool) -> dict[str, _Bone]:
+    """Read the section :bonedata; return the bones by name."""
     bones: dict[str, _Bone] = {}
-    while (line := reader.peek()) is not None and not line.words[0].startswith(":"):
-        begin = reader.take("")
+    rest = iter(lines)
+    for begin in rest:
         if begin.words[0].lower() != "begin":
             raise begin.error(f"expected begin, got {quoted(begin.words[0])}")
-        name, bone = _bone(reader, begin, degrees)
+        if len(bones) >= _MOST_BONES:
+            raise begin.error(f"more than {_MOST_BONES} bones")
+        line, given = begin, {}
+        for line in rest:
+            if (key := line.words[0].lower()) in ("begin", "end"):
+                break
+            given[key] = line
+        if line is begin or line.words[0].lower() != "end":
+            raise line.error(f"the bone that begins in line {begin.number} has no end")
+        bone = _bone(begin, given, degrees)
+        name = bone.line.words[1]
         if name in bones or name == _ROOT:
             raise bone.line.error(f"the bone {quoted(name)} is defined twice")
         bones[name] = bone
-        if len(bones) > _MOST_BONES:
-            raise begin.error(f"more than {_MOST_BONES} bones")
     return bones
 
 
-def _bone(reader: Reader, begin: Line, degrees: bool) -> tuple[str, _Bone]:
-    named: Line | None = None
-    direction = length = None
+def _bone(begin: Line, given: dict[str, Line], degrees: bool) -> _Bone:
+    """Return the bone that is given by lines by their first word."""
+    for missing in ("name", "direction", "length"):
+        if missing not in given:
+            raise begin.error(f"the bone that begins here has no {missing}")
+    name, towards, long = given["name"], given["direction"], given["length"]
+    if len(name.words) != 2:
+        raise name.error(f"expected one name, got {len(name.words) - 1}")
+    direction = np.array(towards.numbers(towards.words[1:], 3, "direction"))
+    if np.linalg.norm(direction) < 1e-6:
+        raise towards.error("expected a direction, got a vector of length 0")
+    direction /= np.linalg.norm(direction)
+    (length,) = long.numbers(long.words[1:], 1, "length")
+    if length < 0:
+        raise long.error(f"expected a length of 0 or more, got {length:g}")
     frame = Rotation.identity()
-    dofs: tuple[str, ...] = ()
-    while True:
-        line = reader.take("the end of the bone that begins in line " + str(begin.number))
-        key, *_ = line.words
-        key, rest = key.lower(), line.words[1:]
-        if key == "end":
-            break
-        if key.startswith(":") or key == "begin":
-            raise line.error(f"the bone that begins in line {begin.number} has no end")
-        if key == "name":
-            if len(rest) != 1:
-                raise line.error(f"expected one name, got {len(rest)}")
-            named = line
-        elif key == "direction":
-            direction = np.array(line.numbers(rest, 3, "direction"))
-            if np.linalg.norm(direction) < 1e-6:
-                raise line.error("expected a direction, got a vector of length 0")
-            direction /= np.linalg.norm(direction)
-        elif key == "length":
-            (length,) = line.numbers(rest, 1, "length")
-            if length < 0:
-                raise line.error(f"expected a length of 0 or more, got {length:g}")
-        elif key == "axis":
-            values = line.numbers(rest[:3], 3, "axis")
-            frame = Rotation.from_euler(_axis(line, rest[3:]), values, degrees=degrees)
-        elif key == "dof":
-            dofs = tuple(word.lower() for word in rest)
-            if set(dofs) - set(_TURNS) or len(set(dofs)) != len(dofs):
-                raise line.error(f"expected dof to be some of rx ry rz, got {quoted(' '.join(rest))}")
-    for what, value in (("name", named), ("direction", direction), ("length", length)):
-        if value is None:
-            raise begin.error(f"the bone that begins here has no {what}")
-    assert named is not None
-    assert direction is not None
-    return named.words[1], _Bone(named, direction * length, frame, dofs)
+    if axis := given.get("axis"):
+        values = axis.numbers(axis.words[1:4], 3, "axis")
+        frame = Rotation.from_euler(_axis(axis, axis.words[4:]), values, degrees=degrees)
+    dofs = _kinds(given["dof"], _TURNS, "dof to be some of rx ry rz") if "dof" in given else ()
+    return _Bone(name, direction * length, frame, dofs)
+
+
+def _kinds(line: Line, allowed: tuple[str, ...], expected: str) -> tuple[str, ...]:
+    """Return the kinds of values that a line lists, each once."""
+    kinds = tuple(word.lower() for word in line.words[1:])
+    if set(kinds) - set(allowed) or len(set(kinds)) != len(kinds):
+        raise line.error(f"expected {expected}, got {quoted(' '.join(line.words[1:]))}")
+    return kinds
 
 
 def _axis(line: Line, words: tuple[str, ...]) -> str:
@@ -279,10 +262,10 @@ def _axis(line: Line, words: tuple[str, ...]) -> str:
     return order
 
 
-def _hierarchy(reader: Reader, bones: dict[str, _Bone]) -> dict[str, str]:
+def _hierarchy(lines: list[Line], bones: dict[str, _Bone]) -> dict[str, str]:
     """Read the section :hierarchy; return the name of the parent by name of the bone."""
     parents: dict[str, str] = {}
-    for line in _body(reader):
+    for line in lines:
         if line.words[0].lower() in ("begin", "end") and len(line.words) == 1:
             continue
         parent, *children = line.words

@@ -40,13 +40,8 @@ _GYRATION = 0.3  # metres: radius of gyration of a body about its pelvis, for th
 _STILL = 1e-6  # metres and quaternion units: a prop that moves more is carried, and touches nobody
 _BAR = 0.018  # metres: radius of the bars that represent the soles
 _CONTACT_TIME = 0.006  # s: time constant of contacts; MuJoCo requires at least two steps
-_BONES = {
-    "pelvis": "Hips",
-    "chest": "Spine1",
-    "head": "Head",
-    "left_shoulder": "LeftArm",
-    "right_shoulder": "RightArm",
-}  # bone of each place of a push
+# Bone of each place of a push.
+_BONES = {"pelvis": "Hips", "chest": "Spine1", "head": "Head", "left_shoulder": "LeftArm", "right_shoulder": "RightArm"}
 _CHUNK = 120  # frames of the plan sampled at a time, because plans may be long
 
 

@@ -93,7 +93,7 @@ class Box:
 
     def moved(self, place: ArrayLike, yaw: float) -> "Box":
         """See :class:`Geom`."""
-        return Box(_carried(self.center, place, yaw), self.half, self.yaw + yaw)
+        return Box(_point(carried(self.center, place, yaw)), self.half, self.yaw + yaw)
 
     def raised(self, height: float) -> "Box":
         """Return the box raised by ``height`` metres."""
@@ -137,10 +137,6 @@ def carried(points: ArrayLike, place: ArrayLike, yaw: float) -> Floats:
     c, s = np.cos(yaw), np.sin(yaw)
     turned = np.asarray(points, float) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     return turned + np.append(np.asarray(place, float), 0.0)
-
-
-def _carried(point: Point, place: ArrayLike, yaw: float) -> Point:
-    return _point(carried(point, place, yaw))
 
 
 def _point(values: Floats) -> Point:
