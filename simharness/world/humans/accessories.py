@@ -66,15 +66,8 @@ def take_off(body: Body) -> Body:
         return body
     k = int(np.argmax(worn))
     n = int(body.faces[worn].min())
-    return replace(
-        body,
-        vertices=body.vertices[:n],
-        faces=body.faces[:k],
-        part=body.part[:k],
-        level=body.level[:k],
-        weight_bones=body.weight_bones[:n],
-        weights=body.weights[:n],
-    )
+    fewer = {key: getattr(body, key)[:n] for key in ("vertices", "weight_bones", "weights")}
+    return replace(body, **fewer, **{key: getattr(body, key)[:k] for key in ("faces", "part", "level")})
 
 
 def accessory_colors(look: Look) -> Mapping[FacePart, Color]:

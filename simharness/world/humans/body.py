@@ -247,19 +247,10 @@ class Body:
 
     def __post_init__(self) -> None:
         n, k, count = len(self.vertices), len(self.faces), len(self.bones)
-        for key, shape in (
-            ("vertices", (n, 3)),
-            ("faces", (k, 3)),
-            ("part", (k,)),
-            ("level", (k,)),
-            ("heads", (count, 3)),
-            ("parents", (count,)),
-            ("weight_bones", (n, 4)),
-            ("weights", (n, 4)),
-            ("keypoints", (len(LANDMARKS), count, 4)),
-            ("depths", (len(LANDMARKS),)),
-            ("thumbs", (2, 3)),
-        ):
+        shapes: dict[str, tuple[int, ...]] = {"vertices": (n, 3), "faces": (k, 3), "part": (k,), "level": (k,)}
+        shapes |= {"heads": (count, 3), "parents": (count,), "weight_bones": (n, 4), "weights": (n, 4)}
+        shapes |= {"keypoints": (len(LANDMARKS), count, 4), "depths": (len(LANDMARKS),), "thumbs": (2, 3)}
+        for key, shape in shapes.items():
             if np.shape(getattr(self, key)) != shape:
                 raise ValueError(f"body: {key} must be {shape}, got {np.shape(getattr(self, key))}")
         object.__setattr__(self, "_index", {bone: i for i, bone in enumerate(self.bones)})

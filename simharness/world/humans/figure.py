@@ -27,16 +27,8 @@ _SLANT = 0.35  # folds of limbs are not rings: they rise along the surface
 def figure_mesh(body: Body, look: Look) -> Mesh:
     """Return the visible mesh of a body that wears a look, in the rest pose."""
     surface = paint(body, look)
-    return Mesh(
-        vertices=body.vertices,
-        faces=body.faces,
-        colors=surface.colors,
-        smooth=True,
-        texture=surface.texture,
-        uv=surface.uv,
-        parts=body.segments,
-        finish=finish_of(body, look),
-    )
+    finish, segments = finish_of(body, look), body.segments
+    return Mesh(body.vertices, body.faces, surface.colors, True, surface.texture, surface.uv, segments, finish=finish)
 
 
 def finish_of(body: Body, look: Look) -> Finish:

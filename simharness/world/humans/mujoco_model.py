@@ -259,24 +259,14 @@ def person_spec(body: Body, name: str) -> mujoco.MjSpec:
             part.add_freejoint(name="root")
         for hinge in HINGES:
             if hinge.bone == body.bones[bone]:
-                part.add_joint(
-                    name=hinge.name,
-                    type=mujoco.mjtJoint.mjJNT_HINGE,
-                    axis=turn[bone].T @ hinge.axis,
-                    range=hinge.range,
-                    limited=True,
-                )
+                axis, kind = turn[bone].T @ hinge.axis, mujoco.mjtJoint.mjJNT_HINGE
+                part.add_joint(name=hinge.name, type=kind, axis=axis, range=hinge.range, limited=True)
         bodies.append(part)
     capsules = fit_capsules(body)
     for capsule, mass, label in zip(capsules, capsule_masses(body, capsules), _labels(capsules), strict=True):
-        bodies[body.index(capsule.bone)].add_geom(
-            name=label,
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            fromto=[*capsule.start, *capsule.end],
-            size=[capsule.radius, 0, 0],
-            mass=mass,
-            group=SKIN_GROUP,
-        )
+        shape = {"fromto": [*capsule.start, *capsule.end], "size": [capsule.radius, 0, 0]}
+        kind, part = mujoco.mjtGeom.mjGEOM_CAPSULE, bodies[body.index(capsule.bone)]
+        part.add_geom(name=label, type=kind, **shape, mass=mass, group=SKIN_GROUP)
     for inertial in limb_inertials(body):
         part = bodies[body.index(inertial.bone)]
         part.explicitinertial = True  # replaces the inertia of the capsules

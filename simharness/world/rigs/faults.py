@@ -87,18 +87,7 @@ class ExposureSchedule:
     @classmethod
     def ideal(cls, rig: Rig, time: ArrayLike) -> "ExposureSchedule":
         """Return the schedule of a rig without faults: every camera as believed, all pictures at ``time`` (T,), s."""
-        time = as_array(time, ("T",), "time")
-        shape = (len(time), len(rig))
-        return cls(
-            believed_rig=rig,
-            true_cameras=rig,
-            time=np.broadcast_to(time[:, None], shape),
-            source=np.broadcast_to(np.arange(len(time))[:, None], shape),
-            known_time=np.broadcast_to(time[:, None], shape),
-            camera_of_view=np.arange(len(rig)),
-            rotation_rate=np.zeros((len(rig), 3)),
-            velocity=np.zeros((len(rig), 3)),
-        )
+        return schedule_exposures(rig, FaultsSection(), time, seed=0)
 
     def __len__(self) -> int:
         """T, the number of frames."""
@@ -203,9 +192,6 @@ def schedule_exposures(
     phases = np.zeros(len(rig)) if phases is None else as_array(phases, (len(rig),), "phases")
     camera_of_view = _cameras_of_views(faults, rig)
     _check_exists(f"faults.dead = {_as_toml(faults.dead)}", faults.dead, rig)
-    if not len(time):
-        ideal = ExposureSchedule.ideal(rig, time)
-        return replace(ideal, believed_rig=_believed(rig, faults, seed), camera_of_view=camera_of_view)
     turns = [every[view % len(every)] if every else 1 for view in range(len(rig))]
     source = np.stack([_sources(faults, len(time), seed, view, turns[view]) for view in range(len(rig))], axis=1)
     source[:, list(faults.dead)] = -1
@@ -272,7 +258,7 @@ def _sources(faults: FaultsSection, frames: int, seed: int, view: int, every: in
     frozen = stream(seed, "faults", "frozen", view).random(frames) < faults.frozen
     fresh = ~dropped & ~frozen
     # The first picture that arrives has none to repeat: it is new whether the camera froze or not.
-    fresh[np.argmin(dropped)] |= not dropped.all()
+    fresh[np.flatnonzero(~dropped)[:1]] = True
     latest = np.maximum.accumulate(np.where(fresh, np.arange(frames), -1))
     return np.where(dropped, -1, latest)
 

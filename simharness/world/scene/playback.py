@@ -83,13 +83,8 @@ class Playback:
             landmarks = [body.landmarks(pose) for body, pose in zip(self.scene.bodies, bones, strict=True)]
             transforms = np.stack(bones) if bones else self._empty
             transforms[~present[n]] = _NOWHERE
-            yield PlaybackState(
-                time=float(time),
-                landmarks=np.stack(landmarks) if landmarks else np.zeros((0, len(LANDMARKS), 3)),
-                bones=transforms,
-                placements=placements[n],
-                present=present[n],
-            )
+            shown = np.stack(landmarks) if landmarks else np.zeros((0, len(LANDMARKS), 3))
+            yield PlaybackState(float(time), shown, transforms, placements[n], present[n])
 
 
 def simulate(scene: Scene) -> Sequence:

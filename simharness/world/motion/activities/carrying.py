@@ -1,7 +1,5 @@
 """Activity "carry": lift a box, step aside with it, and put it down."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from mvpose.arrays import Floats
@@ -18,14 +16,14 @@ from simharness.world.motion.poses.foot_placement import (
     stance,
 )
 from simharness.world.motion.poses.inverse_kinematics import (
-    Foot,
+    Feet,
     arm_angles,
     reach_with,
     shoulder_girdle,
     solve_legs,
 )
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.timing import Curves, blend, cycle_time, limbs, minimum_jerk, relaxed_posture
+from simharness.world.motion.poses.timing import Curves, blend, cycle_time, minimum_jerk, relaxed_posture
 
 _GRIP, _NEARER = 0.75, 0.15  # grip on the box: height, and distance behind its centre, in its heights and depths
 _STRETCH = 0.92  # fraction of the arm length that is used to reach down
@@ -61,11 +59,11 @@ def carry(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
             steps[side].append((starts, starts + 0.9 * half, prints[side].moved(0.0, target + shift / 2)))
     low, up, hold, aside = (minimum_jerk(u, *keys) for keys in (low_keys, up_keys, hold_keys, aside_keys))
     feet = {side: foot_path(kinematics, spot, u, prints[side], steps[side], lift=0.04) for side in SIDES}
-    motion = _bend(kinematics, spot, time, prints["left"], low, up, aside, feet, relaxed_posture(time, rng))
+    motion = _bend(kinematics, spot, time, prints["left"], feet, relaxed_posture(time, rng), low, up, aside)
 
     once = np.zeros(1)
     standing = {side: foot_path(kinematics, spot, once, prints[side]) for side in SIDES}
-    lowest = _bend(kinematics, spot, once, prints["left"], once + 1, once, once - shift / 2, standing, {})
+    lowest = _bend(kinematics, spot, once, prints["left"], standing, {}, once + 1, once, once - shift / 2)
     (shoulders,) = _in_spot(spot, _shoulders(kinematics, lowest))
     arm = kinematics.arms["left"]
     length, apart = np.linalg.norm(arm.end - arm.anchors[0]), width / 2 - arm.anchors[0, 1]
@@ -94,23 +92,17 @@ def carry(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
 
 
 def _bend(
-    kinematics: Kinematics,
-    spot: Spot,
-    time: Floats,
-    foot: Footprint,
-    low: Floats,
-    up: Floats,
-    aside: Floats,
-    feet: Mapping[str, Foot],
-    curves: Curves,
+    kinematics: Kinematics, spot: Spot, time: Floats, foot: Footprint, feet: Feet, curves: Curves, *pose: Floats
 ) -> Motion:
-    """Return the motion without the arms: bent down to the box by ``low`` and carrying it by ``up``, each 0 to 1."""
+    """Return the motion without the arms; ``pose`` is how far it is bent down to the box and how far it carries it,
+    each (T,) from 0 to 1, and its shift to the left, (T,) metres.
+    """
+    low, up, aside = pose
     blend(curves, low, lumbar_flexion=42.0, thorax_flexion=28.0, neck_flexion=-12.0, thorax_rotation=0.0)
     blend(curves, up, lumbar_flexion=-3.0, thorax_rotation=0.0)
-    blend(curves, low, **limbs(shoulder_flexion=75.0, shoulder_abduction=8.0, elbow_flexion=15.0))
-    hip = hip_position(
-        kinematics, shank=np.radians(5.0 + 14.0 * low + 11.0 * up), thigh=np.radians(7.0 + 88.0 * low + 15.0 * up)
-    )
+    blend(curves, low, shoulder_flexion=75.0, shoulder_abduction=8.0, elbow_flexion=15.0)
+    shank, thigh = np.radians(5.0 + 14.0 * low + 11.0 * up), np.radians(7.0 + 88.0 * low + 15.0 * up)
+    hip = hip_position(kinematics, shank=shank, thigh=thigh)
     hip[:, 0] += foot.place[0]
     pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=np.radians(1.0 + 20.0 * low - 4.0 * up), aside=aside)
     return solve_legs(kinematics, time, pelvis, height, feet, curves)

@@ -6,6 +6,7 @@ Activity "reach": reach for objects high up and low down.
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -49,27 +50,14 @@ def reach(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     pelvis, height = foot_placement.pelvis_from_hips(kinematics, spot, hip, lean=lean, aside=aside)
     feet = {foot: foot_placement.foot_path(kinematics, spot, time, prints[foot], pitch=tiptoe) for foot in SIDES}
     curves = timing.relaxed_posture(time, rng)
-    timing.blend(
-        curves,
-        high,
-        **timing.limb(
-            side, shoulder_flexion=135.0, shoulder_abduction=10.0, elbow_flexion=18.0, clavicle_elevation=22.0
-        ),
-        lumbar_flexion=-5.0,
-        lumbar_bending=-sign * 5.0,
-        thorax_rotation=-sign * 10.0,
-        neck_flexion=-24.0,
-    )
-    timing.blend(
-        curves,
-        low,
-        **timing.limb(side, shoulder_flexion=80.0, shoulder_abduction=5.0, elbow_flexion=14.0),
-        **timing.limb(OTHER[side], shoulder_flexion=14.0, elbow_flexion=35.0),
-        lumbar_flexion=24.0,
-        thorax_flexion=14.0,
-        thorax_rotation=-sign * 14.0,
-        neck_flexion=2.0,
-    )
+    raised = {"shoulder_flexion": 135.0, "shoulder_abduction": 10.0, "elbow_flexion": 18.0, "clavicle_elevation": 22.0}
+    timing.blend(curves, high, side, **raised)
+    timing.blend(curves, high, lumbar_flexion=-5.0, lumbar_bending=-sign * 5.0)
+    timing.blend(curves, high, thorax_rotation=-sign * 10.0, neck_flexion=-24.0)
+    timing.blend(curves, low, side, shoulder_flexion=80.0, shoulder_abduction=5.0, elbow_flexion=14.0)
+    timing.blend(curves, low, OTHER[side], shoulder_flexion=14.0, elbow_flexion=35.0)
+    trunk = {"lumbar_flexion": 24.0, "thorax_flexion": 14.0, "thorax_rotation": -sign * 14.0}
+    timing.blend(curves, low, **trunk, neck_flexion=2.0)
     motion = solve_legs(kinematics, time, pelvis, height, feet, curves)
 
     arm = kinematics.arms[side]
@@ -159,17 +147,11 @@ def _wave(curves: timing.Curves, time: Floats, rng: np.random.Generator) -> None
     side, _ = timing.draw_side(rng)
     on = timing.gesture_envelope(time, rng, hold=2.4, rest=0.5)
     beat = np.sin(2 * np.pi * (rng.uniform(1.2, 1.7) * time + rng.uniform()))
-    arm = timing.limb(
-        side,
-        shoulder_abduction=rng.uniform(55, 80),
-        shoulder_flexion=rng.uniform(15, 35),
-        shoulder_rotation=-75.0 + 6.0 * beat,
-        elbow_flexion=rng.uniform(85, 105) + rng.uniform(18, 26) * beat,
-        forearm_pronation=-5.0,
-        wrist_flexion=-6.0 + 10.0 * beat,
-        clavicle_elevation=10.0,
-    )
-    timing.blend(curves, on, **arm, neck_flexion=-2.0)
+    out, ahead = rng.uniform(55, 80), rng.uniform(15, 35)
+    bent = rng.uniform(85, 105) + rng.uniform(18, 26) * beat
+    timing.blend(curves, on, side, shoulder_abduction=out, shoulder_flexion=ahead, shoulder_rotation=-75.0 + 6.0 * beat)
+    timing.blend(curves, on, side, elbow_flexion=bent, forearm_pronation=-5.0, wrist_flexion=-6.0 + 10.0 * beat)
+    timing.blend(curves, on, side, clavicle_elevation=10.0, neck_flexion=-2.0)
 
 
 @_gesture("point")
@@ -178,23 +160,11 @@ def _point(curves: timing.Curves, time: Floats, rng: np.random.Generator) -> Non
     side, sign = timing.draw_side(rng)
     on = timing.gesture_envelope(time, rng, hold=2.0, rest=0.6)
     away = rng.uniform(-10, 45) + 10.0 * timing.smooth_noise(time, rng, 0.3)  # degrees to the side of the arm
-    timing.blend(
-        curves,
-        on,
-        **timing.limb(
-            side,
-            shoulder_flexion=rng.uniform(72, 100) + 4.0 * timing.smooth_noise(time, rng, 0.3),
-            shoulder_abduction=away,
-            shoulder_rotation=0.0,
-            elbow_flexion=6.0,
-            forearm_pronation=55.0,
-            wrist_flexion=0.0,
-            clavicle_elevation=6.0,
-        ),
-        thorax_rotation=sign * (0.25 * away - 6.0),
-        neck_rotation=sign * 0.6 * away,
-        neck_flexion=0.0,
-    )
+    raised = rng.uniform(72, 100) + 4.0 * timing.smooth_noise(time, rng, 0.3)
+    timing.blend(curves, on, side, shoulder_flexion=raised, shoulder_abduction=away, shoulder_rotation=0.0)
+    timing.blend(curves, on, side, elbow_flexion=6.0, forearm_pronation=55.0, wrist_flexion=0.0, clavicle_elevation=6.0)
+    turned = sign * (0.25 * away - 6.0)
+    timing.blend(curves, on, thorax_rotation=turned, neck_rotation=sign * 0.6 * away, neck_flexion=0.0)
 
 
 @_gesture("talk")
@@ -202,17 +172,12 @@ def _talk(curves: timing.Curves, time: Floats, rng: np.random.Generator) -> None
     """Move both hands in front of the belly as in speech, and nod."""
     for side in SIDES:
         on = timing.gesture_envelope(time, rng, hold=3.0, rest=0.5)
+        noise = partial(timing.smooth_noise, time, rng)
         timing.blend(
-            curves,
-            on,
-            **timing.limb(
-                side,
-                shoulder_flexion=20.0 + 9.0 * timing.smooth_noise(time, rng, 0.5),
-                shoulder_abduction=13.0 + 5.0 * timing.smooth_noise(time, rng, 0.4),
-                shoulder_rotation=16.0 + 14.0 * timing.smooth_noise(time, rng, 0.6),
-                elbow_flexion=82.0 + 18.0 * timing.smooth_noise(time, rng, 0.7),
-                forearm_pronation=-10.0 + 30.0 * timing.smooth_noise(time, rng, 0.5),
-                wrist_flexion=12.0 * timing.smooth_noise(time, rng, 0.8),
-            ),
+            curves, on, side, shoulder_flexion=20.0 + 9.0 * noise(0.5), shoulder_abduction=13.0 + 5.0 * noise(0.4)
         )
+        timing.blend(
+            curves, on, side, shoulder_rotation=16.0 + 14.0 * noise(0.6), elbow_flexion=82.0 + 18.0 * noise(0.7)
+        )
+        timing.blend(curves, on, side, forearm_pronation=-10.0 + 30.0 * noise(0.5), wrist_flexion=12.0 * noise(0.8))
     curves["neck_flexion"] = curves["neck_flexion"] + 4.0 * timing.smooth_noise(time, rng, 0.8)

@@ -1,5 +1,7 @@
 """Activities "squat", "kneel" (on one knee), "crouch" and "lie": lowering the body and rising again."""
 
+from functools import partial
+
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
@@ -35,13 +37,9 @@ def squat(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     low = timing.minimum_jerk(u, (0.0, 0.0), (marks[1], 1.0), (marks[2], 1.0), (marks[3], 0.0))
     curves = timing.relaxed_posture(time, rng)
     timing.blend(
-        curves,
-        low,
-        **timing.limbs(shoulder_flexion=85 + 40 * arms, shoulder_abduction=4.0, elbow_flexion=8.0 + 30 * (1 - arms)),
-        lumbar_flexion=14.0,
-        thorax_flexion=10.0,
-        neck_flexion=-8.0 - 10 * head,
+        curves, low, shoulder_flexion=85 + 40 * arms, shoulder_abduction=4.0, elbow_flexion=8.0 + 30 * (1 - arms)
     )
+    timing.blend(curves, low, lumbar_flexion=14.0, thorax_flexion=10.0, neck_flexion=-8.0 - 10 * head)
     lean = np.radians(2.0 + 26.0 * low)
     hip = hip_position(
         kinematics, shank=np.radians(4.0 + 15.0 * low), thigh=np.radians(5.0 + (55.0 + 23.0 * deep) * low)
@@ -125,28 +123,17 @@ def crouch(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.G
     curves = timing.relaxed_posture(time, rng)
     on = np.ones(len(time))
     _rest_on_knee(curves, on, front)
-    timing.blend(
-        curves,
-        on,
-        lumbar_flexion=14.0 + 10.0 * timing.smooth_noise(time, rng, rate),
-        thorax_flexion=10.0,
-        thorax_rotation=22.0 * timing.smooth_noise(time, rng, rate),
-        neck_flexion=-14.0 + 8.0 * timing.smooth_noise(time, rng, rate),
-        neck_rotation=35.0 * timing.smooth_noise(time, rng, rate),
-    )
+    noise = partial(timing.smooth_noise, time, rng, rate)
+    timing.blend(curves, on, lumbar_flexion=14.0 + 10.0 * noise(), thorax_flexion=10.0, thorax_rotation=22.0 * noise())
+    timing.blend(curves, on, neck_flexion=-14.0 + 8.0 * noise(), neck_rotation=35.0 * noise())
     return solve_legs(kinematics, time, pelvis, height, feet, curves)
 
 
 def _rest_on_knee(curves: timing.Curves, on: Floats, front: str) -> None:
     """Blend in, by ``on``, a forearm that rests on the front thigh and another arm that hangs ahead of the hip."""
-    timing.blend(
-        curves,
-        on,
-        **timing.limb(
-            front, shoulder_flexion=32.0, shoulder_abduction=10.0, shoulder_rotation=20.0, elbow_flexion=72.0
-        ),
-        **timing.limb(OTHER[front], shoulder_flexion=14.0, shoulder_abduction=14.0, elbow_flexion=30.0),
-    )
+    resting = {"shoulder_flexion": 32.0, "shoulder_abduction": 10.0, "shoulder_rotation": 20.0, "elbow_flexion": 72.0}
+    timing.blend(curves, on, front, **resting)
+    timing.blend(curves, on, OTHER[front], shoulder_flexion=14.0, shoulder_abduction=14.0, elbow_flexion=30.0)
 
 
 def _kneeling(kinematics: Kinematics) -> tuple[float, float, float]:
@@ -231,13 +218,12 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
 
     curves = timing.relaxed_posture(time, rng)
     timing.blend(curves, low, lumbar_flexion=18.0, thorax_flexion=12.0, neck_flexion=-8.0, thorax_rotation=0.0)
-    timing.blend(curves, low * (1 - down), **timing.limbs(shoulder_flexion=70.0, elbow_flexion=15.0))
+    timing.blend(curves, low * (1 - down), shoulder_flexion=70.0, elbow_flexion=15.0)
     timing.blend(curves, down, **trunk, neck_rotation=14.0 * roll * timing.smooth_noise(time, rng, 0.12))
     motion = solve_legs(kinematics, time, pelvis, height, feet, curves)
 
     # The hands support the body behind the hips, and finally lie beside them.
-    seat = ankle - _SITTING * length
-    arm = kinematics.arms["left"]
+    seat, arm = ankle - _SITTING * length, kinematics.arms["left"]
     reach = 0.955 * float(np.linalg.norm(arm.end - arm.anchors[0]))
     behind = seat - 0.3 * length
     beside = lying - arm.anchors[0, 2] + reach  # nearly straight: bent elbows would be below the floor
@@ -255,16 +241,8 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
             kinematics, shoulder_flexion=2.0, shoulder_abduction=24.0, shoulder_rotation=35.0, elbow_flexion=14.0
         )
         guess = back + roll[:, None] * (flat - back)
-        motion = reach_with(
-            kinematics,
-            motion,
-            side,
-            spot_to_world(spot, place),
-            turn=turn,
-            weight=timing.ease(down / 0.7),
-            guess=guess,
-            turn_weight=0.012,
-        )
+        place, weight = spot_to_world(spot, place), timing.ease(down / 0.7)
+        motion = reach_with(kinematics, motion, side, place, turn=turn, weight=weight, guess=guess, turn_weight=0.012)
     return motion
 
 

@@ -17,7 +17,7 @@ from simharness.world.motion.activity_registry import solo_activity
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
 from simharness.world.motion.poses.foot_placement import Footprints, leftward
-from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, solve_standing
+from simharness.world.motion.poses.inverse_kinematics import Feet, Foot, Pelvis, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease, limbs
 
@@ -42,7 +42,7 @@ def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gen
 
     width = _STEP_WIDTH * kinematics.legs["left"].end[1]
 
-    def stances(time: Floats, phase: Floats) -> tuple[Pelvis, dict[str, Foot]]:
+    def stances(time: Floats, phase: Floats) -> tuple[Pelvis, Feet]:
         pelvis = gait.pelvis(loop.position(time), loop.heading(time), phase)
         feet = {
             side: footsteps(loop, gait, side, phase - late, time, width=width, toe_out=TOE_OUT)
@@ -119,7 +119,7 @@ def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gene
     offset, swing, upright, droop = rng.uniform(size=4)
     vigour = min(stride.vigour, 1.1)
 
-    def stances(time: Floats, phase: Floats) -> tuple[Pelvis, dict[str, Foot]]:
+    def stances(time: Floats, phase: Floats) -> tuple[Pelvis, Feet]:
         cycle = 2 * np.pi * phase
         heading = loop.heading(time)
         aside = 0.012 * np.sin(cycle + 0.1 * np.pi)

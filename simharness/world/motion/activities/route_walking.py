@@ -41,7 +41,7 @@ from simharness.world.motion.poses.inverse_kinematics import (
     solve_legs,
 )
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.timing import blend, limbs, relaxed_posture, smoothstep
+from simharness.world.motion.poses.timing import blend, relaxed_posture, smoothstep
 
 LOOKAHEAD = 3.0
 """Seconds for which a route must be known beyond the last time: poses depend on the steps that follow."""
@@ -105,7 +105,7 @@ def walk_route(
     curves = dict(resting)
     posture = walking_posture(gait, phase(time), arms=narrow * arms, lean=lean, droop=droop)
     blend(curves, briskness(route, time), **posture)
-    blend(curves, np.abs(turned), **limbs(**_NARROW))
+    blend(curves, np.abs(turned), **_NARROW)
     listed = np.degrees(pelvis.list)
     curves["lumbar_bending"], curves["thorax_bending"] = 0.6 * listed, 0.4 * listed
     for name, most in _GIVE_WAY.items():

@@ -12,7 +12,7 @@ from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses import foot_placement
 from simharness.world.motion.poses.inverse_kinematics import reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.timing import blend, cycle_time, ease, limbs, minimum_jerk, relaxed_posture
+from simharness.world.motion.poses.timing import blend, cycle_time, ease, minimum_jerk, relaxed_posture
 
 _SHANK = np.radians(5.0)  # forward tilt of a seated shank
 _LEANS = np.radians([-9.0, 0.0, 15.0, 35.0])  # leans of the pelvis at which its height above the seat is computed
@@ -70,7 +70,7 @@ def sit(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
     curves = relaxed_posture(time, rng)
     blend(curves, seated, lumbar_flexion=6.0 + 6 * slouch, thorax_flexion=4.0 + 6 * slouch, neck_flexion=2.0)
     blend(curves, bow, lumbar_flexion=14.0, thorax_flexion=10.0, neck_flexion=-10.0)
-    blend(curves, np.maximum(seated, bow), **limbs(shoulder_flexion=24.0, shoulder_abduction=10.0, elbow_flexion=58.0))
+    blend(curves, np.maximum(seated, bow), shoulder_flexion=24.0, shoulder_abduction=10.0, elbow_flexion=58.0)
     feet = {side: foot_placement.foot_path(kinematics, spot, time, prints[side]) for side in SIDES}
     motion = solve_legs(kinematics, time, pelvis, height, feet, curves)
     lap = _knee(kinematics)[0] + ankle - (0.2 + 0.35 * along) * kinematics.leg_parts[0]

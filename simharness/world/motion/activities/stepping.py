@@ -23,7 +23,6 @@ from simharness.world.motion.poses.timing import (
     blend,
     bump,
     cycle_time,
-    limb,
     minimum_jerk,
     relaxed_posture,
     smooth_noise,
@@ -104,25 +103,11 @@ def step(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gen
     }
     # On the floor both knees are slightly bent; the body moves over the foot on the block first, then up.
     standing = relaxed_pelvis_height(kinematics) - 0.008
-    ahead = minimum_jerk(
-        u,
-        (0.1, 0.0),
-        (lead_up, 0.38 * forward),
-        (up - 0.1, forward),
-        (stood, forward),
-        (lowered, 0.45 * forward),
-        (down, 0.0),
-    )
-    low, bent = standing - 0.02, standing - 0.06
-    rise = minimum_jerk(
-        u,
-        (0.1, standing),
-        (lead_up, low),
-        (up, standing + height),
-        (stood - 0.1, standing + height),
-        (lowered, bent + 0.02),
-        (down, standing),
-    )
+    moves = [(0.1, 0.0), (lead_up, 0.38 * forward), (up - 0.1, forward), (stood, forward), (lowered, 0.45 * forward)]
+    ahead = minimum_jerk(u, *moves, (down, 0.0))
+    low, bent, high = standing - 0.02, standing - 0.06, standing + height
+    climbs = [(0.1, standing), (lead_up, low), (up, high), (stood - 0.1, high), (lowered, bent + 0.02)]
+    rise = minimum_jerk(u, *climbs, (down, standing))
     aside = _over_standing_foot(u, steps, by=0.03)
     lean = np.radians(2.0) + np.radians(9.0) * (bump(u, 0.2, up) + 0.6 * bump(u, stood, down))
     ground = spot_to_world(spot, np.stack([ahead - forward / 2, aside], axis=-1))
@@ -139,7 +124,7 @@ def step(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gen
     moving = bump(u, 0.1, lead_up + 0.2) - bump(u, lead_up, up + 0.2)
     for side, sign in ((lead, -1.0), (trail, 1.0)):
         curves[f"{side}_shoulder_flexion"] = curves[f"{side}_shoulder_flexion"] + sign * (10 + 14 * swing) * moving
-    blend(curves, bump(u, 0.1, up) + bump(u, stood, down), neck_flexion=14.0, **limb(lead, elbow_flexion=28.0))
+    blend(curves, bump(u, 0.1, up) + bump(u, stood, down), lead, neck_flexion=14.0, elbow_flexion=28.0)
     motion = solve_legs(kinematics, time, pelvis, rise, feet, curves)
     foot = kinematics.soles["left"]
     front, back = above["left"].place[0] + foot[:, 0].max(), above["left"].place[0] + foot[:, 0].min()
@@ -213,38 +198,18 @@ def dance(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         pump = np.sin(np.pi * count + (0.0 if sign > 0 else np.pi) + 0.6)
         blend(
-            curves,
-            always,
-            **limb(
-                side,
-                shoulder_flexion=16.0 + (12 + 14 * broad) * pump,
-                shoulder_abduction=22.0 + 8.0 * dip,
-                shoulder_rotation=18.0 + 10.0 * pump,
-                elbow_flexion=82.0 + (10 + 12 * broad) * pump,
-                forearm_pronation=20.0,
-            ),
+            curves, always, side, shoulder_flexion=16.0 + (12 + 14 * broad) * pump, shoulder_abduction=22.0 + 8.0 * dip
         )
+        blend(curves, always, side, shoulder_rotation=18.0 + 10.0 * pump, elbow_flexion=82.0 + (10 + 12 * broad) * pump)
+        blend(curves, always, side, forearm_pronation=20.0)
+        out = 105.0 + (10 + 12 * broad) * sign * sway
         blend(
-            curves,
-            raised,
-            **limb(
-                side,
-                shoulder_flexion=40.0 + 10.0 * sway,
-                shoulder_abduction=105.0 + (10 + 12 * broad) * sign * sway,
-                shoulder_rotation=-50.0,
-                elbow_flexion=70.0 + 18.0 * pump,
-                clavicle_elevation=14.0,
-            ),
+            curves, raised, side, shoulder_flexion=40.0 + 10.0 * sway, shoulder_abduction=out, shoulder_rotation=-50.0
         )
-    blend(
-        curves,
-        always,
-        lumbar_bending=(2.0 + 4.0 * twisty) * -sway,
-        lumbar_flexion=3.0 + 3.0 * dip,
-        thorax_bending=(2.0 + 4.0 * twisty) * sway,
-        thorax_rotation=-(4.0 + 8.0 * twisty) * swing,
-        neck_flexion=2.0 + 8.0 * dip * bouncy,
-    )
+        blend(curves, raised, side, elbow_flexion=70.0 + 18.0 * pump, clavicle_elevation=14.0)
+    blend(curves, always, lumbar_bending=(2.0 + 4.0 * twisty) * -sway, lumbar_flexion=3.0 + 3.0 * dip)
+    blend(curves, always, thorax_bending=(2.0 + 4.0 * twisty) * sway, thorax_rotation=-(4.0 + 8.0 * twisty) * swing)
+    blend(curves, always, neck_flexion=2.0 + 8.0 * dip * bouncy)
     pelvis, feet = stances(count)
     whole = stances(np.linspace(0.0, _BAR, _BAR_SAMPLES))
     return solve_standing(kinematics, time, pelvis, feet, curves, straightest=_DANCE_BENT, fit=whole)

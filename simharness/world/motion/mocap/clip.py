@@ -65,14 +65,7 @@ class Clip:
         """Return the time in the recording, (...) seconds, at times (...): back and forth, ``start`` at time 0."""
         return back_and_forth(np.asarray(time, float), start=self.start, end=float(self.time[-1]))
 
-    def perform(
-        self,
-        kinematics: Kinematics,
-        time: Floats,
-        *,
-        place: ArrayLike,
-        bearing: float,
-    ) -> Motion:
+    def perform(self, kinematics: Kinematics, time: Floats, *, place: ArrayLike, bearing: float) -> Motion:
         """Return the motion of the clip, performed by a body.
 
         Args:

@@ -157,17 +157,9 @@ def plant_foot(ankle: Floats, turn: Floats, standing: Bools, sole: Sole, *, rate
     for start, stop in stances:
         held[start:stop] = _settled(recorded[start:stop])
     turn = Rotation.from_euler("ZYX", (recorded + _faded(held - recorded, stances, rate)) * [1, -1, 1]).as_matrix()
-    anchors = [_anchor(ankle[start:stop, :2], turn[start:stop], sole) for start, stop in stances]
-    return FootPath(
-        turn=turn,
-        clearance=_lifted(clearance - ground, stances),
-        ground=ground,
-        recorded=ankle[:, :2],
-        stances=stances,
-        anchors=np.reshape(anchors, (-1, 2)),
-        sole=sole,
-        rate=rate,
-    )
+    held_at = [_anchor(ankle[start:stop, :2], turn[start:stop], sole) for start, stop in stances]
+    lifted, anchors = _lifted(clearance - ground, stances), np.reshape(held_at, (-1, 2))
+    return FootPath(turn, lifted, ground, ankle[:, :2], stances, anchors, sole, rate)
 
 
 def _levelled(turn: Floats, standing: Bools) -> Floats:

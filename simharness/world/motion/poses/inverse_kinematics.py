@@ -40,6 +40,10 @@ class Foot:
         return Rotation.from_euler("ZY", np.stack([self.bearing, -self.pitch], axis=-1)).as_matrix()
 
 
+Feet = Mapping[str, Foot]
+"""Feet by side."""
+
+
 @dataclass(frozen=True)
 class Pelvis:
     """Pose of the pelvis in every frame, except for its mean height."""
@@ -73,11 +77,11 @@ def solve_standing(
     kinematics: Kinematics,
     time: Floats,
     pelvis: Pelvis,
-    feet: Mapping[str, Foot],
+    feet: Feet,
     posture: Mapping[str, ArrayLike],
     *,
     straightest: float,
-    fit: tuple[Pelvis, Mapping[str, Foot]] | None = None,
+    fit: tuple[Pelvis, Feet] | None = None,
 ) -> Motion:
     """Place the pelvis as high as the legs allow, and solve the legs for the given feet.
 
@@ -95,7 +99,7 @@ def solve_standing(
     return solve_legs(kinematics, time, pelvis, height, feet, posture)
 
 
-def highest_pelvis(kinematics: Kinematics, pelvis: Pelvis, feet: Mapping[str, Foot], *, straightest: float) -> float:
+def highest_pelvis(kinematics: Kinematics, pelvis: Pelvis, feet: Feet, *, straightest: float) -> float:
     """Return the greatest mean height of the pelvis, in metres, at which no knee flexes less than ``straightest``.
 
     It is one constant for the whole motion: a height fitted frame by frame would jerk at every step.
@@ -110,7 +114,7 @@ def solve_legs(
     time: Floats,
     pelvis: Pelvis,
     height: ArrayLike,
-    feet: Mapping[str, Foot],
+    feet: Feet,
     posture: Mapping[str, ArrayLike],
 ) -> Motion:
     """Solve the legs so that the feet reach their targets under a given pelvis.

@@ -68,19 +68,10 @@ class Chain:
         angles = start.copy()
         if turn is None:
             turn, turn_weight = np.broadcast_to(np.eye(3), (len(angles), 3, 3)), 0.0
-        _solve_all(
-            self.axes,
-            self.anchors,
-            self.end,
-            self.ranges,
-            np.ascontiguousarray(turn, float),
-            np.ascontiguousarray(place, float),
-            float(turn_weight),
-            float(pull),
-            follow,
-            np.ascontiguousarray(start),
-            angles,
-        )
+        targets = np.ascontiguousarray(turn, float), np.ascontiguousarray(place, float)
+        weights = float(turn_weight), float(pull), follow
+        chain = self.axes, self.anchors, self.end, self.ranges
+        _solve_all(*chain, *targets, *weights, np.ascontiguousarray(start), angles)
         return angles
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
-from simharness.world.humans.anatomy import SIDES
+from simharness.world.humans.anatomy import ANATOMY, SIDES
 
 
 def ease(x: ArrayLike) -> Floats:
@@ -112,20 +112,20 @@ def relaxed_posture(time: Floats, rng: np.random.Generator) -> Curves:
     return curves
 
 
-def blend(curves: Curves, on: Floats, **targets: ArrayLike) -> None:
-    """Blend the curves, in place, towards the targets in degrees with the weight ``on`` (T,), 0 to 1."""
+def blend(curves: Curves, on: Floats, side: str = "", /, **targets: ArrayLike) -> None:
+    """Blend the curves, in place, towards the targets in degrees with the weight ``on`` (T,), 0 to 1.
+
+    Hinges of limbs may be named without their side: they are those of ``side``, or by default of both.
+    """
     for name, target in targets.items():
-        curves[name] = (1 - on) * curves.get(name, np.zeros_like(on)) + on * np.asarray(target, float)
-
-
-def limb(side: str, **targets: ArrayLike) -> dict[str, ArrayLike]:
-    """Return targets of the joints of one side, given by names without the side."""
-    return {f"{side}_{name}": value for name, value in targets.items()}
+        sided = [f"{each}_{name}" for each in ((side,) if side else SIDES)]
+        for curve in sided if name in ANATOMY["limbs"] else (name,):
+            curves[curve] = (1 - on) * curves.get(curve, np.zeros_like(on)) + on * np.asarray(target, float)
 
 
 def limbs(**targets: ArrayLike) -> dict[str, ArrayLike]:
     """Return the same targets for the joints of both sides, given by names without the side."""
-    return {name: value for side in SIDES for name, value in limb(side, **targets).items()}
+    return {f"{side}_{name}": value for side in SIDES for name, value in targets.items()}
 
 
 def draw_side(rng: np.random.Generator) -> tuple[str, float]:

@@ -62,13 +62,9 @@ def settled(room: RoomSection, seed: int) -> RoomSection:
     kind = room_kinds()[name]
     floor = kind.floors[stream(seed, "room", "usual floor").integers(len(kind.floors))]
     wall = kind.walls[stream(seed, "room", "usual wall").integers(len(kind.walls))]
-    return room.model_copy(
-        update={
-            "kind": name,
-            "floor": floor if room.floor == "usual" else room.floor,
-            "wall": wall if room.wall == "usual" else room.wall,
-        }
-    )
+    drawn_finishes = {"floor": floor if room.floor == "usual" else room.floor}
+    drawn_finishes |= {"wall": wall if room.wall == "usual" else room.wall}
+    return room.model_copy(update={"kind": name} | drawn_finishes)
 
 
 def check_size(room: RoomSection) -> None:
