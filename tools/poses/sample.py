@@ -15,7 +15,7 @@ from simharness.detector.viewing_conditions import body_axes
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
-from simharness.world.motion.activity_registry import Activity, activities_in_place
+from simharness.world.motion.activity_registry import Activity, activities
 from simharness.world.motion.motion import motion_clock
 from simharness.world.motion.paths import Loop, Spot, Track, draw_loop
 from simharness.world.motion.poses.kinematics import Kinematics
@@ -25,6 +25,7 @@ _HALF = 2.0  # half the side of the square in which people walk, metres
 _GRAVITY = 9.81
 _CHILDREN = 0.1  # share of children among the bodies
 _HIGHEST = np.deg2rad(45.0)  # elevation of cameras seen from people: from level to this
+_ON_THE_WAY = frozenset({"cross", "swap", "hide", "visit"})
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,14 @@ class PosesInPictures:
 
     places: Floats
     bearing: Floats
+
+
+def activities_in_place() -> tuple[Activity, ...]:
+    """Return the activities of people who stay, without those that are about coming, going, passing and hiding.
+
+    What those people do in between, walking and standing, others do as well.
+    """
+    return tuple(each for each in activities().values() if each.name not in _ON_THE_WAY)
 
 
 def sample_joints(seed: int, *, bodies: int, frames: int) -> Floats:

@@ -16,10 +16,11 @@ from mvpose.arrays import Floats
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.shape import Shape
-from simharness.world.motion.activity_registry import Activity, activities_in_place
+from simharness.world.motion.activity_registry import Activity
 from simharness.world.motion.motion import motion_clock
 from simharness.world.motion.paths import Loop, Spot, Track, draw_loop
 from simharness.world.motion.poses.kinematics import Kinematics
+from tools.poses.sample import activities_in_place
 
 _DURATION = 4.0  # duration of every motion, seconds
 _HALF = 2.0  # half the side of the square in which people walk, metres

@@ -126,15 +126,10 @@ class FacePoints:
         crown = float(at["head_top"][2])
         vertices = body.vertices.astype(float)
         face, scalp = (vertices[np.unique(body.faces[np.isin(body.part, parts)])] for parts in (_FACE, _SCALP))
-        return cls(
-            eye=_left(at["left_eye"], at["right_eye"]),
-            ear=_left(at["left_ear"], at["right_ear"]),
-            nose=at["nose"],
-            crown=crown,
-            scale=(crown - float(at["left_eye"][2])) / _EYES_TO_CROWN,
-            face=face[face[:, 2] > at["nose"][2] - 1.2 * (crown - at["nose"][2])],
-            scalp=scalp,
-        )
+        eye, ear = (_left(at[f"left_{name}"], at[f"right_{name}"]) for name in ("eye", "ear"))
+        scale = (crown - float(at["left_eye"][2])) / _EYES_TO_CROWN
+        face = face[face[:, 2] > at["nose"][2] - 1.2 * (crown - at["nose"][2])]
+        return cls(eye, ear, at["nose"], crown, scale, face, scalp)
 
 
 _NAMES = ("left_eye", "right_eye", "left_ear", "right_ear", "nose", "head_top")

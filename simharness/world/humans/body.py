@@ -129,7 +129,9 @@ class BodyModel:
 
         Values beyond the anchors are extrapolated.
         """
-        coefficients = self._coefficients(phenotypes)
+        coefficients = self.coefficients
+        for name in PHENOTYPES:
+            coefficients = np.tensordot(interpolation(phenotypes[name], self.anchors[name]), coefficients, axes=1)
         vertices = np.empty_like(self.mean)
         mix(self.mean.ravel(), self.deltas.reshape(len(coefficients), -1), self.step * coefficients, vertices.ravel())
         return vertices, self.mean_heads + np.tensordot(coefficients, self.delta_heads, axes=1)
@@ -177,12 +179,6 @@ class BodyModel:
     @cached_property
     def _weights_float32(self) -> NDArray[np.float32]:
         return np.ascontiguousarray(self.weights, np.float32)
-
-    def _coefficients(self, phenotypes: Mapping[str, float]) -> Floats:
-        coefficients = self.coefficients
-        for name in PHENOTYPES:
-            coefficients = np.tensordot(interpolation(phenotypes[name], self.anchors[name]), coefficients, axes=1)
-        return coefficients
 
 
 def interpolation(value: float, anchors: ArrayLike) -> Floats:
@@ -319,9 +315,10 @@ def make_body(shape: Shape) -> Body:
     """Make the bare rest body of a shape, in its close-fitting suit."""
     model = body_model()
     vertices, heads = model.rest_of_shape(shape)
-    skin_vertices = np.unique(model.skin_faces)
     keypoints = _keypoints(model, vertices, heads)
     joints = keypoints[..., :3].sum(1)
+    bare = vertices[np.unique(model.skin_faces)]
+    nearest = [np.sqrt(((bare - point) ** 2).sum(1).min()) for point in joints]
     thumbs = vertices[model.palms[:, 0]] - vertices[model.palms[:, 1]]
     return Body(
         shape=shape,
@@ -335,7 +332,7 @@ def make_body(shape: Shape) -> Body:
         weight_bones=np.ascontiguousarray(model.weight_bones[: model.shown]),
         weights=np.ascontiguousarray(model.weights[: model.shown], np.float32),
         keypoints=keypoints,
-        depths=np.maximum(2 * _nearest(joints, vertices[skin_vertices]), 0.015),
+        depths=np.maximum(2 * np.array(nearest), 0.015),
         thumbs=thumbs / np.linalg.norm(thumbs, axis=1, keepdims=True),
         stature=model.stature(vertices),
         mass=model.mass(vertices),
@@ -366,8 +363,3 @@ def _keypoints(model: BodyModel, vertices: Floats, heads: Floats) -> Floats:
     hips = [LANDMARKS.index(f"{side}_hip") for side in ("left", "right")]
     result[LANDMARKS.index("mid_hip")] = result[hips].mean(0)
     return result
-
-
-def _nearest(points: Floats, cloud: Floats) -> Floats:
-    """Return the distance of every point (p, 3) to the nearest point of a cloud (n, 3)."""
-    return np.array([np.sqrt(((cloud - point) ** 2).sum(1).min()) for point in points])

@@ -121,7 +121,10 @@ def dress(body: Body, look: Look) -> Body:
         np.bincount(faces[rows].ravel(), np.repeat(body.level[rows], 3), len(pairs)) / np.maximum(count, 1)
         for rows, count in zip((~arm, arm), adjacent, strict=True)
     )
-    normals = _vertex_normals(rest, body.faces)[source]
+    a, b, c = np.moveaxis(rest[body.faces], 1, 0)
+    normals = np.zeros_like(rest)
+    np.add.at(normals, body.faces, np.cross(b - a, c - a)[:, None, :])
+    normals = unit(normals)[source]
     normals[worn == Garment.SOLE, 2] = 0.0  # a shoe is wider than the foot, but stands on the same floor
     leg = (worn == Garment.TROUSERS) & (level > 1)
     normals[leg] = unit(normals[leg] * [1, 1, 0])  # normals over the foot point up and would lift the hem
@@ -210,13 +213,6 @@ def _draped(vertices: Floats, faces: NDArray[np.int32], garment: NDArray[np.int6
     for _ in range(round(np.interp(fit, (0, 1), _DRAPE_ROUNDS))):
         vertices = vertices + moves[:, None] * (mean @ vertices - vertices)
     return vertices
-
-
-def _vertex_normals(vertices: Floats, faces: NDArray[np.int32]) -> Floats:
-    a, b, c = np.moveaxis(vertices[faces], 1, 0)
-    normals = np.zeros_like(vertices)
-    np.add.at(normals, faces, np.cross(b - a, c - a)[:, None, :])
-    return unit(normals)
 
 
 # Pixels. Twice as many along a limb as around it: seen from the side, the texture is short in the latter direction, and

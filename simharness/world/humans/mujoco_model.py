@@ -102,10 +102,8 @@ def capsule_masses(body: Body, capsules: Sequence[Capsule]) -> list[float]:
         segment: sum(c.volume for c, each in zip(capsules, segments, strict=True) if each == segment)
         for segment in set(segments)
     }
-    return [
-        fractions[segment[0]] * body.mass * capsule.volume / volumes[segment]
-        for capsule, segment in zip(capsules, segments, strict=True)
-    ]
+    pairs = zip(capsules, segments, strict=True)
+    return [fractions[name] * body.mass * each.volume / volumes[name, side] for each, (name, side) in pairs]
 
 
 def _segment(bone: str) -> str:

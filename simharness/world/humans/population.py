@@ -144,10 +144,8 @@ def _adult_measures(sex: str, score: Floats) -> dict[str, float]:
     The first score is that of stature; each other score is the part of its measure that is independent of stature.
     """
     return {
-        name: float(
-            spread.mean + spread.deviation * (spread.correlation * score[0] + np.sqrt(1 - spread.correlation**2) * each)
-        )
-        for each, (name, spread) in zip(score, adult_spreads()[sex].items(), strict=False)
+        name: float(s.mean + s.deviation * (s.correlation * score[0] + np.sqrt(1 - s.correlation**2) * each))
+        for each, (name, s) in zip(score, adult_spreads()[sex].items(), strict=False)
     }
 
 

@@ -40,7 +40,6 @@ from simharness.world.motion.poses.kinematics import Cast
 
 _PACKAGES = ("simharness.world.motion.activities", "simharness.world.motion.interactions")
 _STROLL = (0.28, 0.39)  # Froude numbers: people stroll in a room; 0.42 is comfortable outdoors
-_ON_THE_WAY = frozenset({"cross", "swap", "hide", "visit"})
 _registered: "dict[str, Activity]" = {}
 
 Perform = TypeVar("Perform", bound=Callable[..., Performance])
@@ -134,14 +133,6 @@ def activities() -> Mapping[str, Activity]:
             "ActivityName in simharness/scenario/sections/people_section.py"
         )
     return MappingProxyType({name: _registered[name] for name in names if name in _registered})
-
-
-def activities_in_place() -> tuple[Activity, ...]:
-    """Return the activities of people who stay, without those that are about coming, going, passing and hiding.
-
-    What those people do in between, walking and standing, others do as well.
-    """
-    return tuple(each for each in activities().values() if each.name not in _ON_THE_WAY)
 
 
 def configured_activities(people: PeopleSection) -> dict[str, Activity]:

@@ -272,15 +272,9 @@ class _Stage:
         traffic = self._scenario.people.traffic
         entering, leaving = _traffic(self._scenario, self._groups[index].people[0])
         always = not (traffic.entering or traffic.leaving)
-        return Visitor(
-            entering=entering or always,
-            leaving=leaving or always,
-            away=traffic.away,
-            speed=float(np.sqrt(_GRAVITY * mover.leg_length)) * froude,
-            doors=self._doors,
-            room=self._scenario.room,
-            duration=self._scenario.duration,
-        )
+        speed = float(np.sqrt(_GRAVITY * mover.leg_length)) * froude
+        room, duration = self._scenario.room, self._scenario.duration
+        return Visitor(entering or always, leaving or always, traffic.away, speed, self._doors, room, duration)
 
     def _collides(self, performance: Performance, bodies: Sequence[SampledBody]) -> bool:
         """Return whether a performance comes too near to those of other groups."""

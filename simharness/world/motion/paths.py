@@ -192,7 +192,9 @@ def draw_loop(
     """
     start = float(rng.uniform())
     points = _ellipse(rng, half, tightest, half if widest is None else widest)
-    if np.abs(points).max() > half or _sharpest(points) > 1.0 / tightest:
+    ahead, behind = np.roll(points, -1, axis=0), np.roll(points, 1, axis=0)
+    sharpest = np.abs(_curvature((ahead - behind) / 2, ahead - 2 * points + behind)).max()  # without fitting a spline
+    if np.abs(points).max() > half or sharpest > 1.0 / tightest:
         return None
     loop = make_loop(points, speed=speed, start=start)
     bend = loop.curvature(np.linspace(0.0, loop.length / speed, 2 * _KNOTS))
@@ -209,12 +211,6 @@ def _ellipse(rng: np.random.Generator, half: float, tightest: float, widest: flo
     radial = 1.0 + wobble * np.cos(3 * around + phase)
     ellipse = np.stack([wide * radial * np.cos(around), slim * radial * np.sin(around)], axis=-1)
     return center + ellipse @ rotation_2d(tilt).T
-
-
-def _sharpest(points: Floats) -> float:
-    """Return the approximate greatest curvature of a closed curve of dense points (n, 2), without fitting a spline."""
-    ahead, behind = np.roll(points, -1, axis=0), np.roll(points, 1, axis=0)
-    return float(np.abs(_curvature((ahead - behind) / 2, ahead - 2 * points + behind)).max())
 
 
 def _curvature(tangent: Floats, bend: Floats) -> Floats:

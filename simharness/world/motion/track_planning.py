@@ -26,8 +26,15 @@ _FREE, _FREE_MARGIN = 0.1, 0.05  # seconds between checks of a visitor's way, an
 _SCREEN = 16  # every sixteenth coarse check comes first: most draws fail there
 
 
+class _Alone:
+    """Request of one person who needs no more room than a pelvis."""
+
+    clearance = 0.0
+    people = 1
+
+
 @dataclass(frozen=True)
-class LoopRequest:
+class LoopRequest(_Alone):
     """Request for a loop."""
 
     activity: str
@@ -55,7 +62,7 @@ class SpotRequest:
 
 
 @dataclass(frozen=True)
-class RecordedRequest:
+class RecordedRequest(_Alone):
     """Request for a recorded path: ``offset`` (N, 2) in metres from its start at ``time`` (N,) in seconds."""
 
     activity: str
@@ -64,7 +71,7 @@ class RecordedRequest:
 
 
 @dataclass(frozen=True)
-class VisitRequest:
+class VisitRequest(_Alone):
     """Request for the route of a visitor."""
 
     activity: str
@@ -121,20 +128,21 @@ def plan_tracks(
     for plan in range(_PLANS):
         board = _Board(span, spacing, around)
         order = list(range(len(requests)))
-        if plan:
-            order.sort(key=lambda index: _urgency(requests[index], movers_first=plan % 2 == 0))
+        if plan:  # moving people before or after the others, and large clearances first
+            last = plan % 2 == 0  # spots
+            order.sort(key=lambda k: (isinstance(requests[k], SpotRequest) == last, -requests[k].clearance))
         order.sort(key=lambda index: isinstance(requests[index], VisitRequest))
         for index in order:
             rng = stream(seed, "people", people[index], "track", plan)
             square = _square(requests[index], half, limit, plan)
             refusals = _place(rng, index, requests[index], board, plan=plan, half=square, admit=admit)
             if index not in board.tracks:
-                placed = max(placed, sum(_people(requests[done]) for done in board.tracks))
+                placed = max(placed, sum(requests[done].people for done in board.tracks))
                 refused += refusals
                 break
         else:
             return tuple(board.tracks[index] for index in range(len(requests)))
-    count = sum(map(_people, requests))
+    count = sum(request.people for request in requests)
     touching = f" ({refused} tracks kept that distance, but people or their props touched)" if refused else ""
     grown = any(_square(request, half, limit, plan=0) > half for request in requests)
     room = f" (recorded paths in {limit + paths.SWAY:.2f} m, up to the walls)" if grown else ""
@@ -164,7 +172,8 @@ def _place(
         for attempt in range(_TRIES)
     )
     if isinstance(request, VisitRequest):
-        drawn = (_draw_visit(rng, request, board, half=half) for _ in range(_VISIT_TRIES))
+        routes = (request.visitor.draw(rng, half=half, start=board.start, free=board.free) for _ in range(_VISIT_TRIES))
+        drawn = ([] if route is None else [route] for route in routes)
     candidates: Iterable[paths.Track] = (track for tracks in drawn for track in tracks if board.apart(track, request))
     if plan and isinstance(request, SpotRequest):
         candidates = sorted(candidates, key=lambda track: board.elbow_room(track, request, half))
@@ -200,7 +209,7 @@ class _Board:
 
     def add(self, index: int, track: paths.Track, request: TrackRequest) -> None:
         self.tracks[index] = track
-        self._needs.append(_clearance(request))
+        self._needs.append(request.clearance)
         self._taken = np.concatenate([self._taken, _places(track, self._time)[None]])
 
     def apart(self, track: paths.Track, request: TrackRequest) -> bool:
@@ -209,7 +218,7 @@ class _Board:
             return False
         if not self.tracks:
             return True
-        least = self._spacing + 2 * paths.SWAY + _clearance(request) + np.array(self._needs)[:, None]
+        least = self._spacing + 2 * paths.SWAY + request.clearance + np.array(self._needs)[:, None]
         screen = self._time[::_SCREEN]
         if (_distance(_places(track, screen), self._taken[:, ::_SCREEN]) < least).any():
             return False
@@ -239,7 +248,7 @@ class _Board:
         return True
 
     def _clear_of_centre(self, track: paths.Track, request: TrackRequest) -> bool:
-        least = self._around + paths.SWAY + _clearance(request)
+        least = self._around + paths.SWAY + request.clearance
         if (np.hypot(*track.position(self._time).T) < least).any():
             return False
         fine = np.arange(self._time[0], self._time[-1], _FINE)
@@ -251,9 +260,9 @@ class _Board:
         Summed over both axes, so that it is smallest in corners.
         """
         place = spot.position(0.0)
-        least = self._spacing + 2 * paths.SWAY + _clearance(request) + np.array(self._needs)[:, None]
+        least = self._spacing + 2 * paths.SWAY + request.clearance + np.array(self._needs)[:, None]
         others = (_distance(place, self._taken) - least).min(initial=np.inf)
-        return float(np.minimum(others, half - _clearance(request) - np.abs(place)).sum())
+        return float(np.minimum(others, half - request.clearance - np.abs(place)).sum())
 
 
 def _places(track: paths.Track, time: Floats) -> Floats:
@@ -265,19 +274,6 @@ def _places(track: paths.Track, time: Floats) -> Floats:
 
 def _distance(one: Floats, other: Floats) -> Floats:
     return np.hypot(other[..., 0] - one[..., 0], other[..., 1] - one[..., 1])
-
-
-def _clearance(request: TrackRequest) -> float:
-    return request.clearance if isinstance(request, SpotRequest) else 0.0
-
-
-def _urgency(request: TrackRequest, *, movers_first: bool) -> tuple[bool, float]:
-    """Return a sort key: moving people before or after the others, and large clearances first."""
-    return isinstance(request, SpotRequest) == movers_first, -_clearance(request)
-
-
-def _people(request: TrackRequest) -> int:
-    return request.people if isinstance(request, SpotRequest) else 1
 
 
 def _limits(request: LoopRequest, half: float) -> paths.LoopLimits:
@@ -295,7 +291,7 @@ def _draw(
     if isinstance(request, RecordedRequest):
         recorded = paths.draw_recorded(rng, half=half, time=request.time, offset=request.offset)
         return [] if recorded is None else [recorded]
-    assert isinstance(request, LoopRequest)  # visitors have :func:`_draw_visit`
+    assert isinstance(request, LoopRequest)  # routes of visitors are drawn by them
     limits = _limits(request, half)
     follows, which = rng.uniform(size=2)
     starts = rng.uniform(size=_STARTS)
@@ -314,14 +310,6 @@ def _draw(
         fit = speeds[(limits.slowest <= speeds) & (speeds <= limits.fastest)]
         loop = replace(loop, speed=float(fit[0])) if len(fit) else loop
     return [replace(loop, start=float(start) * loop.length) for start in starts]
-
-
-def _draw_visit(
-    rng: np.random.Generator, request: VisitRequest, board: _Board, *, half: float
-) -> Sequence[paths.Track]:
-    """Draw a route of a visitor round the other tracks, possibly none."""
-    route = request.visitor.draw(rng, half=half, start=board.start, free=board.free)
-    return [] if route is None else [route]
 
 
 def _square(request: TrackRequest, half: float, limit: float, plan: int) -> float:

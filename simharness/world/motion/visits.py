@@ -166,7 +166,7 @@ class Visitor:
     def _make_way(self, walker: Itinerary, rng: np.random.Generator, *, half: float, free: FreeWay) -> bool:
         """Wait, or go a few steps to where nobody comes; return False where neither is possible."""
         near = walker.place + rng.uniform(-_ASIDE, _ASIDE, (_PLACES, 2))
-        return walker.attempt(_wait, self._free(free)) or any(
+        return walker.attempt(lambda each: each.stand(_PAUSE), self._free(free)) or any(
             walker.attempt(partial(_go_and_stay, place=place, stay=0.0), self._free(free))
             for place in near.clip(-half, half)
         )
@@ -229,10 +229,6 @@ def _leave(walker: Itinerary, *, door: Door) -> Itinerary:
     if not door.faces(walker.place):
         walker.walk_to(door.straight(door.place))
     return walker.walk_to(door.beyond(walker.place))
-
-
-def _wait(walker: Itinerary) -> Itinerary:
-    return walker.stand(_PAUSE)
 
 
 def in_room(room: RoomSection, place: Floats) -> Bools:

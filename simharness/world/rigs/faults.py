@@ -106,11 +106,8 @@ class ExposureSchedule:
     def camera(self, frame: int, view: int) -> Camera:
         """Return the true camera, drift included, that took the picture delivered by ``view`` in ``frame``."""
         index = self.camera_of_view[view]
-        return moved(
-            self.true_cameras[index],
-            float(self.time[frame, view]) * self.rotation_rate[index],
-            float(self.time[frame, view]) * self.velocity[index],
-        )
+        time = float(self.time[frame, view])
+        return moved(self.true_cameras[index], time * self.rotation_rate[index], time * self.velocity[index])
 
 
 def moved(camera: Camera, rotation: ArrayLike, shift: ArrayLike) -> Camera:

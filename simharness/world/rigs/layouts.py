@@ -86,12 +86,9 @@ def _laid_out(cameras: CamerasSection, seed: int, room: tuple[float, float, floa
         aims[k] += cameras.aim_jitter * stream(seed, "cameras", "aim", k).standard_normal(3)
     K = intrinsics(cameras.fov, cameras.size)
     distortion = np.array(cameras.distortion)
-    return Rig(
-        [
-            look_at(center, aim, K=K, size=cameras.size, distortion=distortion, name=f"cam{k}")
-            for k, (center, aim) in enumerate(zip(centers, aims, strict=True))
-        ]
-    )
+    lens: dict[str, Any] = {"K": K, "size": cameras.size, "distortion": distortion}
+    placed = zip(centers, aims, strict=True)
+    return Rig([look_at(center, aim, **lens, name=f"cam{k}") for k, (center, aim) in enumerate(placed)])
 
 
 def _from_file(cameras: CamerasSection) -> Rig:
@@ -321,14 +318,6 @@ def preset_rig(name: str, *, only: Sequence[str] = ()) -> Rig:
 
 
 def _camera(name: str, entry: dict[str, Any], size: list[int]) -> Camera:
-    R = Rotation.from_rotvec(entry["rotation"]).as_matrix()
-    return Camera(
-        K=np.array(
-            [[entry["focal"][0], 0.0, entry["center"][0]], [0.0, entry["focal"][1], entry["center"][1]], [0, 0, 1]]
-        ),
-        R=R,
-        t=-R @ np.array(entry["position"]),
-        distortion=np.array(entry.get("distortion", np.zeros(5))),
-        size=(size[0], size[1]),
-        name=name,
-    )
+    (fx, fy), (cx, cy), R = entry["focal"], entry["center"], Rotation.from_rotvec(entry["rotation"]).as_matrix()
+    K, lens = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0, 0, 1]]), np.array(entry.get("distortion", np.zeros(5)))
+    return Camera(K=K, R=R, t=-R @ np.array(entry["position"]), distortion=lens, size=(size[0], size[1]), name=name)

@@ -15,13 +15,7 @@ from simharness.world.motion.poses.foot_placement import (
     spot_to_world,
     stance,
 )
-from simharness.world.motion.poses.inverse_kinematics import (
-    Feet,
-    arm_angles,
-    reach_with,
-    shoulder_girdle,
-    solve_legs,
-)
+from simharness.world.motion.poses.inverse_kinematics import Feet, arm_angles, reach_with, shoulder_girdle, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import Curves, blend, cycle_time, minimum_jerk, relaxed_posture
 

@@ -17,13 +17,7 @@ from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses import foot_placement, timing
 from simharness.world.motion.poses.foot_placement import foot_path, spot_to_world, stance
-from simharness.world.motion.poses.inverse_kinematics import (
-    Pelvis,
-    arm_angles,
-    reach_with,
-    solve_legs,
-    solve_standing,
-)
+from simharness.world.motion.poses.inverse_kinematics import Pelvis, arm_angles, reach_with, solve_legs, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
 
 
@@ -38,12 +32,8 @@ def reach(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
 
     tiptoe = np.radians(-18.0 * tall) * high
     lean = np.radians(2.0 + 24.0 * low)
-    hip = foot_placement.hip_position(
-        kinematics,
-        shank=np.radians(6.0 + (7.0 + 8.0 * deep) * low),
-        thigh=np.radians(7.0 + (24.0 + 30.0 * deep) * low),
-        pitch=tiptoe,
-    )
+    shank, thigh = np.radians(6.0 + (7.0 + 8.0 * deep) * low), np.radians(7.0 + (24.0 + 30.0 * deep) * low)
+    hip = foot_placement.hip_position(kinematics, shank=shank, thigh=thigh, pitch=tiptoe)
     prints = {foot: foot_placement.stance(kinematics, foot, apart=1.15).moved(0.06) for foot in SIDES}
     hip[:, 0] += prints["left"].place[0]
     aside = 0.012 * sign * np.maximum(high, low) + 0.005 * timing.smooth_noise(time, rng, 0.2)

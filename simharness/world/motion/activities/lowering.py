@@ -69,12 +69,8 @@ def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
 
     shank, thigh, on_toes = _kneeling(kinematics)
     pitch = np.radians(through(0.0, -38.0, np.degrees(on_toes)))
-    hip = hip_position(
-        kinematics,
-        shank=np.radians(through(3.0, 52.0, np.degrees(shank))),
-        thigh=np.radians(through(5.0, -30.0, np.degrees(thigh))),
-        pitch=pitch,
-    )
+    shanks, thighs = through(3.0, 52.0, np.degrees(shank)), through(5.0, -30.0, np.degrees(thigh))
+    hip = hip_position(kinematics, shank=np.radians(shanks), thigh=np.radians(thighs), pitch=pitch)
     knelt = hip_position(kinematics, shank=shank, thigh=thigh, pitch=on_toes)
     half = knelt[0] / 2  # centres the path of the pelvis on the spot
     back_print, front_print = (stance(kinematics, side).moved(-half) for side in (back, front))
@@ -83,12 +79,9 @@ def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     aside = 0.35 * back_print.place[1] * through(0.0, 1.0, 0.3)
     lean = np.radians(through(1.0, 8.0, 3.0 + 4.0 * bow))
     pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=lean, aside=aside)
-    feet = {
-        back: foot_path(kinematics, spot, time, back_print, pitch=pitch),
-        front: foot_path(
-            kinematics, spot, u, front_print, [(PEELING, stepped, lunge), (up + 0.1, home, front_print)], lift=0.09
-        ),
-    }
+    steps = [(PEELING, stepped, lunge), (up + 0.1, home, front_print)]
+    feet = {back: foot_path(kinematics, spot, time, back_print, pitch=pitch)}
+    feet[front] = foot_path(kinematics, spot, u, front_print, steps, lift=0.09)
     curves = timing.relaxed_posture(time, rng)
     low = through(0.0, 0.15, 1.0)
     _rest_on_knee(curves, low, front)

@@ -143,7 +143,8 @@ def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gene
     forward = {"left": -np.cos(cycle - 0.1 * np.pi), "right": np.cos(cycle - 0.1 * np.pi)}  # with the opposite leg
     arms = (0.75 + 0.5 * swing) * (0.5 + 0.5 * vigour)
     turned = np.degrees(pelvis.bearing - loop.heading(time))
-    bank = np.degrees(_bank(loop, time))
+    leaning = np.arctan(loop.speed**2 * loop.curvature(time) / _GRAVITY)  # into the bend, positive to the left
+    bank = np.degrees(np.clip(leaning, -0.3, 0.3))
     posture: dict[str, ArrayLike] = dict(
         lumbar_flexion=3.0,
         thorax_flexion=3.0,
@@ -162,11 +163,6 @@ def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gene
     )
     lap, strides = laps(loop, stride)
     return solve_standing(kinematics, time, pelvis, feet, posture, straightest=_RUN_BENT, fit=stances(lap, strides))
-
-
-def _bank(loop: Loop, time: Floats) -> Floats:
-    """Return the lean of a runner into the bend, positive to the left, (T,) radians."""
-    return np.clip(np.arctan(loop.speed**2 * loop.curvature(time) / _GRAVITY), -0.3, 0.3)
 
 
 def make_stride(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> Gait:

@@ -33,13 +33,7 @@ from simharness.world.motion.activity_registry import Activity, solo, solo_activ
 from simharness.world.motion.motion import Motion, Performance, Prop
 from simharness.world.motion.paths import Itinerary, Route, Spot, turning_time
 from simharness.world.motion.poses.foot_placement import Footprints, spot_to_world
-from simharness.world.motion.poses.inverse_kinematics import (
-    Foot,
-    Pelvis,
-    follow_shank,
-    pelvis_height,
-    solve_legs,
-)
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, follow_shank, pelvis_height, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import blend, relaxed_posture, smoothstep
 

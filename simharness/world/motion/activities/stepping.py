@@ -19,14 +19,7 @@ from simharness.world.motion.poses.foot_placement import (
 )
 from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, solve_legs, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.timing import (
-    blend,
-    bump,
-    cycle_time,
-    minimum_jerk,
-    relaxed_posture,
-    smooth_noise,
-)
+from simharness.world.motion.poses.timing import blend, bump, cycle_time, minimum_jerk, relaxed_posture, smooth_noise
 
 Steps = Mapping[str, list[tuple[float, float, Footprint]]]  # by side: take-off time, landing time, footprint
 

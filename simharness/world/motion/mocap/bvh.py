@@ -36,11 +36,9 @@ def read_bvh(path: Path) -> RecordedMotion:
     """
     reader = Reader(path)
     joints = _hierarchy(reader)
-    skeleton = MocapSkeleton(
-        tuple(joint.name for joint in joints),
-        np.array([joint.parent for joint in joints]),
-        np.array([joint.offset if joint.parent >= 0 else [0.0, 0.0, 0.0] for joint in joints]),
-    )
+    offsets = np.array([joint.offset if joint.parent >= 0 else [0.0, 0.0, 0.0] for joint in joints])
+    names, parents = tuple(joint.name for joint in joints), np.array([joint.parent for joint in joints])
+    skeleton = MocapSkeleton(names, parents, offsets)
     width = sum(len(joint.channels) for joint in joints)
     frames, rate = _heading(reader)
     rows = reader.rest()
@@ -83,7 +81,10 @@ def _hierarchy(reader: Reader) -> list[_Joint]:
             break
         if key in ("ROOT", "JOINT", "END"):
             joints.append(_joint(line, key, joints, opened))
-            _brace(reader, line)
+            if line.words[-1] != "{":
+                brace = reader.take("{")
+                if brace.words != ("{",):
+                    raise brace.error(f"expected {{ alone, got {quoted(' '.join(brace.words))}")
             opened.append(len(joints) - 1)
         elif not opened:
             raise line.error(f"expected ROOT, got {quoted(line.words[0])}")
@@ -119,13 +120,6 @@ def _joint(line: Line, key: str, joints: list[_Joint], opened: list[int]) -> _Jo
     if any(joint.name == name for joint in joints):
         raise line.error(f"the joint {quoted(name)} is defined twice")
     return _Joint(name, line, parent)
-
-
-def _brace(reader: Reader, line: Line) -> None:
-    if line.words[-1] != "{":
-        brace = reader.take("{")
-        if brace.words != ("{",):
-            raise brace.error(f"expected {{ alone, got {quoted(' '.join(brace.words))}")
 
 
 def _channels(line: Line, joint: _Joint) -> list[str]:

@@ -157,7 +157,10 @@ def plant_foot(ankle: Floats, turn: Floats, standing: Bools, sole: Sole, *, rate
     for start, stop in stances:
         held[start:stop] = _settled(recorded[start:stop])
     turn = Rotation.from_euler("ZYX", (recorded + _faded(held - recorded, stances, rate)) * [1, -1, 1]).as_matrix()
-    held_at = [_anchor(ankle[start:stop, :2], turn[start:stop], sole) for start, stop in stances]
+    held_at = []  # where the rolling foot is nearest to its recorded positions while it is flat
+    for start, stop in stances:
+        place, flat = ankle[start:stop, :2] - sole.rolled(turn[start:stop]), _flatness(_angles(turn[start:stop])[1])
+        held_at.append(np.average(place, axis=0, weights=flat))
     lifted, anchors = _lifted(clearance - ground, stances), np.reshape(held_at, (-1, 2))
     return FootPath(turn, lifted, ground, ankle[:, :2], stances, anchors, sole, rate)
 
@@ -197,11 +200,6 @@ def _settled(angles: Floats) -> Floats:
     )  # close to the recorded pitch where it is large, and smooth
     bearing = np.full(len(pitch), np.average(bearing, weights=_flatness(pitch)))
     return np.column_stack([bearing, flat, np.zeros(len(pitch))])
-
-
-def _anchor(place: Floats, turn: Floats, sole: Sole) -> Floats:
-    """Return the anchor, (2,), with the rolling foot nearest to its recorded positions (n, 2) where it is flat."""
-    return np.average(place - sole.rolled(turn), axis=0, weights=_flatness(_angles(turn)[1]))
 
 
 def _flatness(pitch: Floats) -> Floats:

@@ -48,15 +48,11 @@ def reenact(people: People, person: int, kinematics: Kinematics, *, time: Floats
 
 def follow(joints: Floats, kinematics: Kinematics, *, time: Floats) -> Motion:
     """Return the motion of a body whose joints follow COCO-17 joints (N, 17, 3), metres, at times (N,), seconds."""
-    source = _source(time, joints, kinematics, _neutral_joints(kinematics))
+    root = np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
+    neutral = kinematics.joints(Motion(np.zeros(1), root, np.zeros((1, len(DOFS)))))[0]  # in the pelvis frame
+    source = _source(time, joints, kinematics, neutral)
     rate = 1.0 / np.diff(time).mean() if len(time) > 1 else RATE
     return follow_joints(retarget(source, kinematics), kinematics, joints, rate=rate)
-
-
-def _neutral_joints(kinematics: Kinematics) -> Floats:
-    """Return the COCO-17 joints (17, 3) of the neutral pose in the pelvis frame."""
-    root = np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
-    return kinematics.joints(Motion(np.zeros(1), root, np.zeros((1, len(DOFS)))))[0]
 
 
 def _source(time: Floats, joints: Floats, kinematics: Kinematics, neutral: Floats) -> SourceMotion:

@@ -84,16 +84,11 @@ def source_motion(recording: RecordedMotion, *, rate: float) -> SourceMotion:
         for segment, end in ends.items():
             segments[side, segment] = places[:, end] - places[:, limb[segment]]
     rotations["pelvis"] = tilt_pelvis(rotations["pelvis"], segments, rate=recording.rate)
-    return SourceMotion(
-        time=np.arange(len(recording)) / recording.rate,
-        turns=rotations,
-        segments=segments,
-        hips=np.mean([places[:, roles.limbs[side]["thigh"]] for side in SIDES], axis=0),
-        legs={
-            side: float(sum(np.linalg.norm(segments[side, part], axis=1)[0] for part in ("thigh", "shank")))
-            for side in SIDES
-        },
-    )
+    time = np.arange(len(recording)) / recording.rate
+    hips = np.mean([places[:, roles.limbs[side]["thigh"]] for side in SIDES], axis=0)
+    first = {key: float(np.linalg.norm(vectors, axis=1)[0]) for key, vectors in segments.items()}
+    legs = {side: first[side, "thigh"] + first[side, "shank"] for side in SIDES}
+    return SourceMotion(time, rotations, segments, hips, legs)
 
 
 def tilt_pelvis(pelvis: Floats, segments: dict[tuple[str, str], Floats], *, rate: float) -> Floats:
@@ -233,12 +228,8 @@ def _leg(kinematics: Kinematics, side: str, position: Floats, pelvis: Floats, st
 
 def _heights(kinematics: Kinematics, position: Floats, pelvis: Floats, steps: list[FootPath], knee: float) -> Floats:
     """Return the heights of the pelvis at which each knee flexes by ``knee`` radians, (2, N) metres."""
-    return np.stack(
-        [
-            pelvis_height(kinematics, side, position[:, :2], pelvis, step.ankle(step.turn), knee)
-            for side, step in zip(SIDES, steps, strict=True)
-        ]
-    )
+    ankles, ground = {side: step.ankle(step.turn) for side, step in zip(SIDES, steps, strict=True)}, position[:, :2]
+    return np.stack([pelvis_height(kinematics, side, ground, pelvis, ankles[side], knee) for side in SIDES])
 
 
 def _ankle(recorded: SourceMotion, kinematics: Kinematics, side: str, position: Floats) -> Floats:

@@ -6,11 +6,13 @@ The joints of a recorded skeleton are mapped to a person by their names and hier
 import re
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats, Integers
+from mvpose.files.input_files import parse_toml
 from simharness.world.humans.anatomy import SIDES
 
 END = " end"  # suffix of a joint name: tip of its bone, a joint without rotation
@@ -92,19 +94,8 @@ def lowest_common_ancestor(skeleton: MocapSkeleton, first: int, second: int) -> 
     return next(joint for joint in skeleton.ancestors(second) if joint in above)
 
 
-# Joint names by role, without the side, best first: of CMU, MotionBuilder, Biovision, Poser, 3ds Max and Blender. Two
-# roles of a limb may share a name ("shoulder" is the clavicle in one skeleton and the upper arm in another), so the
-# first match counts.
-_NAMES = {
-    "thigh": ("upleg", "upperleg", "femur", "thigh", "hip"),
-    "shank": ("leg", "tibia", "shin", "calf", "lowerleg", "lowleg", "knee"),
-    "foot": ("foot", "ankle"),
-    "arm": ("humerus", "upperarm", "uparm", "shldr", "arm", "shoulder"),
-    "forearm": ("radius", "forearm", "lowerarm", "lowarm", "elbow"),
-    "hand": ("hand", "wrist"),
-    "toes": ("toebase", "toes", "toe", "ball"),
-    "collar": ("clavicle", "collar", "collarbone", "shoulder"),
-}
+_FILE = Path(__file__).parents[1] / "data" / "joint_names.toml"
+_NAMES: dict[str, list[str]] = parse_toml(_FILE.read_text(encoding="utf-8"))  # by role
 _OPTIONAL = frozenset({"hand", "toes", "collar"})
 _LIMBS = (("thigh", "shank", "foot", "toes"), ("collar", "arm", "forearm", "hand"))
 _SIDE_WORDS = {"left": "left", "l": "left", "right": "right", "r": "right"}
@@ -163,13 +154,9 @@ def map_joints(recording: RecordedMotion) -> JointMap:
 
     pelvis = lowest_common_ancestor(skeleton, *(limbs[side]["thigh"] for side in SIDES))
     tops = [limbs[side]["collar"] if limbs[side]["collar"] >= 0 else limbs[side]["arm"] for side in SIDES]
-    chest = lowest_common_ancestor(skeleton, *(_above(skeleton, top) for top in tops))
+    chest = lowest_common_ancestor(skeleton, *(int(skeleton.parents[top]) for top in tops))
     heads = [joint for joint, (side, word) in enumerate(named) if side is None and word == "head"]
     return JointMap(pelvis, chest, heads[0] if heads else -1, limbs, _axes(recording, limbs))
-
-
-def _above(skeleton: MocapSkeleton, joint: int) -> int:
-    return int(skeleton.parents[joint])
 
 
 def _side_and_word(name: str) -> tuple[str | None, str]:

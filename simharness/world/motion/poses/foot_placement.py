@@ -100,11 +100,8 @@ def foot_path(
         before = after
     ahead, height = kinematics.rolling.at(tilt)
     ground = ground + ahead[:, None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
-    return Foot(
-        ankle=np.column_stack([spot_to_world(spot, ground), height + floor + aloft]),
-        bearing=spot.bearing + bearing,
-        pitch=tilt,
-    )
+    ankle = np.column_stack([spot_to_world(spot, ground), height + floor + aloft])
+    return Foot(ankle, spot.bearing + bearing, tilt)
 
 
 def spot_to_world(spot: Spot, place: ArrayLike) -> Floats:

@@ -85,6 +85,9 @@ def solve_standing(
 ) -> Motion:
     """Place the pelvis as high as the legs allow, and solve the legs for the given feet.
 
+    The mean height is one constant for the whole motion, the greatest at which no knee flexes less than
+    ``straightest``: a height fitted frame by frame would jerk at every step.
+
     Args:
         kinematics: body.
         time: times in seconds, (T,).
@@ -95,18 +98,11 @@ def solve_standing(
         fit: pelvis and feet to which the height is fitted, if it must not depend on ``time``: their whole cycle, or its
             extremes; None: ``pelvis`` and ``feet``.
     """
-    height = highest_pelvis(kinematics, *(fit or (pelvis, feet)), straightest=straightest)
+    fitted, planted = fit or (pelvis, feet)
+    turn, ground = fitted.turn.as_matrix(), fitted.ground
+    highest = [pelvis_height(kinematics, side, ground, turn, planted[side].ankle, straightest) for side in SIDES]
+    height = float(np.min(highest - fitted.bob, initial=np.inf))
     return solve_legs(kinematics, time, pelvis, height, feet, posture)
-
-
-def highest_pelvis(kinematics: Kinematics, pelvis: Pelvis, feet: Feet, *, straightest: float) -> float:
-    """Return the greatest mean height of the pelvis, in metres, at which no knee flexes less than ``straightest``.
-
-    It is one constant for the whole motion: a height fitted frame by frame would jerk at every step.
-    """
-    turn = pelvis.turn.as_matrix()
-    highest = [pelvis_height(kinematics, side, pelvis.ground, turn, feet[side].ankle, straightest) for side in SIDES]
-    return float(np.min(highest - pelvis.bob, initial=np.inf))
 
 
 def solve_legs(

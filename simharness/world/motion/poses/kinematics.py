@@ -186,12 +186,8 @@ class Kinematics:
         """Return the chain of hinges in the pelvis frame, read from MuJoCo in the neutral configuration."""
         self._pose(_ORIGIN, np.zeros(len(DOFS)))
         ids = [self._model.joint(name).id for name in hinges]
-        return Chain(
-            axes=self._data.xaxis[ids].copy(),
-            anchors=self._data.xanchor[ids].copy(),
-            end=end,
-            ranges=np.array([RANGES[name] for name in hinges]),
-        )
+        axes, anchors = self._data.xaxis[ids].copy(), self._data.xanchor[ids].copy()
+        return Chain(axes, anchors, end, np.array([RANGES[name] for name in hinges]))
 
 
 Cast = Sequence[Kinematics]

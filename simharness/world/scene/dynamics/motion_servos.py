@@ -186,17 +186,14 @@ class MotionServos:
             placements = [solid.trajectory.at(times) for solid in self._moving if solid.trajectory is not None]
             feedforward = self._feedforward(times[:: self._substeps], plan, placements)
             if start == 0:
-                self._begin(plan, placements)
+                self.data.qpos[:], self.data.qvel[:] = self._configuration(plan, 0)
+                self._place(placements, 0)
+                mujoco.mj_forward(self.model, self.data)
                 yield self.data.qpos.copy()
             for k in range((stop - start) * self._substeps):
                 self._step(plan, placements, feedforward[k + 1], k + 1, float(times[k]))
                 if (k + 1) % self._substeps == 0:
                     yield self.data.qpos.copy()
-
-    def _begin(self, plan: "_Plan", placements: list[Floats]) -> None:
-        self.data.qpos[:], self.data.qvel[:] = self._configuration(plan, 0)
-        self._place(placements, 0)
-        mujoco.mj_forward(self.model, self.data)
 
     def _configuration(self, plan: "_Plan", k: int) -> tuple[Floats, Floats]:
         """Return the planned ``qpos`` and ``qvel`` of all people at index ``k`` of the plan."""
@@ -237,7 +234,9 @@ class MotionServos:
         self._place(placements, k)
         speed = data.qvel[self.hinge_dofs]
         off = plan.angles[k] - data.qpos[self.hinges] - self.model.opt.timestep * speed
-        adherence = self._adherence(plan, k)
+        away = np.linalg.norm(plan.roots[k, :, :3] - data.qpos[self.roots[:, :3]], axis=1)
+        near, far = _REACH
+        adherence = np.clip((far - away) / (far - near), 0.0, 1.0)  # to the plan: 1 near the planned pelvis
         servo = self._stiffness * (off + _DAMPING * (plan.speeds[k] - speed))
         wanted = adherence[:, None] * feedforward + servo
         torque = np.clip(wanted, -self._strength, self._strength)
@@ -249,12 +248,6 @@ class MotionServos:
             if share := push.share(time, self.model.opt.timestep):
                 data.xfrc_applied[bone, :3] += share * np.array(push.force)
         mujoco.mj_step(self.model, data)
-
-    def _adherence(self, plan: "_Plan", k: int) -> Floats:
-        """Return the weight of the plan of each person, (P,): 1 near the planned pelvis, 0 out of reach of it."""
-        off = np.linalg.norm(plan.roots[k, :, :3] - self.data.qpos[self.roots[:, :3]], axis=1)
-        near, far = _REACH
-        return np.clip((far - off) / (far - near), 0.0, 1.0)
 
     def _assistance(self, plan: "_Plan", adherence: Floats, k: int) -> Floats:
         """Return bounded forces and torques (P, 6) that pull the pelvises towards their planned poses."""

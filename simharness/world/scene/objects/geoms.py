@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol, Self
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -15,18 +15,6 @@ from simharness.types.floor import Floor
 Point = tuple[float, float, float]
 
 _SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-
-
-class Geom(Protocol):
-    """Interface of the geoms of an object."""
-
-    def moved(self, place: ArrayLike, yaw: float) -> Self:
-        """Return the geom rotated by ``yaw`` about the world z axis, then moved by ``place`` (2,) on the floor."""
-        ...
-
-    def add_to(self, spec: mujoco.MjSpec, body: Any, name: str) -> None:
-        """Add the geom to a body of a MuJoCo model, under a name that is unique in the model."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -92,7 +80,7 @@ class Box:
         return best
 
     def moved(self, place: ArrayLike, yaw: float) -> "Box":
-        """See :class:`Geom`."""
+        """Return the geom rotated by ``yaw`` about the world z axis, then moved by ``place`` (2,) on the floor."""
         return Box(_point(carried(self.center, place, yaw)), self.half, self.yaw + yaw)
 
     def raised(self, height: float) -> "Box":
@@ -101,7 +89,7 @@ class Box:
         return Box((x, y, float(z + height)), self.half, self.yaw)
 
     def add_to(self, spec: mujoco.MjSpec, body: Any, name: str) -> None:
-        """See :class:`Geom`."""
+        """Add the geom to a body of a MuJoCo model, under a name that is unique in the model."""
         quat = [np.cos(self.yaw / 2), 0.0, 0.0, np.sin(self.yaw / 2)]
         body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_BOX, pos=self.center, size=self.half, quat=quat)
 
@@ -117,11 +105,11 @@ class Surface:
     touches: bool = True
 
     def moved(self, place: ArrayLike, yaw: float) -> "Surface":
-        """See :class:`Geom`."""
+        """Return the geom rotated by ``yaw`` about the world z axis, then moved by ``place`` (2,) on the floor."""
         return replace(self, vertices=carried(self.vertices, place, yaw))
 
     def add_to(self, spec: mujoco.MjSpec, body: Any, name: str) -> None:
-        """See :class:`Geom`; the mesh asset gets the same name."""
+        """Add the geom to a body of a MuJoCo model, under a unique name, which the mesh asset gets as well."""
         spec.add_mesh(
             name=name,
             uservert=self.vertices.ravel(),
@@ -130,6 +118,9 @@ class Surface:
         )
         touches = {} if self.touches else {"contype": 0, "conaffinity": 0}
         body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **touches)
+
+
+Geom = Box | Surface
 
 
 def carried(points: ArrayLike, place: ArrayLike, yaw: float) -> Floats:

@@ -299,7 +299,9 @@ def place_furniture(seed: int, space: FreeSpace, openings: Sequence[Opening]) ->
     if not furniture:
         return ()
     site, sheet, walls = Site(space), draw_sheet(seed), room_walls(space.room)
-    lines = _thinned(lines_in(space))
+    lines = lines_in(space)
+    step = max(1, len(lines) // _LINES)
+    lines = SightLines(lines.starts[::step], lines.ends[::step], lines.time[::step])
     area = Box((0.0, 0.0, 1.0), (space.area, space.area, 1.0)) if space.pelvises.size else None
     share = sum(wall.length for wall in walls) / _WALLS
     placed: list[Solid] = []
@@ -353,8 +355,3 @@ def _along_walls(share: float, wall: Wall, model: ObjectModel) -> tuple[Floats, 
     depth, width = model.extent.half[0], model.extent.half[1]
     along = width + share * max(wall.length - 2 * width, 0.0)
     return wall.at((along, depth + _BEHIND, 0.0))[:2], wall.yaw
-
-
-def _thinned(lines: SightLines) -> SightLines:
-    step = max(1, len(lines) // _LINES)
-    return SightLines(lines.starts[::step], lines.ends[::step], lines.time[::step])

@@ -85,13 +85,12 @@ class FreeSpace:
 
     def obstructed(self, hull: Box) -> bool:
         """Return whether an object with this hull obstructs a person at any time."""
-        return any(_comes_near(hull, tree, margin) for tree, margin in self._people)
-
-
-def _comes_near(hull: Box, tree: cKDTree, margin: float) -> bool:
-    reach = float(np.hypot(*hull.half[:2])) + margin
-    near = tree.data[tree.query_ball_point(hull.center[:2], reach)]
-    return bool((hull.distance_on_floor(np.pad(near, ((0, 0), (0, 1)))) < margin).any())
+        for tree, margin in self._people:
+            reach = float(np.hypot(*hull.half[:2])) + margin
+            near = tree.data[tree.query_ball_point(hull.center[:2], reach)]
+            if (hull.distance_on_floor(np.pad(near, ((0, 0), (0, 1)))) < margin).any():
+                return True
+        return False
 
 
 def _thinned(points: Floats) -> Floats:

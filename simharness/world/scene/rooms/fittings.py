@@ -106,13 +106,8 @@ def _sockets(sheet: Sheet, wall: Wall, taken: Sequence[Taken]) -> list[Mesh]:
     """Return pairs of sockets along the wall, above the skirting board."""
     low = [each for each in taken if each[2] < 0.3]
     middles = [(k + 0.5) * _SOCKETS for k in range(int(wall.length // _SOCKETS))]
-    places = [
-        y
-        for middle in middles
-        for y in (middle - 0.04, middle + 0.045)
-        if _is_free(low, y - 0.04, y + 0.04, 0.24, 0.34)
-    ]
-    return [_hang(sheet, wall, "socket", (y - 0.04, y + 0.04, 0.24, 0.32)) for y in places]
+    spans = [(y - 0.04, y + 0.04) for middle in middles for y in (middle - 0.04, middle + 0.045)]
+    return [_hang(sheet, wall, "socket", (*span, 0.24, 0.32)) for span in spans if _is_free(low, *span, 0.24, 0.34)]
 
 
 def _prints(sheet: Sheet, room: RoomSection, rng: np.random.Generator, wall: Wall, taken: list[Taken]) -> list[Mesh]:
@@ -149,13 +144,10 @@ def make_court(room: RoomSection, seed: int) -> tuple[Solid, ...]:
     long, wide = max(room.size[:2]), min(room.size[:2])
     limits = np.array([long, wide]) / 2 - _EDGE
     courts = parse_toml((ASSETS / "courts.toml").read_text(encoding="utf-8"))
-    strips = []
-    for court, start, shade in (("basketball", -long / 2 + _OUT, color), ("badminton", 0.0, pale)):
-        about = courts[court]
-        strips += [(path, about["width"], about["height"], shade) for path in _lines_of(about, start)]
     vertices, colors = [], []
-    for path, width, height, shade in strips:
-        for a, b in pairwise(_subdivided(path)):
+    for court, start, shade in (("basketball", -long / 2 + _OUT, color), ("badminton", 0.0, pale)):
+        width, height = courts[court]["width"], courts[court]["height"]
+        for a, b in (ends for path in _lines_of(courts[court], start) for ends in pairwise(_subdivided(path))):
             if (np.abs([a, b]) <= limits).all():
                 vertices.append(_strip(a, b, width, height))
                 colors.append(shade)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,11 +88,8 @@ def _lamps(room: RoomSection, mood: Mood) -> tuple[AreaLight, ...]:
     counts = [min(max(1, round(side / pitch)), _MOST) for side in room.size[:2]]
     places = [((np.arange(n) + 0.5) / n - 0.5) * side for n, side in zip(counts, room.size[:2], strict=True)]
     radiance = _vector(strength * np.array(mood.lamp))
-    lamps = [
-        AreaLight((float(x), float(y), z), (0.0, dy, 0.0), (dx, 0.0, 0.0), radiance, focus)
-        for x in places[0]
-        for y in places[1]
-    ]
+    sides = (0.0, dy, 0.0), (dx, 0.0, 0.0)
+    lamps = [AreaLight((float(x), float(y), z), *sides, radiance, focus) for x, y in product(*places)]
     return tuple(lamps[mood.every // 2 :: mood.every])
 
 

@@ -73,7 +73,8 @@ def make_room(room: RoomSection, seed: int, openings: Sequence[Opening] = ()) ->
     x, y = room.size[0] / 2, room.size[1] / 2
     texture = _floor_finish(room.floor, seed)
     slab = Box((0.0, 0.0, -_THICK / 2), (x, y, _THICK / 2))
-    floor = Solid("room", "floor", _floor(x, y, texture), (slab,), slab)
+    grid = _level_grid(_ticks(-x, x, _CELL), _ticks(-y, y, _CELL))
+    floor = Solid("room", "floor", _textured_grid(grid, grid[..., :2], texture, (1.0, 1.0, 1.0)), (slab,), slab)
     if room.kind == "outdoors":
         return floor, _open_ground(x, y, texture)
     if not room.walls:
@@ -111,10 +112,8 @@ def _chosen(finishes: Sequence[str], name: str, rng: np.random.Generator) -> str
     return drawn if name == "any" else name
 
 
-def _floor(x: float, y: float, texture: TiledTexture) -> Mesh:
-    columns, rows = _ticks(-x, x, _CELL), _ticks(-y, y, _CELL)
-    grid = np.stack([*np.meshgrid(columns, rows, indexing="ij"), np.zeros((len(columns), len(rows)))], axis=-1)
-    return _textured_grid(grid, grid[..., :2], texture, (1.0, 1.0, 1.0))
+def _level_grid(columns: Floats, rows: Floats) -> Floats:
+    return np.stack([*np.meshgrid(columns, rows, indexing="ij"), np.zeros((len(columns), len(rows)))], axis=-1)
 
 
 def _wall(wall: Wall, texture: TiledTexture, windows: Sequence[Opening]) -> Solid:
@@ -169,7 +168,7 @@ def _open_ground(x: float, y: float, texture: TiledTexture) -> Solid:
         )
         for half in (x, y)
     )
-    grid = np.stack([*np.meshgrid(columns, rows, indexing="ij"), np.zeros((len(columns), len(rows)))], axis=-1)
+    grid = _level_grid(columns, rows)
     middles = (grid[:-1, :-1, :2] + grid[1:, 1:, :2]) / 2
     beside: Bools = np.any(np.abs(middles) > (x, y), axis=-1)
     mesh = replace(_textured_grid(grid, grid[..., :2], texture, (1.0, 1.0, 1.0), beside), smooth=True)
