@@ -20,8 +20,8 @@ from simharness.world.humans.added_mesh import (
     FacePoints,
     add_mesh,
     attached,
+    directions_at,
     grid,
-    heading,
     hull,
     hull_reach,
     rigid,
@@ -123,7 +123,7 @@ def _shoulder_strap(
         y = side * scale * (_APART + shift)
         slab = trunk[(np.abs(trunk[:, 1] - y) < 0.018) & (trunk[:, 2] > low - 0.12 * scale)]
         reach = hull(slab[:, [0, 2]] - core, over) + _OVER
-        line = core + reach[:, None] * heading(over)
+        line = core + reach[:, None] * directions_at(over)
         edges.append(np.column_stack([line[:, 0], np.full(len(line), y), line[:, 1]]))
     front = 0.5 * (edges[0][-1] + edges[1][-1])
     start = np.arctan2(abs(front[1]), front[0] - core[0])
@@ -293,7 +293,7 @@ def mask(body: Body) -> list[AddedMesh]:
         slab = face.face[np.abs(face.face[:, 2] - z) < 0.010 * scale]
         slab = slab[slab[:, 0] > axis[0]]
         reach = hull(slab[:, :2] - axis, bearing) + _GAP
-        rows.append(np.column_stack([axis + reach[:, None] * heading(bearing), np.full(len(bearing), z)]))
+        rows.append(np.column_stack([axis + reach[:, None] * directions_at(bearing), np.full(len(bearing), z)]))
     cloth = np.stack(rows)
     cloth[-1, :, 0] = np.minimum(cloth[-1, :, 0], cloth[-2, :, 0] - 0.012 * scale)  # under the chin
     sheets: list[Sheet] = [(cloth.reshape(-1, 3), grid(len(rows), cloth.shape[1], closed=False))]
@@ -324,7 +324,7 @@ def hat(body: Body, *, kind: str) -> list[AddedMesh]:
     center[2] = behind + slope * (center[0] - back)
     bearing = np.linspace(0, 2 * np.pi, _COLUMNS, endpoint=False)
     rise = np.linspace(np.pi / 2, 0, _ROWS)
-    around = np.column_stack([heading(bearing), np.zeros(_COLUMNS)])
+    around = np.column_stack([directions_at(bearing), np.zeros(_COLUMNS)])
     flat = (np.cos(rise)[:, None, None] * around + np.sin(rise)[:, None, None] * [0, 0, 1]).reshape(-1, 3)
     directions = flat + np.outer(slope * flat[:, 0], [0, 0, 1])  # the edge is tilted to the front
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -365,7 +365,7 @@ def _visor(edge: Floats, bearing: Floats, scale: float) -> Sheet:
 
 def _brim(edge: Floats, bearing: Floats, scale: float) -> Sheet:
     """Return the brim around the edge (c, 3) of a hat."""
-    outward = np.column_stack([heading(bearing), np.zeros(len(bearing))])
+    outward = np.column_stack([directions_at(bearing), np.zeros(len(bearing))])
     rows = [edge - 0.003 * outward]
     for share in (0.5, 1.0):
         droop = -0.10 * share + 0.22 * share**2 * np.sin(bearing) ** 2  # turned up at the sides

@@ -81,10 +81,10 @@ def rounded(value: Floats, power: float) -> Floats:
 
 def hull(points: Floats, bearing: Floats) -> Floats:
     """Return the distance from the origin to the convex hull of points (n, 2) at bearings (c,), metres."""
-    return hull_reach(points, heading(bearing))
+    return hull_reach(points, directions_at(bearing))
 
 
-def heading(bearing: Floats) -> Floats:
+def directions_at(bearing: Floats) -> Floats:
     """Return the unit vectors (c, 2) at bearings (c,) in radians."""
     return np.column_stack([np.cos(bearing), np.sin(bearing)])
 
@@ -126,7 +126,8 @@ class FacePoints:
         crown = float(at["head_top"][2])
         vertices = body.vertices.astype(float)
         face, scalp = (vertices[np.unique(body.faces[np.isin(body.part, parts)])] for parts in (_FACE, _SCALP))
-        eye, ear = (_left(at[f"left_{name}"], at[f"right_{name}"]) for name in ("eye", "ear"))
+        # Means of a left point and the mirrored right one.
+        eye, ear = (0.5 * (at[f"left_{name}"] + at[f"right_{name}"] * [1, -1, 1]) for name in ("eye", "ear"))
         scale = (crown - float(at["left_eye"][2])) / _EYES_TO_CROWN
         face = face[face[:, 2] > at["nose"][2] - 1.2 * (crown - at["nose"][2])]
         return cls(eye, ear, at["nose"], crown, scale, face, scalp)
@@ -136,8 +137,3 @@ _NAMES = ("left_eye", "right_eye", "left_ear", "right_ear", "nose", "head_top")
 _FACE = [FacePart.SKIN, FacePart.LIPS, FacePart.BROW]
 _SCALP = [FacePart.SCALP]
 _EYES_TO_CROWN = 0.107  # of an adult, metres
-
-
-def _left(left: Floats, right: Floats) -> Floats:
-    """Return the mean of a left point and the mirrored right point."""
-    return 0.5 * (left + right * [1, -1, 1])

@@ -8,7 +8,7 @@ So a ring is the hull of two round sections, like cloth around both legs, and no
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.world.humans.added_mesh import AddedMesh, FacePoints, grid, heading, hull, rigid
+from simharness.world.humans.added_mesh import AddedMesh, FacePoints, directions_at, grid, hull, rigid
 from simharness.world.humans.body import Body, FacePart
 from simharness.world.humans.skinning import Skirt
 
@@ -110,7 +110,7 @@ def long_hair(body: Body, *, volume: float) -> AddedMesh:
     height = np.linspace(top, end, 18)
     bearing = np.radians(np.linspace(*_BEHIND, 25))
     center = np.array([0.5 * (scalp[:, 0].min() + scalp[:, 0].max()), 0.0])
-    directions = heading(bearing)
+    directions = directions_at(bearing)
     thick = 0.006 + 0.006 * volume
     rows, fall = [], np.zeros(len(bearing))
     for z in height:
@@ -170,7 +170,7 @@ def bob(body: Body, *, volume: float) -> AddedMesh:
     eyes, height = face.eye[2], face.crown - face.eye[2]
     center = np.array([0.5 * (face.scalp[:, 0].min() + face.scalp[:, 0].max()), 0.0])
     bearing = np.radians(np.linspace(*_BOB, 23))
-    directions = heading(bearing)
+    directions = directions_at(bearing)
     points = np.concatenate([face.face, face.scalp])
     rows, fall = [], np.zeros(len(bearing))
     levels = np.linspace(eyes + 0.86 * height, eyes - 0.85 * height, 12)

@@ -108,15 +108,20 @@ def check_times(time: Floats, what: str) -> None:
 
 def check_poses(pose: Floats, what: str) -> None:
     """Raise ValueError for poses (N, 7) that are not finite or have quaternions that do not have unit length."""
-    if not np.isfinite(pose).all():
-        bad = int(np.flatnonzero(~np.isfinite(pose).all(axis=1))[0])
-        raise ValueError(f"{what} must be finite; the one at index {bad} is not")
+    _check_finite(pose, what)
     off = np.abs(np.linalg.norm(pose[:, 3:], axis=1) - 1.0)
     if (off > _UNIT_TOLERANCE).any():
         raise ValueError(
             f"{what} quaternions (w x y z) must have unit length, the one at index {int(off.argmax())} is off by "
             f"{off.max():.2g}"
         )
+
+
+def _check_finite(values: Floats, what: str) -> None:
+    """Raise ValueError for values (N, D) that are not finite."""
+    if not np.isfinite(values).all():
+        bad = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
+        raise ValueError(f"{what} must be finite; the one at index {bad} is not")
 
 
 @dataclass(frozen=True)
@@ -195,9 +200,7 @@ class Motion:
         set_arrays(self, "motion ", time=("T",), root=("T", 7), angles=("T", len(DOFS)))
         check_times(self.time, "motion")
         check_poses(self.root, "motion root")
-        if not np.isfinite(self.angles).all():
-            bad = int(np.flatnonzero(~np.isfinite(self.angles).all(axis=1))[0])
-            raise ValueError(f"motion angles must be finite; those at index {bad} are not")
+        _check_finite(self.angles, "motion angles")
 
     def __len__(self) -> int:
         return len(self.root)

@@ -154,40 +154,6 @@ def plan_tracks(
     )
 
 
-def _place(
-    rng: np.random.Generator,
-    index: int,
-    request: TrackRequest,
-    board: "_Board",
-    *,
-    plan: int,
-    half: float,
-    admit: Admit,
-) -> int:
-    """Add a track that keeps its distance and is admitted, if one is drawn; return the number of rejected tracks."""
-    alone = _TRIES * max(0.0, _ALONE[0] + plan * _ALONE[1])
-    wide = max(0.0, 1.0 + plan * _NARROWER)
-    drawn = (
-        _draw(rng, request, board, half=half, wide=wide, following=_FOLLOWING if attempt >= alone else 0.0)
-        for attempt in range(_TRIES)
-    )
-    if isinstance(request, VisitRequest):
-        routes = (request.visitor.draw(rng, half=half, start=board.start, free=board.free) for _ in range(_VISIT_TRIES))
-        drawn = ([] if route is None else [route] for route in routes)
-    candidates: Iterable[paths.Track] = (track for tracks in drawn for track in tracks if board.apart(track, request))
-    if plan and isinstance(request, SpotRequest):
-        candidates = sorted(candidates, key=lambda track: board.elbow_room(track, request, half))
-    refusals = 0
-    for track in candidates:
-        if admit(index, track, list(board.tracks)):
-            board.add(index, track, request)
-            break
-        refusals += 1
-        if refusals == _REFUSALS:
-            break
-    return refusals
-
-
 class _Board:
     """Tracks found so far, with their positions at the coarse checks."""
 
@@ -202,10 +168,6 @@ class _Board:
     def start(self) -> float:
         """First time of the plan, seconds."""
         return float(self._time[0])
-
-    @property
-    def loops(self) -> list[paths.Loop]:
-        return [track for track in self.tracks.values() if isinstance(track, paths.Loop)]
 
     def add(self, index: int, track: paths.Track, request: TrackRequest) -> None:
         self.tracks[index] = track
@@ -265,6 +227,33 @@ class _Board:
         return float(np.minimum(others, half - request.clearance - np.abs(place)).sum())
 
 
+def _place(
+    rng: np.random.Generator, index: int, request: TrackRequest, board: _Board, *, plan: int, half: float, admit: Admit
+) -> int:
+    """Add a track that keeps its distance and is admitted, if one is drawn; return the number of rejected tracks."""
+    alone = _TRIES * max(0.0, _ALONE[0] + plan * _ALONE[1])
+    wide = max(0.0, 1.0 + plan * _NARROWER)
+    drawn = (
+        _draw(rng, request, board, half=half, wide=wide, following=_FOLLOWING if attempt >= alone else 0.0)
+        for attempt in range(_TRIES)
+    )
+    if isinstance(request, VisitRequest):
+        routes = (request.visitor.draw(rng, half=half, start=board.start, free=board.free) for _ in range(_VISIT_TRIES))
+        drawn = ([] if route is None else [route] for route in routes)
+    candidates: Iterable[paths.Track] = (track for tracks in drawn for track in tracks if board.apart(track, request))
+    if plan and isinstance(request, SpotRequest):
+        candidates = sorted(candidates, key=lambda track: board.elbow_room(track, request, half))
+    refusals = 0
+    for track in candidates:
+        if admit(index, track, list(board.tracks)):
+            board.add(index, track, request)
+            break
+        refusals += 1
+        if refusals == _REFUSALS:
+            break
+    return refusals
+
+
 def _places(track: paths.Track, time: Floats) -> Floats:
     """Return the positions of a track at times (...), (..., 2) metres; NaN, which is near nobody, while absent."""
     if not isinstance(track, Route) or track.presence.always:
@@ -295,7 +284,7 @@ def _draw(
     limits = _limits(request, half)
     follows, which = rng.uniform(size=2)
     starts = rng.uniform(size=_STARTS)
-    loops = board.loops
+    loops = [track for track in board.tracks.values() if isinstance(track, paths.Loop)]
     ahead = loops[int(which * len(loops))] if loops else None
     if ahead is not None and follows < following:
         if not limits.slowest <= ahead.speed <= limits.fastest:

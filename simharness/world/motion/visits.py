@@ -1,7 +1,7 @@
 """Visits: routes of people who come in through a door, stop here and there, and go out again."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -208,7 +208,7 @@ class Visitor:
 
     def _route(self, walker: Itinerary) -> Route:
         route = walker.route()
-        return Route(route.place, route.bearing, route.speed, route.ramps, route.turns, self._presence(route))
+        return replace(route, presence=self._presence(route))
 
     def _presence(self, route: Route) -> Presence:
         """Return the times at which the person is in the room, from a fine sampling."""

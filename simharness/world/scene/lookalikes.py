@@ -101,20 +101,16 @@ class Lookalikes:
         flat = np.any(self.fronts, axis=-1)
         ahead = ((viewpoint - self.figures) * self.fronts[:, None]).sum(axis=-1)
         shown[:count] = (ahead > 0) | ~flat[:, None]
-        for mirror, (image, point, on_glass) in zip(self.mirrors, self._in_mirrors(joints, points, shown), strict=True):
-            on_glass[:] = mirror.shows(viewpoint, mirror.reflect(image))
+        people = (len(self) - count) // max(len(self.mirrors), 1)
+        for k, mirror in enumerate(self.mirrors):
+            part = slice(count + k * people, count + (k + 1) * people)
+            image = joints[part]
+            on_glass = shown[part] = mirror.shows(viewpoint, mirror.reflect(image))
             viewer_distance, image_distance = mirror.in_front(viewpoint), -mirror.in_front(image)
             whole = np.where(on_glass, viewer_distance + image_distance, 1.0)
             share = np.where(on_glass, viewer_distance / whole, 1.0)
-            point[:] = viewpoint + (image - viewpoint) * share[..., None]
+            points[part] = viewpoint + (image - viewpoint) * share[..., None]
         return points, shown
-
-    def _in_mirrors(self, *arrays: NDArray) -> list[tuple[NDArray, ...]]:
-        """Return for each mirror its writable part of arrays (D, ...)."""
-        first, mirrors = len(self.figures), len(self.mirrors)
-        people = (len(self) - first) // max(mirrors, 1)
-        parts = [slice(first + m * people, first + (m + 1) * people) for m in range(mirrors)]
-        return [tuple(array[part] for array in arrays) for part in parts]
 
 
 def _front(figure: Floats) -> Floats:

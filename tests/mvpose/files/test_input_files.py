@@ -137,7 +137,8 @@ SHIPPED = {
     "mvpose/calibration/file_mistakes.py", "mvpose/networks/catalogue/fetch.py", "mvpose/public_names.py",
     "mvpose/skeleton.py", "simharness/outputs/benchmark/layout.py", "simharness/scoring/score_registry.py",
     "simharness/cli/scenarios_command.py",
-    "simharness/world/humans/wardrobe.py",
+    "simharness/world/humans/wardrobe.py", "simharness/world/motion/activities/gait.py",
+    "simharness/world/motion/mocap/skeleton.py",
 }  # fmt: skip
 CALLS = re.compile(
     r"(?:^|\.)(?:read_text|read_bytes|loadmat|read_parquet|scan_parquet|FileStorage|imread)$|^(?:np\.load|json\.loads?|"

@@ -4,7 +4,7 @@ The sagittal angles of hip, knee and ankle pass, within a few degrees, through t
 Biomechanics and Motor Control of Human Gait", 2nd ed., 1991) and J. Perry and J. Burnfield ("Gait Analysis", 2nd ed.,
 2010) give for healthy adults at a comfortable speed: range and timing of each joint; the hip is relative to quiet
 standing. Between the landmarks they are smooth curves, not a copy of a table. Applied to a body they give its stride
-length and the pitch and swing of its feet. ``walking.py`` then places the feet in the world and solves the legs, so
+length and the pitch and swing of its feet. ``round_loops.py`` then places the feet in the world and solves the legs, so
 that the curves are met on a straight path and approximated on a bend.
 """
 
@@ -19,6 +19,7 @@ from scipy.optimize import brentq
 
 from mvpose.arrays import Floats
 from mvpose.files.input_files import parse_toml
+from simharness.world.humans.anatomy import LEG
 from simharness.world.motion.poses.foot_placement import leftward
 from simharness.world.motion.poses.inverse_kinematics import Pelvis
 from simharness.world.motion.poses.kinematics import FootRoll, Kinematics
@@ -70,7 +71,7 @@ class StrideCurves:
         Returns:
             At ``PHASES``, pitch of the foot, (n,) radians, and its footprint ahead of the pelvis, (n,) metres.
         """
-        curves, order = vigour * self.angles(PHASES), kinematics.leg_order
+        curves, order = vigour * self.angles(PHASES), LEG
         angles = np.zeros((len(PHASES), len(order)))
         angles[:, [order.index(name) for name in ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")]] = curves
         _, place = kinematics.legs["left"].forward(angles)

@@ -1,9 +1,9 @@
 """Walking along a route: steps that shorten to a stop, turns on the spot by small steps, and standing in between.
 
-The gait is that of ``walking.py``. Its amplitudes follow the speed, so that a person who stops ends in quiet standing,
-while the cadence is kept: a slow step is a short one. Steps are in proportion to the legs. The height of the pelvis
-follows the feet: high over a standing person, lower while steps are long. A footprint lies where the pelvis passes over
-it; a foot is lifted only in a stride that moves its footprint.
+The gait is that of ``round_loops.py``. Its amplitudes follow the speed, so that a person who stops ends in quiet
+standing, while the cadence is kept: a slow step is a short one. Steps are in proportion to the legs. The height of the
+pelvis follows the feet: high over a standing person, lower while steps are long. A footprint lies where the pelvis
+passes over it; a foot is lifted only in a stride that moves its footprint.
 
 Activities: "visit", coming in, walking from place to place, and going out again; and "hide", walking through a booth
 with curtains, in which no camera sees the person for a while.

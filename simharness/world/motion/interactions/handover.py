@@ -83,7 +83,12 @@ class _Course:
 def hand_over(performers: Cast, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Performance:
     """The first person holds out an object and the second takes it; then it is returned the same way."""
     box, bulk = rng.uniform() < _BOX_CHANCE, rng.uniform(size=3)
-    item = _box(bulk) if box else _bottle(bulk)
+    if box:
+        deep, wide, tall = np.array([0.20, 0.26, 0.18]) + np.array([0.08, 0.10, 0.08]) * bulk
+        item = _Item("box", (float(deep), float(wide), float(tall)), (0.25 * tall, 0.75 * tall), 0.3 * deep)
+    else:
+        wide, tall = 0.065 + 0.02 * bulk[0], 0.26 + 0.06 * bulk[1]
+        item = _Item("bottle", (wide, wide, tall), (0.25 * tall, 0.7 * tall), 0.0)
     parts = (0.6, 0.9, 0.35, 0.9, 0.6, 1.4, 0.9, 0.4)
     u, marks = cycle_time(time, parts, rng=rng, pace=pace)
     course = _Course(*marks[1:])
@@ -100,16 +105,6 @@ def hand_over(performers: Cast, spot: Spot, time: Floats, *, rng: np.random.Gene
         motions.append(_hold(mover, motion, home_spot, item, person, path, course.holding(person, u)))
     prop = Prop(item.kind, item.size, Trajectory(time, np.concatenate([path, turn], axis=1)))
     return Performance(tuple(motions), (prop,))
-
-
-def _bottle(bulk: Floats) -> _Item:
-    wide, tall = 0.065 + 0.02 * bulk[0], 0.26 + 0.06 * bulk[1]
-    return _Item("bottle", (wide, wide, tall), (0.25 * tall, 0.7 * tall), 0.0)
-
-
-def _box(bulk: Floats) -> _Item:
-    deep, wide, tall = np.array([0.20, 0.26, 0.18]) + np.array([0.08, 0.10, 0.08]) * bulk
-    return _Item("box", (float(deep), float(wide), float(tall)), (0.25 * tall, 0.75 * tall), 0.3 * deep)
 
 
 def _item_path(performers: Cast, meeting: Meeting, item: _Item, given: Floats) -> Floats:
@@ -148,7 +143,7 @@ def _hold(
 _SHAKEN = (0.015, 0.03)  # metres: amplitude of the shaking
 _SHAKE_RATE = (1.8, 2.6)  # Hz
 _SHAKEN_INWARD = np.radians(22.0)  # rotation of the fingers of a right hand to the left
-# Angles of an arm held out for a handshake, in the order of ``Kinematics.arm_order``.
+# Angles of an arm held out for a handshake, in the order of ``ARM``.
 _HELD_OUT = np.radians([40.0, 6.0, 15.0, 50.0, 5.0, 0.0])
 
 

@@ -49,7 +49,7 @@ _OPEN = {
     "under": limbs(shoulder_flexion=30.0, shoulder_abduction=50.0, shoulder_rotation=10.0, elbow_flexion=25.0),
 }
 _DETOUR = 30.0  # degrees
-# Closed arms: start angles in the order of ``Kinematics.arm_order``; height of the palms above the other's shoulders,
+# Closed arms: start angles in the order of ``ARM``; height of the palms above the other's shoulders,
 # and their distance from the other's spine, metres.
 _HOLDS: Mapping[Role, tuple[Floats, float, float]] = {
     "over": (np.radians([122.0, 40.0, 78.0, 97.0, 15.0, 0.0]), 0.02, 0.16),

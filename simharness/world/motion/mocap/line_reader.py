@@ -25,18 +25,18 @@ class Line:
         """Return an error about this line."""
         return ValueError(f"{self.file}, line {self.number}: {message}")
 
-    def numbers(self, words: tuple[str, ...], count: int | None, what: str) -> list[float]:
+    def numbers(self, words: tuple[str, ...], count: int, what: str) -> list[float]:
         """Return ``words`` as numbers.
 
         Args:
             words: some words of the line.
-            count: required number of words; None: any.
+            count: required number of words.
             what: name of the values, for the message.
 
         Raises:
             ValueError: wrong number of words, or a word that is not a number of moderate size.
         """
-        if count is not None and len(words) != count:
+        if len(words) != count:
             raise self.error(f"expected {count} value{'s' * (count != 1)} for {what}, got {len(words)}")
         result = []
         for word in words:

@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.world.humans.anatomy import ARM, DOFS, SIDES
+from simharness.world.humans.anatomy import ARM, DOFS, LEG, SIDES
 from simharness.world.motion.mocap.foot_contact import FootPath, detect_stances, make_sole, plant_foot
 from simharness.world.motion.mocap.limb_angles import arm_angles, into, thigh_and_shank
 from simharness.world.motion.mocap.skeleton import JointMap, RecordedMotion, map_joints
@@ -183,11 +183,9 @@ def retarget(recorded: SourceMotion, kinematics: Kinematics) -> Motion:
     angles = np.zeros((len(position), len(DOFS)))
     _trunk(recorded, kinematics, angles)
     for side, step in zip(SIDES, steps, strict=True):
-        columns = [DOFS.index(f"{side}_{name}") for name in kinematics.leg_order]
-        start = np.zeros((len(position), len(kinematics.leg_order)))
-        start[:, [kinematics.leg_order.index(name) for name in _HIP_AND_KNEE]] = _hip_and_knee(
-            pelvis, recorded.segments, side
-        )
+        columns = [DOFS.index(f"{side}_{name}") for name in LEG]
+        start = np.zeros((len(position), len(LEG)))
+        start[:, [LEG.index(name) for name in _HIP_AND_KNEE]] = _hip_and_knee(pelvis, recorded.segments, side)
         angles[:, columns] = _leg(kinematics, side, position, pelvis, step, start)
     quaternion = Rotation.from_matrix(pelvis).as_quat(scalar_first=True)
     return Motion(recorded.time, np.concatenate([position, quaternion], axis=1), angles)
@@ -202,7 +200,7 @@ def _leg(kinematics: Kinematics, side: str, position: Floats, pelvis: Floats, st
     chain = kinematics.legs[side]
     ranges = chain.ranges.copy()
     # A straight knee has no defined bending direction.
-    ranges[kinematics.leg_order.index("knee_flexion"), 0] = _STRAIGHTEST
+    ranges[LEG.index("knee_flexion"), 0] = _STRAIGHTEST
     chain = replace(chain, ranges=ranges)
     to_pelvis = pelvis.swapaxes(1, 2)
 
@@ -281,9 +279,8 @@ def _arm(recorded: SourceMotion, trunk: Floats, side: str, angles: Floats, shrug
     # The clavicle rises with the arm (scapulohumeral rhythm); recorded clavicles differ too much to be copied.
     rise = np.clip(_SHOULDER_RISE * (1 + upper[:, 2]) ** 2 / 2, *shrug)
     lowered = Rotation.from_euler("X", -rise[:, None]).as_matrix()
-    aims = [None if aim is None else (lowered @ aim[..., None])[..., 0] for aim in (upper, fore, hand, thumb)]
-    assert aims[0] is not None
-    assert aims[1] is not None
+    upper, fore = ((lowered @ aim[..., None])[..., 0] for aim in (upper, fore))
+    hand, thumb = (None if aim is None else (lowered @ aim[..., None])[..., 0] for aim in (hand, thumb))
     angles[:, DOFS.index(f"{side}_clavicle_elevation")] = rise
     columns = [DOFS.index(f"{side}_{name}") for name in ARM]
-    angles[:, columns] = arm_angles(aims[0], aims[1], aims[2], aims[3])
+    angles[:, columns] = arm_angles(upper, fore, hand, thumb)

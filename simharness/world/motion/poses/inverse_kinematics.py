@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.world.humans.anatomy import DOFS, SIDES
+from simharness.world.humans.anatomy import ARM, DOFS, LEG, SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematic_chain import Chain
 from simharness.world.motion.poses.kinematics import Kinematics
@@ -128,7 +128,7 @@ def solve_legs(
     angles = np.zeros((len(position), len(DOFS)))
     for name, value in posture.items():
         angles[:, DOFS.index(name)] = np.radians(value)
-    order = kinematics.leg_order
+    order = LEG
     sagittal = [order.index(name) for name in ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")]
     inward = turn.swapaxes(1, 2)
     for side in SIDES:
@@ -172,7 +172,7 @@ def pelvis_height(
     leg = kinematics.legs[side]
     hip = turn @ leg.anchors[0]
     bent = np.zeros((1, len(leg.axes)))
-    bent[:, kinematics.leg_order.index("knee_flexion")] = knee
+    bent[:, LEG.index("knee_flexion")] = knee
     length = np.linalg.norm(leg.forward(bent)[1] - leg.anchors[0])
     across = np.linalg.norm(ankle[:, :2] - ground - hip[:, :2], axis=1)
     return ankle[:, 2] - hip[:, 2] + np.sqrt(np.maximum(length**2 - across**2, 0.0))
@@ -188,12 +188,10 @@ def shoulder_girdle(kinematics: Kinematics, motion: Motion, side: str) -> tuple[
 
 def arm_angles(kinematics: Kinematics, **degrees: float) -> Floats:
     """Return arm angles in chain order, (6,) radians, from degrees by name without the side; all others are 0."""
-    unknown = degrees.keys() - set(kinematics.arm_order)
+    unknown = degrees.keys() - set(ARM)
     if unknown:
-        raise ValueError(
-            f"an arm has no hinge {', '.join(sorted(unknown))}; its hinges are {', '.join(kinematics.arm_order)}"
-        )
-    return np.radians([degrees.get(name, 0.0) for name in kinematics.arm_order])
+        raise ValueError(f"an arm has no hinge {', '.join(sorted(unknown))}; its hinges are {', '.join(ARM)}")
+    return np.radians([degrees.get(name, 0.0) for name in ARM])
 
 
 def reach_with(
@@ -226,7 +224,7 @@ def reach_with(
         follow: as for ``Chain.solve``; recommended with ``turn``.
     """
     weight = np.broadcast_to(np.asarray(weight, float), len(motion))
-    columns, on = [DOFS.index(f"{side}_{name}") for name in kinematics.arm_order], weight > 0
+    columns, on = [DOFS.index(f"{side}_{name}") for name in ARM], weight > 0
     current = motion.angles[:, columns]
     start = current if guess is None else np.broadcast_to(np.asarray(guess, float), current.shape)
     base, origin = shoulder_girdle(kinematics, motion, side)

@@ -32,20 +32,15 @@ class Kinematics:
     Attributes:
         body: body.
         spec: MuJoCo model, made once because that is slow; copies can be attached to other models.
-        legs: by side, chain of the six hinges from the pelvis to the ankle, which is the end.
-        leg_order: names of the hinges of a leg, without the side, in the order of the chain.
+        legs: by side, chain of the six hinges of ``LEG`` from the pelvis to the ankle, which is the end.
         trunks: by side, chain of the seven hinges from the pelvis over lumbar spine and thorax to the clavicle. Its end
             is the origin: ``turn @ x + place`` is the new position of a point x of the shoulder girdle in the neutral
             pose.
-        arms: by side, chain of the six hinges from the clavicle to the hand, in the frame at the end of the trunk. The
-            end is the centre of the palm, on the skin; at zero the fingers point to -z, the thumb to +x, and the palm
-            to the thigh, which is -y for the left hand and +y for the right one.
-        arm_order: names of the hinges of an arm, without the side, in the order of the chain.
+        arms: by side, chain of the six hinges of ``ARM`` from the clavicle to the hand, in the frame at the end of the
+            trunk. The end is the centre of the palm, on the skin; at zero the fingers point to -z, the thumb to +x, and
+            the palm to the thigh, which is -y for the left hand and +y for the right one.
         ranges: lowest and highest value of every angle, (D, 2) radians.
     """
-
-    leg_order = LEG
-    arm_order = ARM
 
     def __init__(self, body: Body) -> None:
         self.body = body

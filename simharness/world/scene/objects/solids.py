@@ -43,11 +43,9 @@ class ObjectModel:
         """Return the solid at ``place`` (2,), rotated by ``yaw``."""
         figure = None if self.figure is None else carried(self.figure, place, yaw)
         mirror = None if self.mirror is None else self.mirror.moved(place, yaw)
-        mesh, geoms = (
-            self.mesh.moved(carried(self.mesh.vertices, place, yaw)),
-            [g.moved(place, yaw) for g in self.geoms],
-        )
-        return Solid(kind, name, mesh, tuple(geoms), self.hull(place, yaw), figure=figure, mirror=mirror)
+        mesh = self.mesh.moved(carried(self.mesh.vertices, place, yaw))
+        geoms = tuple(geom.moved(place, yaw) for geom in self.geoms)
+        return Solid(kind, name, mesh, geoms, self.hull(place, yaw), figure=figure, mirror=mirror)
 
     def along(self, trajectory: Trajectory, *, kind: Kind, name: str) -> "Solid":
         """Return the solid that moves along a trajectory."""

@@ -33,7 +33,7 @@ from simharness.world.scene.placement.free_space import (
 from simharness.world.scene.placement.occlusion_target import cover, lines_in
 from simharness.world.scene.placement.sight_lines import SightLines
 from simharness.world.scene.rooms.kinds import room_kinds
-from simharness.world.scene.rooms.openings import Opening, Wall, room_walls
+from simharness.world.scene.rooms.openings import Opening, room_walls
 
 _SPEED = (0.35, 0.7)  # m/s: largest speed on the path
 _LINE = (0.4, 2.5)  # metres from the middle of a line to its ends
@@ -303,6 +303,26 @@ def place_furniture(seed: int, space: FreeSpace, openings: Sequence[Opening]) ->
     step = max(1, len(lines) // _LINES)
     lines = SightLines(lines.starts[::step], lines.ends[::step], lines.time[::step])
     area = Box((0.0, 0.0, 1.0), (space.area, space.area, 1.0)) if space.pelvises.size else None
+
+    def find(rng: np.random.Generator, model: ObjectModel, name: str) -> Solid | None:
+        """Return a piece of furniture at the first valid place; None if there is none."""
+        for along, wall_share in rng.uniform(size=(_TRIES, 2)):
+            wall, (depth, width, _) = walls[int(wall_share * len(walls))], model.extent.half
+            from_left = width + along * max(wall.length - 2 * width, 0.0)
+            place, yaw = wall.at((from_left, depth + _BEHIND, 0.0))[:2], wall.yaw  # its back to the wall
+            hull = model.hull(place, yaw)
+            if (
+                (area is not None and area.gap_on_floor(hull) <= 0.0)
+                or not site.clear(hull, at_wall=True)
+                or not all(opening.keeps_free(hull) for opening in openings)
+                or site.space.obstructed(hull)
+            ):
+                continue
+            solid = model.at(place, yaw, kind="furniture", name=name)
+            if site.leaves_pictures_free(solid) and (not len(lines) or lines.cut_by(solid).mean() <= _MOST_HIDDEN):
+                return solid
+        return None
+
     share = sum(wall.length for wall in walls) / _WALLS
     placed: list[Solid] = []
     for name, (low, high) in furniture.items():
@@ -310,7 +330,7 @@ def place_furniture(seed: int, space: FreeSpace, openings: Sequence[Opening]) ->
         for k in range(max(1, round(share * number))):
             key = ("room", "furniture", name, k)
             model = draw_variant(stream(seed, *key), name).model(sheet)
-            solid = _find_at_wall(stream(seed, *key, "place"), model, f"{name}{k}", site, walls, openings, area, lines)
+            solid = find(stream(seed, *key, "place"), model, f"{name}{k}")
             if solid is not None:
                 site.add(solid)
                 placed.append(solid)
@@ -321,37 +341,3 @@ def place_furniture(seed: int, space: FreeSpace, openings: Sequence[Opening]) ->
             'cameras: enlarge room.size, lower people.area, or use room.kind = "laboratory"'
         )
     return tuple(placed)
-
-
-def _find_at_wall(
-    rng: np.random.Generator,
-    model: ObjectModel,
-    name: str,
-    site: Site,
-    walls: Sequence[Wall],
-    openings: Sequence[Opening],
-    area: Box | None,
-    lines: SightLines,
-) -> Solid | None:
-    """Return a piece of furniture at the first valid place; None if there is none."""
-    for share, wall_share in rng.uniform(size=(_TRIES, 2)):
-        place, yaw = _along_walls(share, walls[int(wall_share * len(walls))], model)
-        hull = model.hull(place, yaw)
-        if (
-            (area is not None and area.gap_on_floor(hull) <= 0.0)
-            or not site.clear(hull, at_wall=True)
-            or not all(opening.keeps_free(hull) for opening in openings)
-            or site.space.obstructed(hull)
-        ):
-            continue
-        solid = model.at(place, yaw, kind="furniture", name=name)
-        if site.leaves_pictures_free(solid) and (not len(lines) or lines.cut_by(solid).mean() <= _MOST_HIDDEN):
-            return solid
-    return None
-
-
-def _along_walls(share: float, wall: Wall, model: ObjectModel) -> tuple[Floats, float]:
-    """Return the place of a piece with its back to a wall, and its yaw."""
-    depth, width = model.extent.half[0], model.extent.half[1]
-    along = width + share * max(wall.length - 2 * width, 0.0)
-    return wall.at((along, depth + _BEHIND, 0.0))[:2], wall.yaw

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
 from simharness.types.random_streams import stream
-from simharness.world.humans.anatomy import DOFS
+from simharness.world.humans.anatomy import ARM, DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.contact import ContactModel
@@ -46,6 +46,6 @@ def penetration(cast: Sequence[Kinematics], motions: Sequence[Motion], time: Arr
 def palm_pose(kinematics: Kinematics, motion: Motion, side: str) -> tuple[Floats, Floats]:
     """Return orientation (T, 3, 3) and position (T, 3) in metres of the centre of a palm; see ``Kinematics.arms``."""
     base, origin = shoulder_girdle(kinematics, motion, side)
-    columns = [DOFS.index(f"{side}_{name}") for name in kinematics.arm_order]
+    columns = [DOFS.index(f"{side}_{name}") for name in ARM]
     turn, place = kinematics.arms[side].forward(motion.angles[:, columns])
     return base @ turn, (base @ place[..., None])[..., 0] + origin

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from simharness.types.random_streams import stream
+from simharness.world.humans.anatomy import ARM, LEG
 from simharness.world.humans.body import make_body
 from simharness.world.humans.mujoco_model import person_spec
 from simharness.world.humans.population import draw_shape
@@ -38,7 +39,7 @@ def test_trunk_and_arm_agree_with_mujoco(kinematics, side):
     at_rest, turn_at_rest = neutral.xpos.copy(), neutral.xmat.reshape(3, 3).copy()
     for _ in range(10):
         bends, swings = rng.uniform(*trunk.ranges.T), rng.uniform(*arm.ranges.T)
-        names = [*kinematics.trunk_order(side), *(f"{side}_{name}" for name in kinematics.arm_order)]
+        names = [*kinematics.trunk_order(side), *(f"{side}_{name}" for name in ARM)]
         data = posed(kinematics, **dict(zip(names, [*bends, *swings], strict=True)))
         (base,), (origin,) = trunk.forward(bends[None])
         (turn,), (place,) = arm.forward(swings[None])
@@ -70,7 +71,7 @@ def test_forward_kinematics_agrees_with_mujoco(kinematics, side):
     mujoco.mj_kinematics(model, data)
     neutral = data.body(foot).xmat.reshape(3, 3).copy()
     for row, turn, place in zip(angles, turns, places, strict=True):
-        for name, angle in zip(kinematics.leg_order, row, strict=True):
+        for name, angle in zip(LEG, row, strict=True):
             data.joint(f"{side}_{name}").qpos = angle
         mujoco.mj_kinematics(model, data)
         np.testing.assert_allclose(place, data.body(foot).xpos, atol=1e-9)

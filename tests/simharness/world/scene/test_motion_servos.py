@@ -289,7 +289,7 @@ class Planned:
 
     def torques(self) -> dict[str, float]:
         still = np.zeros(self.model.nv)
-        efforts = InverseDynamics(self.model, [self._dofs[0]], [self._dofs[1]])
+        efforts = InverseDynamics(self.model, *(np.array([dofs]) for dofs in self._dofs))
         (torques,) = efforts.torques(self.data.qpos, still, still, [])
         return dict(zip(DOFS, torques, strict=True))
 
