@@ -35,7 +35,7 @@ def write_coco(layout: Layout, rig: Rig, truth: Mapping[int, Truth], people: Seq
         images: list[dict[str, Any]] = []
         annotations: list[dict[str, Any]] = []
         for frame, true in truth.items():
-            file = layout.picture(camera.name, frame).relative_to(layout.folder).as_posix()
+            file = layout.path("pictures", camera=camera.name, frame=frame).relative_to(layout.folder).as_posix()
             images.append({"id": frame, "file_name": file, "width": width, "height": height})
             area = true.boxes[view, :, 2] * true.boxes[view, :, 3]
             for person in np.flatnonzero(area >= _LEAST).tolist():

@@ -38,9 +38,18 @@ from simharness.world.rigs.faults import ExposureSchedule
 FORMAT = "simharness export"
 """Value of ``format`` in the manifest of an export."""
 
-PICTURES = "hdImgs/{camera}/{camera}_{frame:08d}.jpg"
-BODIES = "hdPose3d_stage1_coco19/body3DScene_{frame:08d}.json"
-PEOPLE = "openpose/{camera}/{camera}_{frame:08d}_keypoints.json"
+FILES = {
+    "calibration": "calibration_{name}.json",  # of the true rig
+    "calibration_believed": "calibration_believed_{name}.json",  # of the believed rig, where it differs
+    "pictures": "hdImgs/{camera}/{camera}_{frame:08d}.jpg",  # of a camera in a frame
+    "bodies": "hdPose3d_stage1_coco19/body3DScene_{frame:08d}.json",  # true poses of a frame
+    "detections": "openpose/{camera}/{camera}_{frame:08d}_keypoints.json",  # in the picture of a camera
+    "scenario": "scenario.toml",  # the resolved scenario
+    "recording": "recording.toml",  # the sequence described as a recording
+    "truth": "truth.npz",  # true joints of the recording
+    "exact": "exact.npz",  # given rig and detections, and exact truth, for ``simharness score``
+}
+"""Files of a sequence beside the manifest."""
 
 
 @dataclass(frozen=True)
@@ -52,56 +61,13 @@ class Layout:
     name: str
     """Name of the sequence, used in the names of calibration files; the folder may have another name."""
 
-    @property
-    def calibration(self) -> Path:
-        """Calibration of the true rig."""
-        return self.folder / f"calibration_{self.name}.json"
-
-    @property
-    def believed(self) -> Path:
-        """Calibration of the believed rig; written only where it differs from the true rig."""
-        return self.folder / f"calibration_believed_{self.name}.json"
-
-    @property
-    def manifest(self) -> Path:
-        """Description of the sequence."""
-        return self.folder / "manifest.json"
-
-    @property
-    def scenario(self) -> Path:
-        """Resolved scenario of the sequence."""
-        return self.folder / "scenario.toml"
-
-    @property
-    def recording(self) -> Path:
-        """Description of the sequence as a recording."""
-        return self.folder / "recording.toml"
-
-    @property
-    def truth(self) -> Path:
-        """True joints of the recording."""
-        return self.folder / "truth.npz"
-
-    @property
-    def exact(self) -> Path:
-        """Given rig and detections, and exact truth, for ``simharness score``."""
-        return self.folder / "exact.npz"
-
-    def picture(self, camera: str, frame: int) -> Path:
-        """Return the path of the picture of a camera in a frame."""
-        return self.folder / PICTURES.format(camera=camera, frame=frame)
+    def path(self, file: str, **of: Any) -> Path:
+        """Return the path of one of :data:`FILES`, of the ``camera`` and the ``frame`` where each has one."""
+        return self.folder / FILES[file].format(name=self.name, **of)
 
     def channel(self, channel: str, camera: str, frame: int) -> Path:
         """Return the path of a channel of a picture, such as depth."""
         return self.folder / channel / camera / f"{camera}_{frame:08d}.png"
-
-    def bodies(self, frame: int) -> Path:
-        """Return the path of the true poses of a frame."""
-        return self.folder / BODIES.format(frame=frame)
-
-    def people(self, camera: str, frame: int) -> Path:
-        """Return the path of the detections in the picture of a camera."""
-        return self.folder / PEOPLE.format(camera=camera, frame=frame)
 
 
 def readable_json(content: dict[str, Any]) -> bytes:
@@ -163,6 +129,8 @@ def manifest(
         seconds: duration of the export, seconds.
     """
     scenario = trial.scenario
+    missing = {key for key, there in (("pictures", pictures), ("calibration_believed", believed)) if not there}
+    files = {key: None if key in missing else file.replace("{name}", scenario.name) for key, file in FILES.items()}
     return {
         "format": FORMAT,
         "version": 1,
@@ -171,17 +139,7 @@ def manifest(
         "seed": scenario.seed,
         "rate": scenario.rate,
         "frames": {"first": frames.start, "every": frames.step, "count": len(frames)},
-        "files": {
-            "calibration": f"calibration_{scenario.name}.json",
-            "calibration_believed": f"calibration_believed_{scenario.name}.json" if believed else None,
-            "pictures": PICTURES if pictures else None,
-            "bodies": BODIES,
-            "detections": PEOPLE,
-            "scenario": "scenario.toml",
-            "recording": "recording.toml",
-            "truth": "truth.npz",
-            "exact": "exact.npz",
-        },
+        "files": files,
         **{key: texts_of("manifest")[key] for key in ("units", "axes", "calibration", "bodies")},
         "confidence": {"joint, by the number of pictures that show it": CONFIDENCES}
         | texts_of("manifest")["confidence"],

@@ -112,10 +112,10 @@ def export_sequence(
     frames = range(0, scenario.frames, plan.every)
     with Stages(reporter).stage("write", len(frames)) as advance, atomic_folder(plan.folder, FORMAT) as partial:
         layout = Layout(partial, scenario.name)
-        layout.scenario.write_text(dumps(scenario), encoding="utf-8")
-        write_cameras(layout.calibration, true_rig, source=scenario.name)
+        layout.path("scenario").write_text(dumps(scenario), encoding="utf-8")
+        write_cameras(layout.path("calibration"), true_rig, source=scenario.name)
         if faulty := not _same_cameras(true_rig, believed_rig):
-            write_cameras(layout.believed, believed_rig, source=f"{scenario.name}, as believed")
+            write_cameras(layout.path("calibration_believed"), believed_rig, source=f"{scenario.name}, as believed")
         _write_description(layout, scenario, annotate_simulation(scenario, sequence, true_rig), frames, believed=faulty)
         for frame in frames:
             current, here = detected[frame], sequence.present[frame]
@@ -126,21 +126,23 @@ def export_sequence(
                 time=float(sequence.time[frame]),
                 rate=scenario.rate,
             )
-            write_json(layout.bodies(frame), bodies)
+            write_json(layout.path("bodies", frame=frame), bodies)
             shown = current.detections if current.whole is None else current.whole.detections
             for view, name in enumerate(names):
                 seen = shown.select(shown.view == view)
-                write_json(layout.people(name, frame), people_file(seen.keypoints, seen.scores, skeleton=seen.skeleton))
+                file = people_file(seen.keypoints, seen.scores, skeleton=seen.skeleton)
+                write_json(layout.path("detections", camera=name, frame=frame), file)
             if source is not None:
                 for view, name in enumerate(names):
                     if plan.pictures:
                         picture = source.picture(exposures, frame, view, finer=_FINER)
-                        write_image(layout.picture(name, frame), picture[..., ::-1], *_JPEG)
+                        path = layout.path("pictures", camera=name, frame=frame)
+                        write_image(path, picture[..., ::-1], *_JPEG)
                     for channel in channels:
                         image = channel_image(source, trial, frame, view, channel)
                         write_image(layout.channel(channel, name, frame), image)
             advance(1)
-        write_exact(layout.exact, result.recording, frames)
+        write_exact(layout.path("exact"), result.recording, frames)
         if COCO in plan.also:
             write_coco(layout, believed_rig, {frame: detected[frame].truth for frame in frames}, sequence.ids.tolist())
         description = manifest(
@@ -152,7 +154,7 @@ def export_sequence(
             command=command,
             seconds=round(time.perf_counter() - start, 3),
         ) | {"request": request or {}}
-        layout.manifest.write_bytes(readable_json(description))
+        (layout.folder / "manifest.json").write_bytes(readable_json(description))
     return plan.folder
 
 
@@ -206,12 +208,12 @@ def _write_description(layout: Layout, scenario: Scenario, joints: Floats, frame
     """
     rate = scenario.rate / frames.step
     truth = People(np.arange(len(frames)) / rate, np.arange(joints.shape[1]), joints[list(frames)], skeleton=SHELF14)
-    write_people(truth, layout.truth.parent, formats=["npz"])[0].rename(layout.truth)
+    write_people(truth, layout.folder, formats=["npz"])[0].rename(layout.path("truth"))
     keys: dict[str, Any] = {
         "name": scenario.name,
         "rate": rate,
         "frames": [[0, len(frames) - 1]],
-        "calibration": {"file": (layout.believed if believed else layout.calibration).name},
+        "calibration": {"file": layout.path("calibration_believed" if believed else "calibration").name},
         "detections": {
             "format": "openpose",
             "path": "openpose",
@@ -219,6 +221,6 @@ def _write_description(layout: Layout, scenario: Scenario, joints: Floats, frame
             "skeleton": "body25",
             "kind": scenario.detector.kind,
         },
-        "truth": {"format": "npz", "file": layout.truth.name, "skeleton": "shelf14"},
+        "truth": {"format": "npz", "file": layout.path("truth").name, "skeleton": "shelf14"},
     }
-    layout.recording.write_text(f"{_HEAD}{dumps_keys(keys)}", encoding="utf-8")
+    layout.path("recording").write_text(f"{_HEAD}{dumps_keys(keys)}", encoding="utf-8")
