@@ -46,10 +46,12 @@ def scenario_schema() -> Schema:
     definitions["Range"] = _RANGE
     definitions["Paired"] = _table(keys)
     one_at_a_time = {"type": "boolean", "description": "the base, and each key alone, instead of all combinations"}
+    few = {"type": "boolean", "description": "few combinations, with all pairs of values of two keys, instead of all"}
     paired = {"type": "array", "items": {"$ref": f"{_DEFS}Paired"}, "description": "keys that are varied together"}
     about = "values that a run adds at most to each key, between those where scores break"
     refine = {"type": "integer", "minimum": 0, "maximum": MOST_ADDED, "description": about}
-    properties["sweep"] |= _table({**keys, "one_at_a_time": one_at_a_time, "refine": refine, "paired": paired})
+    how: dict[str, Any] = {"one_at_a_time": one_at_a_time, "pairwise": few, "refine": refine, "paired": paired}
+    properties["sweep"] |= _table({**keys, **how})
     properties["cases"]["additionalProperties"] = _table(case)
     properties["extends"]["minLength"] = properties["variants"]["minItems"] = 1
     del schema["required"]

@@ -15,6 +15,7 @@ Beside the keys of a scenario, a scenario file may have::
     detector.phantoms.rate = { from = 0.0, to = 2.0, steps = 5 }        # scale = "log" for a geometric range
     detector.profile = ["poor", "typical"]
     one_at_a_time = true              # instead: the base, and each key alone
+    pairwise = true                   # instead: few combinations, with every pair of values of two keys
     refine = 3                        # a run adds up to three values to each key, where scores break
 
     [[sweep.paired]]                  # keys that are varied together

@@ -53,6 +53,7 @@ def _lines(plan: ScenarioPlan, note: str) -> list[str]:
     lines += _table(rows)
     if plan.sweep.axes:
         how = "the base, and one key at a time" if plan.sweep.one_at_a_time else "all combinations of"
+        how = "combinations with all pairs of values of" if plan.sweep.pairwise else how
         how += (
             f", up to {_count(plan.sweep.refine, 'more value')} of each where scores break" if plan.sweep.refine else ""
         )

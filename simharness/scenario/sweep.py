@@ -11,6 +11,7 @@ from typing import Any
 from mvpose.files.message_text import shown
 from simharness.scenario import layers
 from simharness.scenario.file_model import MOST_TRIALS
+from simharness.scenario.pairwise import pairwise
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.sections.section import Section
 from simharness.scenario.validation_messages import explain, is_key, origin_of, section_at
@@ -21,6 +22,7 @@ MOST_ADDED = 20
 """Largest number of values by which each key of a sweep may be refined."""
 
 _MOST_STEPS = 10_000
+_MOST_PAIRS = 400  # settings of a pairwise sweep take seconds to find from there on
 _HOW = 'write a list, [2, 3, 5], or a range, { from = 0.0, to = 2.0, steps = 5 }, geometric with scale = "log"'
 _SEEDS = "write seeds = 20, or a list of seeds, at the top of the file"
 _NAMES = "write [cases.NAME] with the keys that differ"
@@ -78,6 +80,8 @@ class Sweep:
     """Origin of the values of each dotted key, for messages."""
     refine: int = 0
     """Largest number of values that a run adds to each key where scores break."""
+    pairwise: bool = False
+    """Whether the settings are few combinations, with every pair of values of two axes, instead of all."""
 
     def with_values(self, added: Mapping[str, Sequence[Value]]) -> "Sweep":
         """Return the sweep with more values of keys that are varied alone, ascending."""
@@ -106,7 +110,14 @@ class Sweep:
         added = [self.refine if refined and axis.is_numeric else 0 for axis in self.axes]
         if self.one_at_a_time:
             return 1 + sum(len(axis.others(base)) for axis in self.axes) + sum(added)
+        if self.pairwise:
+            return len(pairwise(self._sizes))
         return math.prod(len(axis.values) + more for axis, more in zip(self.axes, added, strict=True))
+
+    @property
+    def _sizes(self) -> tuple[int, ...]:
+        """Numbers of values of the axes."""
+        return tuple(len(axis.values) for axis in self.axes)
 
     def settings(self, base: Mapping[str, Value]) -> Iterator[tuple[str, dict[str, Value]]]:
         """Yield the varied key, "" for the base and for combinations, and the values of all keys that change.
@@ -120,7 +131,8 @@ class Sweep:
                 for values in axis.others(base):
                     yield axis.keys[0], dict(zip(axis.keys, values, strict=True))
         else:
-            for combination in itertools.product(*(axis.values for axis in self.axes)):
+            for places in pairwise(self._sizes) if self.pairwise else itertools.product(*map(range, self._sizes)):
+                combination = [axis.values[place] for axis, place in zip(self.axes, places, strict=True)]
                 yield "", dict(zip(self.keys, itertools.chain(*combination), strict=True))
 
 
@@ -140,12 +152,13 @@ class SweepReader:
             message = f"{name}: expected a section [{name}] with keys of a scenario, got {_shown(section)}"
             self._refuse((name,), message)
             return Sweep()
-        if name == "search" and (other := {"one_at_a_time", "refine"} & section.keys()):
+        if name == "search" and (other := {"one_at_a_time", "pairwise", "refine"} & section.keys()):
             self._refuse((name, *other), f"{', '.join(sorted(other))}: only a sweep has this; remove it")
         section = dict(section)
-        one_at_a_time = section.pop("one_at_a_time", False)
-        if not isinstance(one_at_a_time, bool):
-            self._refuse(("sweep", "one_at_a_time"), f"one_at_a_time: expected true, got {_shown(one_at_a_time)}")
+        flags = {key: section.pop(key, False) for key in ("one_at_a_time", "pairwise")}
+        for flag, value in flags.items():
+            if not isinstance(value, bool):
+                self._refuse(("sweep", flag), f"{flag}: expected true, got {_shown(value)}")
         refine = section.pop("refine", 0)
         if isinstance(refine, bool) or not isinstance(refine, int) or not 0 <= refine <= MOST_ADDED:
             self._refuse(("sweep", "refine"), f"refine: expected 0 to {MOST_ADDED} values, got {_shown(refine)}")
@@ -165,7 +178,19 @@ class SweepReader:
             if clash := next((other for other in keys[:index] if layers.overlap(key, other)), None):
                 also = "" if clash == key else f", because {'.'.join(clash)} is swept"
                 self._refuse((name, *key), f"{'.'.join(key)} is swept twice{also}; remove one of them")
-        return Sweep(tuple(axes), one_at_a_time is True, self._swept, refine)
+        few = flags["pairwise"] is True
+        if few and (flags["one_at_a_time"] or refine):
+            wrong = "refine" if refine else "one_at_a_time"
+            self._refuse(("sweep", "pairwise"), f"pairwise: does not go with {wrong}; remove one of them")
+        sizes = sorted(len(axis.values) for axis in axes)[-2:]
+        if few and math.prod(sizes) > _MOST_PAIRS:
+            pairs = f"{sizes[0]:,} x {sizes[-1]:,}"
+            self._refuse(
+                ("sweep", "pairwise"),
+                f"pairwise: two keys have {pairs} pairs of values, more than {_MOST_PAIRS:,}; sweep over fewer values",
+            )
+            few = False
+        return Sweep(tuple(axes), flags["one_at_a_time"] is True, self._swept, refine, few)
 
     def cases(self, section: Any, sweep: Sweep) -> dict[str, dict[str, Any]]:
         """Return the changes of every case of [cases]."""

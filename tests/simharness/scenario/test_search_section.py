@@ -47,6 +47,7 @@ def test_axes_and_scenarios_at_their_values(tmp_path):
         ("people.count = [2, 1000]", r"\[search\]: people.count"),
         ('detector.profile = ["typical", "none such"]', "none such"),
         ("one_at_a_time = true", "only a sweep has this"),
+        ("pairwise = true", "only a sweep has this"),
         ("sweep.people.count = [1, 2]", "sweep"),
     ],
 )

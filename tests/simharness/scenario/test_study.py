@@ -337,6 +337,14 @@ class TestMistakes:
             ("method.estimators.custom = ['a.py:A']", "method.estimators cannot be swept: write variants = "),
             ("gate.level = [0.1]", "gate cannot be swept"),
             ("one_at_a_time = 1", "one_at_a_time: expected true, got 1"),
+            ("pairwise = 1", "pairwise: expected true, got 1"),
+            ("pairwise = true\none_at_a_time = true", "pairwise: does not go with one_at_a_time; remove one of them"),
+            ("pairwise = true\nrefine = 2", "pairwise: does not go with refine; remove one of them"),
+            (
+                "pairwise = true\nrate = { from = 1.0, to = 9.0, steps = 30 }\n"
+                "duration = { from = 1.0, to = 9.0, steps = 20 }",
+                "pairwise: two keys have 20 x 30 pairs of values, more than 400; sweep over fewer values",
+            ),
             ("paired = [1]", "paired: expected tables [[sweep.paired]], got [1]"),
             (
                 "[[sweep.paired]]\npeople.count = [1, 2]\npeople.area = [1.0, 2.0, 3.0]",
