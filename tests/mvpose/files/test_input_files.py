@@ -122,6 +122,7 @@ AROUND = {
     "simharness/hunt/hunt_run.py": "appended to, read by the reader",
     "mvpose/formats/people/people_parts.py": "files that were just written",
     "simharness/outputs/study/page.py": "a file of a result folder, if regular",
+    "simharness/gate/frame_times.py": "a text of its own",
 }
 SHIPPED = {
     "simharness/world/rigs/layouts.py", "simharness/world/humans/body.py", "simharness/detector/reported.py",
@@ -129,13 +130,13 @@ SHIPPED = {
     "simharness/world/humans/face_colors.py", "simharness/world/humans/population.py",
     "simharness/world/humans/anatomy.py", "simharness/world/scene/rooms/fittings.py",
     "simharness/world/scene/objects/materials.py", "mvpose/calibration/findings.py",
-    "simharness/outputs/study/curves.py", "simharness/outputs/validation/tables.py",
+    "simharness/outputs/__init__.py",
     "simharness/reality/detector_fit/fit_table.py",
     "simharness/reality/detector_fit/profile.py", "simharness/study/causes/cause_catalogue.py",
     "simharness/world/scene/rooms/room_lighting.py", "simharness/reality/evaluation.py",
     "simharness/trial/kernel_compilation.py", "mvpose/formats/joint_names.py", "mvpose/networks/catalogue/store.py",
     "mvpose/calibration/file_mistakes.py", "mvpose/networks/catalogue/fetch.py", "mvpose/public_names.py",
-    "mvpose/skeleton.py", "simharness/outputs/benchmark/layout.py", "simharness/scoring/score_registry.py",
+    "mvpose/skeleton.py", "simharness/scoring/score_registry.py",
     "simharness/cli/scenarios_command.py",
     "simharness/world/humans/wardrobe.py", "simharness/world/motion/activities/gait.py",
     "simharness/world/motion/mocap/skeleton.py",
