@@ -74,6 +74,7 @@ OWN_STUDY = {
     "simharness study my-lab.toml --workers 2": f"{LAB} --seeds 1",
     "simharness study my-lab.toml --seeds 40": f"{LAB} --seeds 2",
 }
+FIGURES = "simharness report STUDY --figures FOLDER"  # tests/simharness/test_cli_outputs.py
 OWN_GATE = (
     "simharness check my-ci.toml --baseline my-ci.json --update-baseline",
     "simharness check my-ci.toml --baseline my-ci.json",
@@ -158,6 +159,7 @@ GALLERY = "python -m tools.gallery results/gallery"  # tests/tools/test_gallery.
 # Without arguments these begin to bake the body.
 BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")
 KNOWN = {
+    FIGURES,
     *ALONE,
     *USER_FILES.values(),
     *NAMES,
