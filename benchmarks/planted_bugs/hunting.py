@@ -23,7 +23,8 @@ from benchmarks.planted_bugs.records import Outcome
 from mvpose import Detections, Estimate, Rig, preset
 from simharness.hunt.hunt_run import BATCH
 from simharness.hunt.hunt_run import TRIALS as TRIALS_FILE
-from simharness.hunt.properties import FrameAnswer, violations
+from simharness.hunt.properties import FrameAnswer, Violation, violations
+from simharness.scoring.failure_classes import FailureKind, failures_of_frame
 from simharness.types.truth import Truth
 
 SCENARIO = Path(__file__).with_name("hunted.toml")
@@ -46,7 +47,6 @@ HUNTED = (
 )
 """Bugs of the method that are hunted by default. The last two change no result: finding one would be a false alarm."""
 
-_COMPARED = ("missed", "merged", "ghost", "split", "swapped_limb", "displaced_joint", "overconfident")
 _FEWEST = 2  # scenes that fail with the bug alone: in one, a decision may have been too close for rounding errors
 _UNCHANGED = "PLANTED_BUGS_UNCHANGED"  # environment variable: folder of the copy without the bug
 
@@ -91,12 +91,18 @@ def summary(path: Path) -> str:
 
 def worse(rig: Rig, detections: Detections, truth: Truth, estimate: Estimate) -> str:
     """Return what fails in an answer and not in that of the unchanged code; "" if nothing does."""
-    mine, other = (
-        violations(FrameAnswer(rig, detections, truth, each, preset("full")), _COMPARED)
-        for each in (estimate, unchanged(rig, detections))
-    )
+    both = estimate, unchanged(rig, detections)
+    mine, other = (_failures(FrameAnswer(rig, detections, truth, each, preset("full"))) for each in both)
     new = [each for each in mine if not any(each.is_like(known) for known in other)]
-    return f"{new[0].property}: {new[0].text}" if new else ""
+    return f"{new[0].property} {new[0].text}" if new else ""
+
+
+def _failures(answer: FrameAnswer) -> list[Violation]:
+    """Return failures of all classes, people out of plain view who are missed among them, and of the covariance."""
+    of_joints = (FailureKind.SWAPPED_LIMB, FailureKind.DISPLACED_JOINT)
+    found = failures_of_frame(answer.rig, answer.detections, answer.truth, answer.estimate)
+    classified = [Violation(str(each.kind), each.person, "", each.joints * (each.kind in of_joints)) for each in found]
+    return [*classified, *violations(answer, ("overconfident",))]
 
 
 def unchanged(rig: Rig, detections: Detections) -> Estimate:

@@ -35,7 +35,7 @@ def test_only_failures_that_the_unchanged_code_does_not_have_count(answered):
         freedom=estimate.freedom[:1],
         matching=Matching(np.where(estimate.matching.labels == 0, 0, -1)),
     )
-    assert hunting.worse(*frame, lost).startswith("missed: ")
+    assert hunting.worse(*frame, lost).startswith("missed")
     np.testing.assert_array_equal(hunting.unchanged(*frame[:2]).joints, estimate.joints)
 
 
