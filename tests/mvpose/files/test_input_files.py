@@ -109,7 +109,6 @@ AROUND = {
     "mvpose/formats/calibration/qualisys.py": "bytes that were read",
     "simharness/runtime/parquet_tables.py": "bytes that were read",
     "simharness/planning/search.py": "text that was just written",
-    "simharness/gate/frame_times.py": "text that was just written",
     "simharness/outputs/run/pictures.py": "a film that was just written",
     "simharness/runtime/version.py": "code",
     "simharness/trial/needs.py": "what the kernel says of the machine",
