@@ -73,7 +73,9 @@ def _values(entry: ElementTree.Element, name: str, part: str, keys: tuple[str, .
     found = entry.find(part)
     if found is None:
         raise ValueError(f"camera {name!r} lacks <{part}>")
-    with prefixed(f"camera {name!r}: <{part}>", damage=(KeyError,)):
+    if missing := [key for key in keys if key not in found.attrib]:
+        raise ValueError(f"camera {name!r}: <{part}> lacks {missing[0]!r}")
+    with prefixed(f"camera {name!r}: <{part}>"):
         return [float(found.attrib[key]) for key in keys]
 
 
