@@ -14,7 +14,7 @@ from typing import Any, Literal, Self, get_args
 from mvpose.arrays import Floats
 from mvpose.camera import Camera, Rig
 from mvpose.checks import Sealed, as_array
-from mvpose.files.json_values import json_value
+from mvpose.json_values import json_value
 
 Severity = Literal["alarm", "note", "unknown"]
 Verdict = Literal["fine", "faults", "cannot tell"]

@@ -32,7 +32,7 @@ from mvpose.calibration.tracklet_matching import PeopleGroups, RigUncertainty, m
 from mvpose.calibration.tracklets import Tracklets, chosen_frames, link
 from mvpose.camera import Camera, Rig
 from mvpose.detections import Detections
-from mvpose.files.json_values import json_value
+from mvpose.json_values import json_value
 
 Freedom = Literal["extrinsics", "focal", "center"]
 """What a repair may change: places and orientations; focal lengths; principal points."""

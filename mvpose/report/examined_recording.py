@@ -20,7 +20,7 @@ from mvpose.arrays import Floats, Integers
 from mvpose.calibration.findings import camera_names
 from mvpose.camera import Rig
 from mvpose.detections import Detections
-from mvpose.files.json_values import json_value
+from mvpose.json_values import json_value
 from mvpose.reconstruction.error_scale import PRIOR_FREEDOM
 from mvpose.recording import People
 from mvpose.report import measures

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from mvpose import Rig
-from mvpose.files.json_values import json_value
+from mvpose.json_values import json_value
 from simharness.planning.candidates import Candidate
 from simharness.planning.fast_layer import Prediction
 from simharness.planning.forecast_error import ForecastErrors, forecast_text

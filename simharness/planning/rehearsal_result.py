@@ -8,7 +8,7 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from mvpose.arrays import Bools, Integers
-from mvpose.files.json_values import json_value
+from mvpose.json_values import json_value
 from simharness.planning.fast_layer import Prediction
 from simharness.planning.floor_coverage import good_rectangle
 from simharness.planning.forecast_error import forecast_text

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from mvpose import COCO17, Estimate
 from mvpose.arrays import Floats, Integers
-from mvpose.files.json_values import json_value
+from mvpose.json_values import json_value
 from simharness.scoring.catalogue import AP_MM, PCK_MM
 from simharness.scoring.feet_and_hands import WholeBodyInput, whole_body_scores
 from simharness.scoring.frame_scores import score_frames

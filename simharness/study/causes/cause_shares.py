@@ -25,8 +25,8 @@ from pydantic import TypeAdapter
 from mvpose.arrays import Floats
 from mvpose.commands.errors import RunError
 from mvpose.commands.progress import Reporter, Silence, Stages
-from mvpose.files.json_values import json_value
 from mvpose.files.message_text import prefixed
+from mvpose.json_values import json_value
 from simharness.runtime.frame_pool import map_jobs
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.catalogue import SCORES
