@@ -11,6 +11,7 @@ from mvpose.arrays import Floats
 from mvpose.files.input_files import parse_toml
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.detector_measurement import MeasuredDetector
+from simharness.reality.detector_fit.parameters import UNCOVERED
 from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.detector_section import KINDS, LARGEST_MULTIPLE, DetectorSection
 
@@ -23,8 +24,7 @@ _OF_QUALITY = ("keypoints.jitter.", "keypoints.miss.", "keypoints.inversion.", "
 
 _ESTIMATES = {
     "keypoints.inversion_reach": 0.3,
-    # In an operating room (MVOR), hidden joints are grossly wrong 11 to 14 times as often as visible ones.
-    **dict.fromkeys(("keypoints.inversion_uncovered", "keypoints.swap_uncovered"), 0.08),
+    **dict.fromkeys(("keypoints.inversion_uncovered", "keypoints.swap_uncovered"), UNCOVERED),
     "keypoints.drop.depth": 10.0,
     **dict.fromkeys(("keypoints.drop.edge.self_occluded", "keypoints.drop.edge.occluded"), 0.5),
     **{f"keypoints.stray.{kind}": 0.3 for kind in KINDS[3:]},
