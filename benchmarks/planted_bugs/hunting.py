@@ -91,9 +91,9 @@ def summary(path: Path) -> str:
 
 def worse(rig: Rig, detections: Detections, truth: Truth, estimate: Estimate) -> str:
     """Return what fails in an answer and not in that of the unchanged code; "" if nothing does."""
-    both = estimate, unchanged(rig, detections)
-    mine, other = (_failures(FrameAnswer(rig, detections, truth, each, preset("full"))) for each in both)
-    new = [each for each in mine if not any(each.is_like(known) for known in other)]
+    estimates = estimate, unchanged(rig, detections)
+    changed, clean = (_failures(FrameAnswer(rig, detections, truth, each, preset("full"))) for each in estimates)
+    new = [failure for failure in changed if not any(failure.is_like(known) for known in clean)]
     return f"{new[0].property} {new[0].text}" if new else ""
 
 

@@ -4,8 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from simharness.world.scene.objects.materials import FINISHES, MATERIALS
+from simharness.world.scene.objects.materials import MATERIALS
 from simharness.world.scene.objects.object_files import ASSETS
+from simharness.world.scene.rooms.finishes import FINISHES
 from simharness.world.scene.rooms.landscape import PANORAMAS
 from tools.objects.__main__ import write_objects
 from tools.objects.finishes import write_finishes

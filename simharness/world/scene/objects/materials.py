@@ -1,9 +1,8 @@
-"""Materials and prints of objects on one sheet, and seamless textures of floors and walls; all ship as pictures.
+"""Sheet of materials and prints: one texture that all textured objects of a scene share, of pictures that ship.
 
 A renderer prepares every texture once, so objects with many materials stay cheap if they share one picture. Materials
 (wood, fabric, metal) are nearly white and are multiplied by the colours of the faces; prints (pictures on screens,
-posters, papers, boards and packages) bring their colours with them. A texture of a floor or wall shows a patch of given
-size in metres; its rows run downwards, on a wall from the top to the floor.
+posters, papers, boards and packages) bring their colours with them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -134,42 +133,6 @@ def draw_sheet(seed: int) -> Sheet:
     return Sheet.pack(pictures)
 
 
-FLOOR_RESOLUTION = 192  # pixels per metre
-WALL_RESOLUTION = 160
-FINISHES = Path(__file__).parents[3] / "assets" / "finishes"
-"""Folder of the pictures of finishes that simharness ships, some of each."""
-
-
-@dataclass(frozen=True)
-class TiledTexture:
-    """Finish of a floor or wall: a texture (h, w, 3) uint8, sRGB, of a patch with width and height ``size``, metres."""
-
-    texture: NDArray[np.uint8]
-    size: tuple[float, float]
-
-
-FLOORS = (
-    *("tiles", "wood", "carpet", "concrete"),
-    *("carpet_tiles", "linoleum", "parquet", "sports_floor", "stage_boards", "paving", "asphalt", "grass"),
-)
-"""Names of floors; those of any room come first."""
-WALLS = ("plain", "panels", "brick", "stripes", "tinted", "wallpaper", "tiled", "curtain")
-"""Names of walls; those of any room come first."""
-
-
-def finish(name: str, rng: np.random.Generator, height: float | None = None) -> TiledTexture:
-    """Return a finish of floors or walls, one of its shipped pictures.
-
-    The picture of a wall is cut off at ``height`` metres above the floor, or mirrored above its upper edge.
-    """
-    picture = np.asarray(read_picture(drawn_pictures(FINISHES, name, rng)[0]), float) / 255
-    if height is None:
-        return tiled_texture(picture, FLOOR_RESOLUTION)
-    rows = max(round(height * WALL_RESOLUTION), 1)
-    picture = np.pad(picture, ((max(rows - len(picture), 0), 0), (0, 0), (0, 0)), mode="symmetric")
-    return tiled_texture(picture[-rows:], WALL_RESOLUTION)
-
-
 def drawn_pictures(folder: Path, name: str, rng: np.random.Generator, count: int = 1) -> list[Path]:
     """Draw ``count`` different ones of the shipped pictures ``NAME.0.webp``, ``NAME.1.webp`` and so on of a folder."""
     files = sorted(folder.glob(f"{name}.*.webp"))
@@ -179,10 +142,3 @@ def drawn_pictures(folder: Path, name: str, rng: np.random.Generator, count: int
 def read_picture(path: Path) -> NDArray[np.uint8]:
     """Return a shipped picture, sRGB, (h, w, 3)."""
     return np.asarray(cv2.imread(str(path)), np.uint8)[..., ::-1]
-
-
-def tiled_texture(picture: Floats, resolution: int) -> TiledTexture:
-    """Return the texture of a picture (h, w, 3) with values from 0 to 1."""
-    texture = np.round(255 * np.clip(picture, 0, 1)).astype(np.uint8)
-    seal(texture)  # the walls of a room share it
-    return TiledTexture(texture, (texture.shape[1] / resolution, texture.shape[0] / resolution))

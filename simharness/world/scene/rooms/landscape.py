@@ -22,10 +22,11 @@ from simharness.types.lighting import Panorama, Vector
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box, carried
-from simharness.world.scene.objects.materials import FINISHES, draw_sheet, drawn_pictures, read_picture
+from simharness.world.scene.objects.materials import draw_sheet, drawn_pictures, read_picture
 from simharness.world.scene.objects.object_files import draw_variant
 from simharness.world.scene.objects.shapes import outline, ring_mesh
 from simharness.world.scene.objects.solids import Solid
+from simharness.world.scene.rooms.finishes import FINISHES
 
 WHITE = 2.5
 """Radiance that white in the picture stands for."""

@@ -18,9 +18,9 @@ from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.humans.face_colors import Color
 from simharness.world.scene.objects.geoms import Box
-from simharness.world.scene.objects.materials import FLOORS, WALLS, TiledTexture, finish
 from simharness.world.scene.objects.shapes import outline, quad_mesh, ring_mesh
 from simharness.world.scene.objects.solids import Solid
+from simharness.world.scene.rooms.finishes import FLOORS, WALLS, TiledTexture, finish
 from simharness.world.scene.rooms.fittings import make_court, make_fittings
 from simharness.world.scene.rooms.kinds import settled
 from simharness.world.scene.rooms.lamps import make_ceiling, shown_lamps

@@ -6,7 +6,7 @@ from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.lighting import Lighting
 from simharness.world.rigs.layouts import build_rig
-from simharness.world.scene.objects.materials import FLOORS, WALLS, finish
+from simharness.world.scene.rooms.finishes import FLOORS, WALLS, finish
 from simharness.world.scene.rooms.lamps import area_lights, has_ceiling, make_ceiling, shown_lamps
 from simharness.world.scene.rooms.openings import draw_openings
 from simharness.world.scene.rooms.room_lighting import LIGHTS, MOODS, room_lighting
