@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -42,13 +44,15 @@ def test_random_triangles_match_brute_force(seed, size):
     np.testing.assert_allclose(image.depth, depth, rtol=2e-7)
 
 
+@pytest.mark.parametrize("turned", [1, -1])
 @pytest.mark.parametrize("away", [1.01, 1.5, 1.99, 2.01, 2.5])
-def test_small_triangles_before_a_wall_are_seen_and_those_behind_it_are_not(away):
+def test_small_triangles_before_a_wall_are_seen_and_those_behind_it_are_not(away, turned):
+    """From both sides; what stays where it is is drawn first."""
     camera, wall = camera_at((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), size=(48, 36), fov=60.0), 2.0
-    far = sheet([(wall, y, z) for y, z in ((3, 3), (-3, 3), (-3, -3), (3, -3))])
+    far = replace(sheet([(wall, y, z) for y, z in ((3, 3), (-3, 3), (-3, -3), (3, -3))]), still=True)
     y, z = np.random.default_rng(0).uniform(-0.3, 0.3, (2, 200, 1))
     corners = np.stack([y + [0, 0.1, 0], z + [0, 0, 0.1], np.full((200, 3), away)], -1)[..., [2, 0, 1]]
-    near = _mesh(corners.reshape(-1, 3), np.arange(600).reshape(-1, 3), (0.5, 0.5, 0.5))
+    near = _mesh(corners.reshape(-1, 3), np.arange(600).reshape(-1, 3)[:, ::turned], (0.5, 0.5, 0.5))
     image = RasterRenderer().render(camera, [far, near], color=False)
     depth, index = brute_force(camera, np.concatenate([far.vertices[far.faces], np.float32(corners)]).astype(float))
     np.testing.assert_array_equal(image.ids, index >= 2)
