@@ -6,8 +6,8 @@ import pytest
 
 from simharness.world.scene.objects.materials import MATERIALS
 from simharness.world.scene.objects.object_files import ASSETS
-from simharness.world.scene.rooms.finishes import FINISHES
 from simharness.world.scene.rooms.landscape import PANORAMAS
+from simharness.world.scene.rooms.tiled_textures import FINISHES
 from tools.objects.__main__ import write_objects
 from tools.objects.finishes import write_finishes
 from tools.objects.landscape import write_panoramas

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from simharness.types.random_streams import stream
-from simharness.world.scene.rooms.finishes import (
+from simharness.world.scene.rooms.tiled_textures import (
     FLOOR_RESOLUTION,
     WALL_RESOLUTION,
     WALLS,

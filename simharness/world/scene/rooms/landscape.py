@@ -26,7 +26,7 @@ from simharness.world.scene.objects.materials import draw_sheet, drawn_pictures,
 from simharness.world.scene.objects.object_files import draw_variant
 from simharness.world.scene.objects.shapes import outline, ring_mesh
 from simharness.world.scene.objects.solids import Solid
-from simharness.world.scene.rooms.finishes import FINISHES
+from simharness.world.scene.rooms.tiled_textures import FINISHES
 
 WHITE = 2.5
 """Radiance that white in the picture stands for."""

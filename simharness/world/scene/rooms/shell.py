@@ -20,13 +20,13 @@ from simharness.world.humans.face_colors import Color
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import outline, quad_mesh, ring_mesh
 from simharness.world.scene.objects.solids import Solid
-from simharness.world.scene.rooms.finishes import FLOORS, WALLS, TiledTexture, finish
 from simharness.world.scene.rooms.fittings import make_court, make_fittings
 from simharness.world.scene.rooms.kinds import settled
 from simharness.world.scene.rooms.lamps import make_ceiling, shown_lamps
 from simharness.world.scene.rooms.landscape import AROUND, make_surroundings
 from simharness.world.scene.rooms.openings import Opening, Wall, room_walls
 from simharness.world.scene.rooms.room_lighting import room_lighting
+from simharness.world.scene.rooms.tiled_textures import FLOORS, WALLS, TiledTexture, finish
 
 _ANY = 4  # finishes from which "any" is drawn: the first of each list
 _CELL = 1.0  # metres: approximate cell size of the grids of floor and walls

@@ -6,11 +6,11 @@ from simharness.scenario.sections.cameras_section import CamerasSection
 from simharness.scenario.sections.room_section import RoomSection
 from simharness.types.lighting import Lighting
 from simharness.world.rigs.layouts import build_rig
-from simharness.world.scene.rooms.finishes import FLOORS, WALLS, finish
 from simharness.world.scene.rooms.lamps import area_lights, has_ceiling, make_ceiling, shown_lamps
 from simharness.world.scene.rooms.openings import draw_openings
 from simharness.world.scene.rooms.room_lighting import LIGHTS, MOODS, room_lighting
 from simharness.world.scene.rooms.shell import make_room
+from simharness.world.scene.rooms.tiled_textures import FLOORS, WALLS, finish
 
 SIZE = (6.0, 8.0, 3.0)
 ROOM = RoomSection(size=SIZE)
