@@ -1,8 +1,9 @@
 """Leaderboard: ``python -m benchmarks.leaderboard FOLDER --shelf SHELF``.
 
-Runs the methods of :mod:`benchmarks.leaderboard.entries` in the studies ``conditions.toml`` and ``views.toml`` of this
-folder, and on the recording Shelf where its files are given, prints a table of each, and writes into FOLDER the page
-``leaderboard.html`` and a CSV file for each part. Trials and methods that are finished are kept in FOLDER: the same
+Runs the methods of :mod:`benchmarks.leaderboard.entries` in the studies ``conditions.toml``, ``views.toml`` and
+``rigs.toml`` of this folder, and on the recording Shelf where its files are given, prints a table of each, and writes
+into FOLDER the page ``leaderboard.html`` and a CSV file for each part. The part of rigs stands beside what papers on
+learned methods publish (``published_rigs.toml``). Trials and methods that are finished are kept in FOLDER: the same
 command continues an interrupted run. Methods whose packages are not installed are left out, with the reason.
 """
 
@@ -15,8 +16,8 @@ from pathlib import Path
 from rich.console import Console
 
 from benchmarks.leaderboard.entries import Entry, chosen
-from benchmarks.leaderboard.figures import Figure, study_figures, write_csv
-from benchmarks.leaderboard.page import TITLES, render, text_rows
+from benchmarks.leaderboard.figures import RIG_SCORES, Figure, rig_changes, study_figures, write_csv
+from benchmarks.leaderboard.page import TITLES, render, rig_rows, text_rows
 from benchmarks.leaderboard.shelf import NAME, evaluated
 from mvpose.commands.progress import reporter
 from mvpose.files.atomic_files import write_atomic
@@ -25,7 +26,7 @@ from simharness.reality.recording_file import read_recording
 from simharness.scenario.load import load_study
 from simharness.study.study_run import run_study
 
-STUDIES = {"conditions": "case", "views": "cameras.count"}
+STUDIES = {"conditions": "case", "views": "cameras.count", "rigs": "cameras.preset"}
 """Studies of this folder, each with the column that tells its settings apart."""
 
 PAGE = "leaderboard.html"
@@ -69,6 +70,11 @@ def write(parts: dict[str, list[Figure]], entries: Sequence[Entry], skipped: dic
     headings = ("PCP\n%", "minus best\nof mvpose", "precision\n%", "recall\n%", "MPJPE\nmm", "ms\nper frame")
     for name, figures in parts.items():
         ScoreTable(TITLES[name], ("method",), headings, text_rows(figures, entries)).print_to(console)
+        if name == "rigs":
+            columns = ("AP25\n%", "mAP\n%", "MPJPE\nmm", "mAP minus\nthat of cmu0", "MPJPE minus\nthat of cmu0")
+            ScoreTable("Other rigs, the best of mvpose", ("rig",), columns, rig_rows(figures, entries)).print_to(
+                console
+            )
         write_csv(figures, folder / f"{name}.csv")
     for name, why in skipped.items():
         console.print(f"left out: {name}, because {why}", soft_wrap=True, highlight=False, markup=False)
@@ -88,7 +94,10 @@ def _study(name: str, entries: Sequence[Entry], options: argparse.Namespace) -> 
         results = run_study(study, out=options.folder, workers=options.workers, reporter=bars)
     for each in results.info["failed"]:
         print(f"failed: {name}, {each['case']} seed {each['seed']}: {each['error']}")
-    return study_figures(results.trials, entries, STUDIES[name])
+    if name != "rigs":
+        return study_figures(results.trials, entries, STUDIES[name])
+    figures = study_figures(results.trials, entries, STUDIES[name], RIG_SCORES)
+    return figures + rig_changes(results.trials, entries, STUDIES[name])
 
 
 if __name__ == "__main__":

@@ -25,6 +25,15 @@ OVERALL = ("pcp", "precision", "recall", "mpjpe_mm", "ghosts", "time_ms")
 DIFFERENCE = "pcp minus best of ours"
 """Name of the difference of PCP, which has no score of its own."""
 
+RIG_SCORES = ("ap25", "ap50", "ap100", "map", "mpjpe_mm", "pcp", "recall")
+"""Scores of each rig, those of tables on Panoptic among them."""
+
+HOME = "cmu0"
+"""Rig that learned methods are trained on, with which the others are compared."""
+
+CHANGE = " minus that of cmu0"
+"""End of the name of a difference of a score from that with :data:`HOME`."""
+
 ALL = "all"
 """Setting of a figure over all settings."""
 
@@ -54,8 +63,10 @@ class Figure:
     """Adjusted p-value of a difference; NaN where it is not tested."""
 
 
-def study_figures(trials: pl.DataFrame, entries: Sequence[Entry], key: str) -> list[Figure]:
-    """Return the figures of a study: PCP in each setting, scores over all settings, and differences of PCP.
+def study_figures(
+    trials: pl.DataFrame, entries: Sequence[Entry], key: str, scores: Sequence[str] = ("pcp",)
+) -> list[Figure]:
+    """Return the figures of a study: scores in each setting, scores over all settings, and differences of PCP.
 
     Intervals and pairs are over seeds, whose score is the mean over settings. P-values are adjusted by Holm's method.
 
@@ -63,27 +74,50 @@ def study_figures(trials: pl.DataFrame, entries: Sequence[Entry], key: str) -> l
         trials: table of the trials of the study.
         entries: methods, in the order of the figures.
         key: column that tells settings apart.
+        scores: scores of each setting.
     """
     rows = {entry.name: trials.filter(pl.col("variant") == entry.name) for entry in entries}
     settings = trials[key].unique(maintain_order=True).to_list()
     found = [
-        _mean(name, str(setting), table.filter(pl.col(key) == setting), "pcp")
+        _mean(name, str(setting), table.filter(pl.col(key) == setting), score)
         for name, table in rows.items()
         for setting in settings
+        for score in scores
     ]
     found += [_mean(name, ALL, table, score) for name, table in rows.items() for score in OVERALL]
     base = rows[best_of_ours(found, entries)]
     reference = by_seed(base, "pcp")
     differences = {
-        name: paired([reference.get(seed) for seed in scores], list(scores.values()))
+        name: paired([reference.get(seed) for seed in others], list(others.values()))
         for name, table in rows.items()
-        if table is not base and (scores := by_seed(table, "pcp"))
+        if table is not base and (others := by_seed(table, "pcp"))
     }
     adjusted = dict(zip(differences, holm([each.p for each in differences.values()]), strict=True))
     return found + [
         Figure(name, ALL, DIFFERENCE, each.difference, each.low, each.high, each.n, adjusted[name])
         for name, each in differences.items()
     ]
+
+
+def rig_changes(trials: pl.DataFrame, entries: Sequence[Entry], key: str) -> list[Figure]:
+    """Return what other rigs than :data:`HOME` change, paired by seed: mAP, MPJPE and PCP of each method.
+
+    Args:
+        trials: table of the trials of the study.
+        entries: methods, in the order of the figures.
+        key: column of the rig.
+    """
+    rigs = [rig for rig in trials[key].unique(maintain_order=True).to_list() if rig != HOME]
+    found = []
+    for entry in entries:
+        table = trials.filter(pl.col("variant") == entry.name)
+        for score in ("map", "mpjpe_mm", "pcp"):
+            home = by_seed(table.filter(pl.col(key) == HOME), score)
+            for rig in rigs:
+                other = by_seed(table.filter(pl.col(key) == rig), score)
+                each = paired([home.get(seed) for seed in other], list(other.values()))
+                found.append(Figure(entry.name, rig, score + CHANGE, each.difference, each.low, each.high, each.n))
+    return found
 
 
 def best_of_ours(figures: Sequence[Figure], entries: Sequence[Entry]) -> str:

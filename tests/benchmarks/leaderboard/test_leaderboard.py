@@ -14,8 +14,19 @@ import pytest
 import benchmarks.leaderboard
 from benchmarks.leaderboard.__main__ import PAGE, STUDIES, main
 from benchmarks.leaderboard.entries import ENTRIES, Entry, chosen
-from benchmarks.leaderboard.figures import ALL, DIFFERENCE, OVERALL, Figure, best_of_ours, study_figures, write_csv
-from benchmarks.leaderboard.page import cell_of, overall_table, render, setting_table, text_rows
+from benchmarks.leaderboard.figures import (
+    ALL,
+    CHANGE,
+    DIFFERENCE,
+    OVERALL,
+    RIG_SCORES,
+    Figure,
+    best_of_ours,
+    rig_changes,
+    study_figures,
+    write_csv,
+)
+from benchmarks.leaderboard.page import cell_of, overall_table, render, rig_rows, rig_table, setting_table, text_rows
 from benchmarks.leaderboard.shelf import evaluated, pcp, recording_figures
 from benchmarks.leaderboard.views_plot import views_plot
 from benchmarks.method.scenes import Conditions, film, ring
@@ -121,6 +132,69 @@ def test_cells_of_differences_are_bold_where_they_are_significant():
     assert cell_of(replace(shown, p=0.01)).strong
     assert cell_of(replace(shown, p=float("nan"), high=-0.5)).strong  # not tested: the interval decides
     assert cell_of(None).text == cell_of(replace(shown, value=float("nan"))).text == "–"
+
+
+RIGS = {"cmu0": 0.0, "cmu3": -6.0, "cmu1": 2.0}
+"""mAP of three rigs, less that of cmu0."""
+
+
+@pytest.fixture
+def rig_trials():
+    """Three rigs at six seeds: a seed adds the same to mAP with every rig; a point of mAP is 2 mm of MPJPE."""
+    rows = []
+    for seed in range(6):
+        for rig, gain in RIGS.items():
+            for variant, level in {"full": 70.0, "ransac": 60.0}.items():
+                wobble = 0.5 * (-1) ** seed if rig == "cmu3" else 0.0
+                scores = {"map": level + 3.0 * seed + gain + wobble, "mpjpe_mm": 60.0 - 2.0 * (3.0 * seed + gain)}
+                known = dict.fromkeys((*OVERALL, *RIG_SCORES), 90.0 - (variant == "ransac"))
+                rows.append({"cameras.preset": rig, "seed": seed, "variant": variant, **known, **scores})
+    return pl.DataFrame(rows)
+
+
+def test_changes_from_one_rig_to_another_are_paired_by_seed(rig_trials):
+    figures = rig_changes(rig_trials, [FULL, RANSAC], "cameras.preset")
+    alone = mean_interval([64.0 + 3.0 * seed + 0.5 * (-1) ** seed for seed in range(6)], unit="%")
+    for name in ("full", "ransac"):
+        change = figure(figures, name, "cmu3", "map" + CHANGE)
+        assert change.value == pytest.approx(-6.0)
+        assert change.n == 6
+        assert -7.5 < change.low < -6.0 < change.high < -4.5
+        assert change.high - change.low < 0.3 * (alone.high - alone.low)  # seeds differ by more than rigs
+        assert figure(figures, name, "cmu1", "mpjpe_mm" + CHANGE).value == pytest.approx(-4.0)
+    assert not [each for each in figures if each.setting == "cmu0"]
+
+
+def test_rigs_have_their_cameras_scores_and_changes(rig_trials):
+    entries = [FULL, RANSAC]
+    figures = study_figures(rig_trials, entries, "cameras.preset", RIG_SCORES)
+    figures += rig_changes(rig_trials, entries, "cameras.preset")
+    rows = dict(rig_table(figures, entries).rows)
+    assert [(rig, cells[0].text) for rig, cells in rows.items()] == [("cmu0", "5"), ("cmu3", "4"), ("cmu1", "7")]
+    assert [(cell.text, cell.strong) for cell in rows["cmu3"][-2:]] == [("−6.0", True), ("+12.0", True)]
+    assert rows["cmu0"][-1].text == "–"
+    assert [row[0] for row in rig_rows(figures, entries)] == ["cmu0", "cmu3", "cmu1"]
+    best = {score: dict(setting_table(figures, entries, score).rows) for score in ("map", "mpjpe_mm")}
+    assert [cell.strong for cell in best["map"]["full"]] == [True] * 3
+    assert best["mpjpe_mm"]["full"][1].strong  # equal to that of ransac, and the least
+    assert best["map"]["ransac"][0].share == pytest.approx(0.5)  # 10 of 20 points behind
+    page = render({"rigs": figures}, entries, {})
+    for text in ("Other rigs of Panoptic", "MV-SSM", "CVPR 2025", "not of the data above", "−6.0"):
+        assert text in page
+
+
+def test_published_figures_have_a_source():
+    published = tomllib.loads((FOLDER / "published_rigs.toml").read_text())["figures"]
+    assert {tuple(each) for each in published} == {("method", "trained", "change", "figures", "source")}
+    assert all(each["source"] for each in published)
+
+
+def test_the_less_the_better_for_errors(rig_trials):
+    worse = rig_trials.with_columns(mpjpe_mm=pl.col("mpjpe_mm") + 10.0 * (pl.col("variant") == "ransac"))
+    figures = study_figures(worse, [FULL, RANSAC], "cameras.preset", RIG_SCORES)
+    rows = dict(setting_table(figures, [FULL, RANSAC], "mpjpe_mm").rows)
+    assert [(cell.strong, round(cell.share, 6)) for cell in rows["full"]] == [(True, 0.0)] * 3
+    assert [(cell.strong, round(cell.share, 6)) for cell in rows["ransac"]] == [(False, 0.5)] * 3
 
 
 def test_csv_has_all_figures(trials, tmp_path):
