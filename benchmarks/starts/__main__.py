@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-import simharness
+from benchmarks.filmed_people import filmed_people
 from mvpose import Detections, Rig
 from mvpose.arrays import Floats
 from mvpose.cli.inputs import Choices, read_inputs
@@ -50,27 +50,17 @@ def _film(number: int, seed: int, apart: float) -> _Film:
         layout = "ring" if number % 2 else "arc"
     activities = ["walk", *map(str, rng.choice(_ACTIVITIES, people - 1))]
     length = rng.uniform(8, 20)
-    changes = [
-        f"seed={seed + number}",
-        f"duration={length + apart + 0.1:.2f}",
-        f"rate={_RATE:.1f}",
-        f"people.count={people}",
-        f"people.activities={json.dumps(activities)}",
-        f"cameras.count={views}",
-        f'cameras.layout="{layout}"',
-        f"cameras.radius={rng.uniform(3.2, 4.5):.2f}",
-        f"cameras.height={rng.uniform(1.2, 2.6):.2f}",
-        "cameras.jitter=0.15",
-        "cameras.aim_jitter=0.15",
-        f"cameras.start={rng.uniform(0, 90):.1f}",
-        "cameras.spread=150.0",
-        "room.size=[11.0,11.0,3.0]",
-        "room.walls=false",
-        'rendering.renderer="rays"',
-        f"clutter.boxes={number % 3}",
-        "clutter.shelves=0",
-    ]
-    recording = simharness.simulate(simharness.load_scenario("quickstart", overrides=changes))
+    recording = filmed_people(
+        seed + number,
+        rng,
+        seconds=length + apart + 0.1,
+        rate=_RATE,
+        activities=activities,
+        views=views,
+        layout=layout,
+        boxes=number % 3,
+        room=["room.size=[11.0,11.0,3.0]", "room.walls=false"],
+    )
     frames = list(recording.detections)
     rates = [_RATE if number % 10 == 4 and view % 2 else _RATE // 2 for view in range(views)]
     first = np.round(rng.uniform(0, apart, views) * _RATE).astype(int)
