@@ -135,7 +135,9 @@ def export(
     every: int = option(1, "Write every Nth frame only.", metavar="N"),
     pictures: bool = option(True, "Write the pictures.", "--pictures/--no-pictures"),
     also: str = option(
-        "", "Also write [cyan]depth,ids,parts,coco[/] (true keypoints in the pictures), or some.", metavar="FILES"
+        "",
+        "Also write [cyan]depth,ids,parts[/], and true keypoints as [cyan]coco,visibility,heatmaps[/], or some.",
+        metavar="FILES",
     ),
     sequences: int | None = option(
         None,

@@ -102,7 +102,7 @@ ROWS = {
     | {
         "every": Row("--every 2", "--no-pictures"),
         "pictures": Row("--no-pictures"),
-        "also": Row("--also depth,coco", "--no-pictures"),
+        "also": Row("--also depth,coco,visibility,heatmaps", "--no-pictures"),
         "sequences": Row("--sequences 2", "--no-pictures"),
         "workers": Row("--workers 2", "--sequences 2 --no-pictures"),
     },

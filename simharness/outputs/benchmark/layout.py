@@ -2,6 +2,7 @@
 
     calibration_NAME.json, calibration_believed_NAME.json
     hdImgs/00_00/00_00_00000000.jpg, depth/00_00/00_00_00000000.png, ids/..., parts/..., coco/00_00.json
+    visibility.npz, heatmaps/00_00/00_00_00000000.npz
     hdPose3d_stage1_coco19/body3DScene_00000000.json
     openpose/00_00/00_00_00000000_keypoints.json
     manifest.json, scenario.toml, recording.toml, truth.npz, exact.npz

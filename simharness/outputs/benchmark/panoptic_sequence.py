@@ -28,6 +28,7 @@ from mvpose.recording import People
 from mvpose.skeleton import PANOPTIC19
 from simharness.outputs.benchmark.coco_truth import COCO, write_coco
 from simharness.outputs.benchmark.layout import FORMAT, Layout, confidences, manifest, readable_json, write_json
+from simharness.outputs.benchmark.picture_truth import HEATMAPS, VISIBILITY, write_heatmaps, write_visibility
 from simharness.outputs.benchmark.render import CHANNELS, channel_image, write_image
 from simharness.outputs.benchmark.submission import write_exact
 from simharness.reality.annotation_errors import annotate_simulation
@@ -42,6 +43,7 @@ _HEAD = (
     "# The detections and the truth of this sequence as a recording: simharness evaluate FOLDER\n"
     "# Frames are counted as they were written: frame k is the k-th file of each camera.\n"
 )
+_TRUTH = (COCO, VISIBILITY, HEATMAPS)
 _JPEG = (cv2.IMWRITE_JPEG_QUALITY, 95)
 _FINER = 2  # samples per pixel along each axis, against aliasing
 
@@ -61,13 +63,14 @@ class ExportPlan:
     pictures: bool = True
     """Whether pictures are written."""
     also: frozenset[str] = frozenset()
-    """More files for each camera: the channels of :mod:`.render` as PNG, and "coco", true keypoints in the pictures."""
+    """More files: the channels of :mod:`.render` as PNG, and truth in the pictures, "coco" (:mod:`.coco_truth`),
+    "visibility" and "heatmaps" (:mod:`.picture_truth`)."""
 
     def __post_init__(self) -> None:
         if self.every < 1:
             raise ValueError(f"--every must be 1 or more, got {self.every}")
-        if unknown := self.also - {*CHANNELS, COCO}:
-            expected = ", ".join((*CHANNELS, COCO))
+        if unknown := self.also - {*CHANNELS, *_TRUTH}:
+            expected = ", ".join((*CHANNELS, *_TRUTH))
             raise ValueError(f"--also: unknown {', '.join(sorted(unknown))}; expected any of {expected}")
         check_writable(self.folder, FORMAT, option="")
 
@@ -107,7 +110,7 @@ def export_sequence(
     names = hd_names([camera.name for camera in exposures.believed_rig])
     true_rig, believed_rig = renamed(exposures.true_rig, names), renamed(exposures.believed_rig, names)
     joints = sequence.of_skeleton(PANOPTIC19)
-    channels = sorted(plan.also - {COCO})
+    channels = sorted(plan.also & set(CHANNELS))
     source = picture_source_of(scenario, Playback(trial.scene)) if plan.pictures or channels else None
     frames = range(0, scenario.frames, plan.every)
     with Stages(reporter).stage("write", len(frames)) as advance, atomic_folder(plan.folder, FORMAT) as partial:
@@ -132,6 +135,9 @@ def export_sequence(
                 seen = shown.select(shown.view == view)
                 file = people_file(seen.keypoints, seen.scores, skeleton=seen.skeleton)
                 write_json(layout.path("detections", camera=name, frame=frame), file)
+                if HEATMAPS in plan.also:
+                    path = layout.channel(HEATMAPS, name, frame).with_suffix(".npz")
+                    write_heatmaps(path, current.truth, view, true_rig[view].size)
             if source is not None:
                 for view, name in enumerate(names):
                     if plan.pictures:
@@ -143,8 +149,11 @@ def export_sequence(
                         write_image(layout.channel(channel, name, frame), image)
             advance(1)
         write_exact(layout.path("exact"), result.recording, frames)
+        truth, people = {frame: detected[frame].truth for frame in frames}, sequence.ids.tolist()
         if COCO in plan.also:
-            write_coco(layout, believed_rig, {frame: detected[frame].truth for frame in frames}, sequence.ids.tolist())
+            write_coco(layout, believed_rig, truth, people)
+        if VISIBILITY in plan.also:
+            write_visibility(layout, names, truth, people)
         description = manifest(
             trial,
             frames=frames,
