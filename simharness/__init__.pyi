@@ -6,6 +6,7 @@ from .api import load_scenario as load_scenario
 from .api import run_trial as run_trial
 from .api import score as score
 from .api import simulate as simulate
+from .api import simulate_frames as simulate_frames
 from .scenario.sections.scenario import Scenario as Scenario
 from .trial.foreign_program import ForeignProgram as ForeignProgram
 from .types.recording import Recording as Recording

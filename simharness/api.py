@@ -15,6 +15,11 @@ suite.
     simharness.score(recording, estimates).scores["pcp"]
     simharness.blame(scenario, seeds=5).shares[0].cause
 
+A scenario frame by frame, with pictures that are not kept::
+
+    for frame in simharness.simulate_frames(scenario, pictures=True):
+        estimate = my_method(frame.rig, frame.pictures)
+
 A scenario file as an assertion, for test suites::
 
     def test_the_method_is_robust():
@@ -39,9 +44,20 @@ from simharness.scoring.assessment import Assessment, assess
 from simharness.scoring.catalogue import SCORES, ScoreInfo
 from simharness.study.causes.cause_shares import Blame, blame
 from simharness.trial.run_trial import TrialResult, run_trial
+from simharness.trial.simulated_frames import simulate_frames
 from simharness.types.recording import Recording
 
-__all__ = ["Blame", "TrialResult", "assert_robust", "blame", "load_scenario", "run_trial", "score", "simulate"]
+__all__ = [
+    "Blame",
+    "TrialResult",
+    "assert_robust",
+    "blame",
+    "load_scenario",
+    "run_trial",
+    "score",
+    "simulate",
+    "simulate_frames",
+]
 
 
 def load_scenario(name: str | Path, *, overrides: Sequence[str] = (), seed: int | None = None) -> Scenario:
