@@ -21,7 +21,6 @@ def filmed_people(
     views: int,
     layout: str,
     boxes: int,
-    room: Sequence[str],
 ) -> Recording:
     """Simulate a recording by the default detector, without pictures.
 
@@ -34,7 +33,6 @@ def filmed_people(
         views: number of cameras.
         layout: of the cameras: ``"ring"``, ``"corners"`` or ``"arc"``.
         boxes: number of boxes that hide people.
-        room: further changes of the scenario.
     """
     changes = [
         f"seed={seed}",
@@ -53,6 +51,7 @@ def filmed_people(
         'rendering.renderer="rays"',
         f"clutter.boxes={boxes}",
         "clutter.shelves=0",
-        *room,
+        "room.size=[11.0,11.0,3.0]",
+        "room.walls=false",
     ]
     return simharness.simulate(simharness.load_scenario("quickstart", overrides=changes))

@@ -49,13 +49,18 @@ def _truth_at(truth: Floats, frame: int, given: Detections, estimate: Estimate, 
     return truth[before] + (place - before) * (truth[before + 1] - truth[before])
 
 
-def aligned(rig: Rig, true: Rig) -> Rig:
-    """Return the rig, turned and shifted as a whole so that its cameras stand as near as they can to the true ones."""
+def aligned(rig: Rig, true: Rig, *, resized: bool = False) -> Rig:
+    """Return the rig, turned and shifted as a whole so that its cameras stand as near as they can to the true ones.
+
+    With ``resized`` it is also given the size of the true one.
+    """
     turn = Rotation.from_matrix([b.R.T @ a.R for a, b in zip(rig, true, strict=True)]).mean().as_matrix()
-    shift = (true.centers - rig.centers @ turn.T).mean(axis=0)
-    return Rig(
-        [replace(camera, R=camera.R @ turn.T, t=-camera.R @ turn.T @ (turn @ camera.center + shift)) for camera in rig]
-    )
+    centers = rig.centers @ turn.T
+    have, want = centers - centers.mean(0), true.centers - true.centers.mean(0)
+    size = (have * want).sum() / (have**2).sum() if resized else 1.0
+    centers = size * centers + (true.centers - size * centers).mean(axis=0)
+    poses = zip(rig, centers, strict=True)
+    return Rig([replace(camera, R=camera.R @ turn.T, t=-camera.R @ turn.T @ center) for camera, center in poses])
 
 
 def camera_errors(rig: Rig, true: Rig) -> tuple[Floats, Floats]:

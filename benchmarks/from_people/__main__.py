@@ -12,12 +12,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from scipy.spatial.distance import pdist
 
+from benchmarks.doctor.measures import aligned, camera_errors
 from benchmarks.filmed_people import filmed_people
 from benchmarks.from_people.peer import RATE, peer_rig
 from mvpose import Rig
-from mvpose.arrays import Floats
 from mvpose.calibration.from_people import calibrate_from_people
 from simharness.types.recording import Recording
 
@@ -36,20 +36,7 @@ def _recording(number: int, seed: int, seconds: float) -> Recording:
         views=3 + number % 4,
         layout=("ring", "corners", "arc", "ring")[number % 4],
         boxes=number % 3,
-        room=["room.size=[10.0,10.0,3.0]"],
     )
-
-
-def errors(found: Rig, true: Rig) -> tuple[Floats, Floats]:
-    """Return the errors of rotations, (V,) degrees, and of centres, (V,), as fractions of the largest baseline."""
-    turns = [Rotation.from_matrix(each.R.T @ camera.R) for each, camera in zip(found, true, strict=True)]
-    world = Rotation.concatenate(turns).mean()
-    rotations = np.degrees([(world.inv() * turn).magnitude() for turn in turns])
-    have = world.inv().apply(found.centers - found.centers.mean(0))
-    want = true.centers - true.centers.mean(0)
-    scale = (have * want).sum() / (have**2).sum()
-    size = np.linalg.norm(want[:, None] - want, axis=-1).max()
-    return rotations, np.linalg.norm(scale * have - want, axis=1) / size
 
 
 def _peer(program: Path, recording: Recording) -> Rig | None:
@@ -94,7 +81,8 @@ def main() -> None:
             if each is None:
                 line.append(f"{name} none")
                 continue
-            rotations, centers = errors(each, rig)
+            rotations, shifts = camera_errors(aligned(each, rig, resized=True), rig)
+            centers = shifts / pdist(rig.centers).max()
             all_errors[name].append((float(np.median(rotations)), float(np.median(centers))))
             worst = f"worst {rotations.max():.2f}°, {100 * centers.max():.2f} %"
             line.append(f"{name} {np.median(rotations):.2f}°, {100 * np.median(centers):.2f} % ({worst})")

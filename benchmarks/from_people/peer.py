@@ -70,8 +70,8 @@ def peer_rig(program: Path, folder: Path, rig: Rig, keypoints: Floats, scores: F
         depth = (joints - joints[:, 11:13].mean(1, keepdims=True)) @ camera.R.T
         noise = gaussian_filter1d(rng.standard_normal(depth.shape), _MEMORY * RATE, axis=0)
         depth += noise * (_ERROR / np.linalg.norm(noise, axis=-1).mean())
-        _write_poses(folder / "out" / "noise_1_0", "2d_joint", view, keypoints[:, view], scores[:, view])
-        _write_poses(folder / "out" / "noise_1_0", "3d_joint", view, depth, np.ones(depth.shape[:2]))
+        write_poses(folder / "out" / "noise_1_0", "2d_joint", view, keypoints[:, view], scores[:, view])
+        write_poses(folder / "out" / "noise_1_0", "3d_joint", view, depth, np.ones(depth.shape[:2]))
     command = [program, "run", videos, folder / "Calib.toml", folder / "out", "cpu", "--no_visualize"]
     command += ["--pose_engine", "metrabs", "--person_selection", "largest"]
     subprocess.run(list(map(str, command)), capture_output=True, check=False)
@@ -91,7 +91,7 @@ def _black_film(file: Path, size: tuple[int, int], frames: int) -> None:
     writer.release()
 
 
-def _write_poses(folder: Path, kind: str, view: int, points: Floats, scores: Floats) -> None:
+def write_poses(folder: Path, kind: str, view: int, points: Floats, scores: Floats) -> None:
     """Write poses (t, 17, d) of COCO with scores (t, 17) as those of BODY_25; joints without a value have score 0."""
     shown = np.zeros((len(points), 25, points.shape[-1]))
     certain = np.zeros((len(points), 25))

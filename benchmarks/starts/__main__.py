@@ -59,7 +59,6 @@ def _film(number: int, seed: int, apart: float) -> _Film:
         views=views,
         layout=layout,
         boxes=number % 3,
-        room=["room.size=[11.0,11.0,3.0]", "room.walls=false"],
     )
     frames = list(recording.detections)
     rates = [_RATE if number % 10 == 4 and view % 2 else _RATE // 2 for view in range(views)]

@@ -128,6 +128,7 @@ MODULES = tuple(
         "benchmarks.doctor",
         "benchmarks.doctor.breaks",
         "benchmarks.expected_error",
+        "benchmarks.from_people",
         "benchmarks.hunt",
         "benchmarks.method",
         "benchmarks.pictures",
