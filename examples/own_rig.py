@@ -1,6 +1,6 @@
 """Put your own calibrated cameras into a scenario: a calibration file in place of the scenario's rig.
 
-Any format that simharness reads will do: VoxelPose, Panoptic, OpenCV, Pose2Sim, EasyMocap. Here the file is made first.
+Any format that is read will do: VoxelPose, Panoptic, OpenCV, Pose2Sim, EasyMocap, COLMAP. Here it is made first.
 """
 
 from pathlib import Path

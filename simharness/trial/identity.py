@@ -35,6 +35,7 @@ from typing import Any
 import mvpose
 import simharness
 from mvpose.formats.calibration.camera_folder import calibration_files
+from mvpose.formats.calibration.colmap import FILES
 from mvpose.formats.people.people_formats import people_files
 from simharness.runtime.version import code_version, digest_of_folders
 from simharness.scenario.sections.scenario import FILE_KEYS, NETWORK_KEYS, Scenario
@@ -218,6 +219,8 @@ def _files(scenario: Scenario) -> dict[str, list[Path]]:
             files[key] = calibration_files(file)
         elif suffix in (".yml", ".yaml", ".xml"):  # calibrations in two files
             files[key] += _beside(file, ".yml", ".yaml", ".xml")
+        elif file.name in FILES:
+            files[key] = [file.with_name(each) for each in FILES]
     return files
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from mvpose import Camera, Rig
 from mvpose.camera import UnlikelyRigError
 from mvpose.files.message_text import one_line
-from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, qualisys, voxelpose
+from mvpose.formats.calibration import colmap, easymocap, opencv, panoptic, pose2sim, qualisys, voxelpose
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
 from mvpose.formats.calibration.camera_folder import only_file, read_folder, suffix_of, unit_of, write_folder
 
@@ -33,6 +33,7 @@ FORMATS: list[CalibrationFormat] = [
     qualisys.FORMAT,
     easymocap.FORMAT,
     pose2sim.FORMAT,
+    colmap.FORMAT,
     opencv.FORMAT,  # after EasyMocap and Pose2Sim, which write the same kinds of files: it takes the rest
 ]
 """Registered formats; the first that recognises a file reads it."""
@@ -80,7 +81,7 @@ def _format_of(path: Path) -> tuple[Path, CalibrationFormat | None]:
         raise ValueError(f"{place}: an empty object, without cameras; expected {file.expected}")
     if chosen is None:
         known = "; ".join(f"{each.name}: {one_line(each.expects, 30)}" for each in FORMATS)
-        raise ValueError(one_line(f"{place}: not a known calibration: found {file.summary}; expected one of {known}"))
+        raise ValueError(f"{place}: not a known calibration: found {file.summary}; expected one of {known}")
     return place, chosen
 
 
@@ -119,7 +120,7 @@ def read_calibration(
             rig = (read_folder if chosen is None else chosen.read)(place, size=size, only=only)
     except ValueError as error:
         if (unlikely := unlikely_rig(error)) is None or unit is None:
-            raise ValueError(one_line(str(error))) from None
+            raise ValueError(one_line(str(error), _MESSAGE)) from None
         rig = Rig.unchecked(unlikely.cameras)
     try:
         if unit is not None:
@@ -150,6 +151,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres of the units of lengths."""
 
 _SHOWN = 12  # names that a message repeats
+_MESSAGE = 700  # letters: all formats are in one message
 
 
 def select(cameras: Sequence[Camera] | Rig, only: Sequence[str], *, key: str = "cameras.only") -> Rig:

@@ -15,6 +15,7 @@ from mvpose.files.input_files import natural_order
 from mvpose.files.message_text import listed, prefixed, shown
 from mvpose.formats.calibration.calibration_file import CalibrationFile
 from mvpose.formats.calibration.camera_entry import is_camera, read_camera
+from mvpose.formats.calibration.colmap import CAMERAS, IMAGES
 from mvpose.formats.calibration.opencv import values_of, write_values
 from mvpose.formats.calibration.panoptic import OWN, read_entry
 from mvpose.formats.pose2sim_project import FILE, folder_names, project_tables
@@ -33,7 +34,7 @@ def only_file(folder: Path) -> Path | None:
     """Return the file of all cameras in a folder, in the folder ``calibration`` within it (of Pose2Sim) as well.
 
     Returns:
-        The file; of EasyMocap's two files the intrinsics; None where there is a file for each camera.
+        The file; of EasyMocap's and COLMAP's two that of the intrinsics; None where there is a file for each camera.
 
     Raises:
         ValueError: no calibration, or several of all cameras.
@@ -46,6 +47,8 @@ def only_file(folder: Path) -> Path | None:
         raise ValueError(f"{folder}: has no {', '.join(f'*{each}' for each in SUFFIXES)}; expected {_WHAT}")
     for file in files:
         if file.name.startswith("intri.") and any(each.name.startswith("extri.") for each in files):
+            return file
+        if file.name == CAMERAS:
             return file
     return files[0] if len(files) == 1 else None
 
@@ -119,6 +122,7 @@ def _files(folder: Path) -> list[Path]:
     there = [each for each in folder.iterdir() if not each.name.startswith(".")]
     found = [each for each in there if each.suffix.lower() in SUFFIXES]
     found = found or [each for each in there if each.name.lower().endswith(_QUALISYS)]  # else converted from these
+    found = found or [each for each in there if each.name in (CAMERAS, IMAGES)]
     settings = [folder / FILE] if folder / FILE in found and project_tables(folder) else []
     return sorted((each for each in found if each not in settings), key=natural_order)
 

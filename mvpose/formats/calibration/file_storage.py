@@ -75,7 +75,7 @@ def read_beside(path: Path, *, what: str) -> dict[str, Any]:
 
 def counterpart(path: Path) -> Path | None:
     """Return the file beside one of intrinsics or extrinsics that has the rest; None for one of another name."""
-    for part, counterpart in (("intri", "extri"), ("extri", "intri")):
+    for part, counterpart in (("intri", "extri"), ("extri", "intri"), ("cameras.txt", "images.txt")):
         if part in path.name:
             return path.with_name(path.name.replace(part, counterpart))
     return None

@@ -89,7 +89,7 @@ class CamerasSection(Section):
     preset: Preset | None = key(None, "layout preset: the published rig")
     file: str = key(
         "",
-        "layout file: a calibration of VoxelPose, Panoptic, OpenCV, Pose2Sim or EasyMocap, relative to the "
+        "layout file: a calibration of VoxelPose, Panoptic, OpenCV, Pose2Sim, EasyMocap or COLMAP, relative to the "
         "scenario file",
     )
     only: tuple[str, ...] = key(
