@@ -11,7 +11,7 @@ from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.detector_sums import FrameSums
 from simharness.reality.detector_fit.frame_sums import SCORED, frame_sums
 from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints, label_joints
-from simharness.reality.detector_fit.parameters import estimate_parameters
+from simharness.reality.detector_fit.parameters import STATES, estimate_parameters
 from simharness.reality.detector_fit.sample import Sample
 from simharness.scenario.sections.detector_section import KINDS
 from simharness.statistics.resampling import block_weights, blocks, interval
@@ -38,12 +38,12 @@ _COUNTED: Mapping[str, Callable[[FrameSums], Floats]] = {
 }
 """Sums that count the observations behind a parameter; the others are measured on all joints in the picture."""
 
-_OCCLUSIONS = ("visible", "self_occluded", "occluded")
 _COUNTED_BY_KIND: Mapping[str, Callable[[FrameSums], Floats]] = {
-    "self_occluded": lambda sums: sums.classes["miss"].n[:, _OCCLUSIONS.index("self_occluded")],
-    "occluded": lambda sums: sums.classes["miss"].n[:, _OCCLUSIONS.index("occluded")],
+    "self_occluded": lambda sums: sums.classes["miss"].n[:, STATES.index("self_occluded")],
+    "occluded": lambda sums: sums.classes["miss"].n[:, STATES.index("occluded")],
     "scatter_hidden": lambda sums: sums.scatter.hidden_n,
     "jitter_mean": lambda sums: sums.jitter.n,
+    "gross": lambda sums: (sums.classes["miss"].k + sums.classes["jitter"].k).sum(axis=1),
 }
 """Sums, (T, 9), that count the joints of each kind behind a parameter."""
 
@@ -168,7 +168,7 @@ def measure_labels(labels: LabelledJoints, *, name: str, weights: Floats, indepe
     for key, value in whole.items():
         low, high = interval(drawn[key], blocks=independent)
         n = _count(key, sums)
-        if key.split(".")[1] in (*CLASSES, "guess") and value[0] < _RULE_OF_THREE * design / max(n, 1):
+        if key.split(".")[1] in (*CLASSES, "guess", "wrong") and value[0] < _RULE_OF_THREE * design / max(n, 1):
             high = np.fmax(high, min(1.0, _RULE_OF_THREE * design / max(n, 1)))
         # A percentile interval need not contain the value itself near a bound such as zero.
         result[key] = MeasuredValue(float(value[0]), float(np.fmin(low, value[0])), float(np.fmax(high, value[0])), n)
@@ -210,9 +210,9 @@ def _count(key: str, sums: FrameSums) -> int:
     kind = KINDS.index(rest[-1]) if rest[-1] in KINDS else None
     if rest[0] in CLASSES and kind is not None:
         n = sums.classes[rest[0]].n[..., kind].sum(axis=0)
-        return int(n[_OCCLUSIONS.index(rest[1])] if rest[1] in _OCCLUSIONS else n.sum())
-    if rest[0] == "guess" and rest[1] in _OCCLUSIONS:
-        return int(sums.classes["miss"].n[:, _OCCLUSIONS.index(rest[1]), kind].sum())
+        return int(n[STATES.index(rest[1])] if rest[1] in STATES else n.sum())
+    if rest[0] in ("guess", "wrong") and rest[1] in STATES:
+        return int(sums.classes["miss"].n[:, STATES.index(rest[1]), kind].sum())
     if rest[0] in _COUNTED_BY_KIND and kind is not None:
         return int(_COUNTED_BY_KIND[rest[0]](sums)[:, kind].sum())
     if section == "scores":

@@ -21,6 +21,13 @@ from scipy.special import expit, logit
 
 from mvpose.arrays import Floats
 from simharness.reality.detector_fit.detector_measurement import MeasuredValue
+from simharness.reality.detector_fit.parameters import SHARES
+from simharness.reality.detector_fit.visibility_errors import (
+    independent,
+    measured_parameters,
+    prior_shares,
+    with_parameters,
+)
 from simharness.scenario.sections.detector_section import KINDS
 
 ROUNDS = 8
@@ -35,7 +42,7 @@ SCALES: Scales = {
         *("keypoints.jitter", "keypoints.miss", "keypoints.inversion.", "keypoints.swap", "keypoints.stray"),
         *("keypoints.guess.self_occluded", "keypoints.guess.occluded", "correlation.scatter_noise"),
         *("keypoints.drop.edge", "keypoints.drop.self_occluded", "keypoints.drop.occluded"),
-        *("boxes.missed_hidden", "keypoints.inversion_uncovered"),
+        *("boxes.missed_hidden", "keypoints.inversion_uncovered", *SHARES),
         *("scores.good", "scores.jitter", "scores.miss", "scores.inversion", "scores.swap", "scores.hidden"),
         *("scores.guess", "scores.overconfident", "scores.underconfident"),
     ),
@@ -111,7 +118,8 @@ def infer(
         rounds: number of simulations before the slopes are found, and after.
         scales: inferred parameters.
     """
-    found = (_parameter(key, value, prior.get(key, 0.0), scales) for key, value in measured.items())
+    prior = prior_shares(prior)
+    found = (_parameter(key, value, prior.get(key, 0.0), scales) for key, value in independent(measured).items())
     parameters = [each for each in found if each is not None]
     if not parameters or not rounds:
         return dict(measured)
@@ -119,7 +127,7 @@ def infer(
     fixed = {key: each.value for key, each in measured.items()}
 
     def run(change: Floats | float, draw: int) -> Floats:
-        of = simulate({**fixed, **state.values(change)}, draw)
+        of = simulate(with_parameters({**fixed, **state.values(change)}), draw)
         return np.array([each.seen(of.get(each.key, np.nan)) for each in parameters])
 
     for draw in range(rounds):
@@ -133,7 +141,8 @@ def infer(
         low, value, high = (state.values(side * reach[index])[each.key] for side in (-1.0, 0.0, 1.0))
         unsure = bool(deviation[index] > _PRIORS_SHARE * state.prior_deviation[index])
         result[each.key] = replace(measured[each.key], value=value, low=low, high=high, by_prior=unsure)
-    return result
+    shares = {key: each for key, each in measured.items() if key.startswith(SHARES)}
+    return {**result, **measured_parameters(result), **shares}
 
 
 def misfit(measured: Mapping[str, MeasuredValue], simulated: Mapping[str, float]) -> float:
@@ -142,7 +151,7 @@ def misfit(measured: Mapping[str, MeasuredValue], simulated: Mapping[str, float]
     Over the parameters of :data:`SCALES`; each counts :data:`_MOST` at most, so that no single one decides.
     """
     squares = []
-    for key, each in measured.items():
+    for key, each in independent(measured).items():
         parameter = _parameter(key, each, 0.5, SCALES)
         if parameter is not None and np.isfinite(parameter.observed) and np.isfinite(simulated.get(key, np.nan)):
             away = (parameter.seen(simulated[key]) - parameter.observed) / (np.sqrt(2) * parameter.deviation)
@@ -258,6 +267,12 @@ class _Inference:
             own, common = next((each for start, each in _WIDTHS.items() if one.key.startswith(start)), _WIDTH)
             covariance[row] = [common**2 * bool(one.kind and one.group == other.group) for other in known]
             covariance[row, row] += own**2
+        # The prior of shares of hidden joints is of their odds over those of visible ones.
+        at = {each.key: row for row, each in enumerate(known)}
+        over = [at.get(f"{SHARES[0]}.{each.kind}", -1) if each.group in SHARES[1:3] else -1 for each in known]
+        sums = np.eye(len(index))
+        sums[np.array(over) >= 0, [row for row in over if row >= 0]] = 1.0
+        covariance = sums @ covariance @ sums.T
         result, deviation = np.zeros((len(self.parameters),) * 2), np.full(len(self.parameters), np.inf)
         result[np.ix_(index, index)], deviation[index] = np.linalg.inv(covariance), np.sqrt(np.diag(covariance))
         return result, deviation

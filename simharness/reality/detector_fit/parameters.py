@@ -5,29 +5,39 @@ parameters are named as the keys of ``[detector]``.
 """
 
 import numpy as np
-from scipy.special import expit, logit, ndtr
+from scipy.special import expit, logit
 
 from mvpose.arrays import Floats
 from simharness.detector.viewing_conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.detector_sums import FrameSums, Trials
-from simharness.reality.detector_fit.frame_sums import APART, BORDER, DEPTHS, LOGITS, SCORED, TERCILES, lags
+from simharness.reality.detector_fit.frame_sums import APART, BORDER, DEPTHS, TERCILES, lags
 from simharness.reality.detector_fit.joint_labels import CLASSES
+from simharness.reality.detector_fit.score_parameters import (
+    LIMB_KINDS,
+    averaged,
+    guess_scores,
+    quantile,
+    score_parameters,
+)
 from simharness.reality.detector_fit.tetrachoric import (
     fit_life,
     fit_noisy_life,
     joint_probability,
     tetrachoric_correlation,
 )
-from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOINT, KINDS
+from simharness.scenario.sections.detector_section import BEARINGS, KINDS
 from simharness.types.truth import GOOD_BELOW
-
-LIMB_KINDS = tuple(sorted({KIND_OF_JOINT[joint] for joint in range(5, 17)}))
-"""Kinds of joint whose truth is known."""
 
 UNCOVERED = 0.08
 """Factor on swaps and inversions of joints that nothing else hides, where few say nothing of it: in an operating room
 (MVOR), hidden joints are grossly wrong 11 to 14 times as often as visible ones."""
+
+STATES = ("visible", "self_occluded", "occluded")
+"""States of a joint, in the order of the sums."""
+
+SHARES = (*(f"share.wrong.{state}" for state in STATES), "share.gross")
+"""Keys, before the kind of joint, of the shares of misses and jitters by state, and of misses among them."""
 
 _WIDEST = 3.0  # units: such a scatter is flat within 1.14, and wider ones are indistinguishable from it
 _MIN_ERRORS = 200  # errors needed to estimate their correlations
@@ -41,7 +51,6 @@ _REACHES = np.geomspace(0.02, 3.0, 60)  # heights; beyond, inversions are as fre
 _MIN_OUTSIDE = 50  # joints outside of the image needed to see how far the detector reports them
 _HIDDEN = ((SELF_OCCLUDED, "self_occluded"), (OCCLUDED, "occluded"))
 _STEEP = 5.0  # largest step towards the growth of drops with depth, a metre
-_SEPARATED = 1.0  # deviations between scores of good keypoints and misses from which mixtures can be separated
 
 
 def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> dict[str, Floats]:
@@ -72,12 +81,16 @@ def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> 
         result["keypoints.drop.depth"] = _depth(sums.depth)
         n_drop[:, 1:] -= np.nan_to_num(1 - edge)[..., None] * sums.edge.n
         dropped = np.where(n_drop > 0, k_drop / n_drop, (k_drop.sum(axis=1) / n_drop.sum(axis=1))[:, None])
-        for index, occlusion in enumerate(("visible", "self_occluded", "occluded")):
+        for index, occlusion in enumerate(STATES):
             _put_by_kind(result, f"keypoints.drop.{occlusion}", np.clip(dropped[:, index], 0.0, 1.0))
         if kind == "top-down":
             result |= _guesses(n, k, sums)
         else:
             result |= _occlusion_factors(n, k, share)
+            wrong = k["miss"] + k["jitter"]
+            shares = *np.moveaxis(wrong / n["miss"], 1, 0), k["miss"].sum(axis=1) / wrong.sum(axis=1)
+            for key, values in zip(SHARES, shares, strict=True):
+                _put_by_kind(result, key, np.clip(values, 0.0, 1.0))
             result["keypoints.border"] = _border(sums)
         result["keypoints.inversion_reach"] = _inversion_reach(sums)
         scatter = sums.scatter
@@ -92,9 +105,9 @@ def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> 
         for index in LIMB_KINDS:  # too few misses of each kind; misses of the face stay near it
             result[f"keypoints.stray.{KINDS[index]}"] = stray
         result |= _dependence(sums, step)
-        result |= _score_parameters(sums)
+        result |= score_parameters(sums)
         if kind == "top-down":
-            result |= _guess_scores(sums)
+            result |= guess_scores(sums)
         result |= _people_parameters(sums, step)
         for index, third in enumerate(TERCILES):
             result[f"size.{third}.drop"] = sums.size_drop.k[:, index] / sums.size_drop.n[:, index]
@@ -212,17 +225,6 @@ def _guesses(n: dict[str, Floats], k: dict[str, Floats], sums: FrameSums) -> dic
     return result
 
 
-def _guess_scores(sums: FrameSums) -> dict[str, Floats]:
-    """Return the usual scores of guesses by kind, and the factor of those outside of the image."""
-    wrong = sums.scores.shown[:, 1, SCORED.index("miss")]
-    pooled = expit(_quantile(wrong.sum(axis=1), 0.5))[:, None]
-    level = np.where(wrong.sum(axis=-1) >= _MIN_HIDDEN, expit(_quantile(wrong, 0.5)), pooled)
-    outside = expit(_quantile(sums.scores.outside, 0.5))
-    result = {"scores.outside": np.minimum(outside / pooled[:, 0], 1.0)}
-    _put_by_kind(result, "scores.guess", level)
-    return result
-
-
 def _sigma(square: Floats) -> Floats:
     """Return the deviation per axis of a Gaussian truncated at 1.14, from its mean square (maximum likelihood)."""
     sigma = np.linspace(0.05, _WIDEST, 600)
@@ -239,7 +241,7 @@ def _hidden_scatter(sums: FrameSums) -> Floats:
     hidden_n, hidden = sums.scatter.hidden_n, sums.scatter.hidden_square
     shown = (sums.scatter.square - hidden) / (sums.scatter.n - hidden_n)
     ratio = _sigma(hidden / hidden_n) / _sigma(shown)
-    pooled = _averaged(ratio, np.where(np.isfinite(ratio), hidden_n, 0.0))[:, None]
+    pooled = averaged(ratio, np.where(np.isfinite(ratio), hidden_n, 0.0))[:, None]
     return np.where(np.isfinite(ratio) & (hidden_n >= _MIN_HIDDEN), ratio, pooled)
 
 
@@ -323,100 +325,6 @@ def _shared_scatter(sums: FrameSums) -> Floats:
     return shared / (np.abs(shared) + single)
 
 
-def _score_parameters(sums: FrameSums) -> dict[str, Floats]:
-    """Return the parameters of scores: usual scores by class, deviation, shares of over- and underconfident ones.
-
-    Args:
-        sums: sums of R resamples.
-    """
-    shown, whole = sums.scores.shown[:, 0], sums.scores.shown.sum(axis=1)  # (R, 6, 9, B), of visible joints and of all
-    limbs = list(LIMB_KINDS)
-    rows = {name: SCORED.index(name) for name in SCORED}
-    good, miss = shown[:, rows["good"]], whole[:, rows["miss"]]
-    many = shown[:, rows["good"]].sum(axis=-1)
-    every = expit(_quantile(shown.sum(axis=1), 0.5))
-    under = over = np.zeros(len(shown))
-    for _ in range(_ROUNDS):
-        # Good keypoints with the score of a miss have the lowest scores: the median of the others is a higher quantile.
-        lower = np.clip(under[:, None] + np.zeros(good.shape[:2]), 0.0, 0.9)
-        usual = expit(_quantile(good, (1 + lower) / 2))
-        # The classes of the face are unknown: its usual score is above its median as for good limb joints.
-        usual = np.where(many > 0, usual, every * _averaged(usual / every, many)[:, None])
-        top = _averaged(usual[:, limbs], many[:, limbs])
-        joint = usual / top[:, None]
-        missed = _averaged(expit(_quantile(miss, ((1 - over) / 2)[:, None])) / joint, miss.sum(axis=-1))
-        upper = _quantile(good, (3 + lower) / 4) - _quantile(good, (1 + lower) / 2)
-        deviation = _averaged(upper / 0.6745, many)
-        high, low = logit(usual), logit(np.clip(missed[:, None] * joint, 1e-6, 1 - 1e-6))
-        middle = (high + low) / 2
-        separation = _averaged(high - low, many) / deviation
-        tail = ndtr(-separation / 2)
-        under = _other_share(_averaged(_below(good, middle), many), tail, separation)
-        over = _other_share(1 - _averaged(_below(miss, middle), miss.sum(axis=-1)), tail, separation)
-    behind = sums.scores.shown[:, 1, rows["good"]]
-    hidden = np.minimum(_averaged(expit(_quantile(behind, 0.5)) / usual, behind.sum(axis=-1)), 1.0)
-
-    def usual_of(name: str, share: Floats, visibility: int) -> Floats:
-        """Return the usual score of a class, from the quantile ``share`` (R,) of its scores by kind."""
-        row = sums.scores.shown[:, visibility, rows[name]]
-        level = expit(_quantile(row, share[:, None])) / joint
-        return _averaged(level, np.where(np.isfinite(level), row.sum(axis=-1), 0.0))
-
-    result = {
-        "scores.good": top,
-        "scores.hidden.good": hidden,
-        "scores.deviation": deviation,
-        "scores.overconfident": over,
-        "scores.underconfident": under,
-    }
-    middle_rank = np.full(len(top), 0.5)
-    ranks = {"miss": (1 - over) / 2, "jitter": middle_rank, "inversion": middle_rank, "swap": middle_rank}
-    for name, share in ranks.items():
-        level, behind_level = usual_of(name, share, 0), usual_of(name, share, 1)
-        level = np.where(np.isfinite(level), level, behind_level)
-        result[f"scores.{name}"] = np.minimum(level, 1.0)
-        lower = np.where(np.isfinite(behind_level), behind_level / level, hidden)
-        result[f"scores.hidden.{name}"] = np.clip(lower, 0.0, 1.0)
-    _put_by_kind(result, "scores.joint", joint)
-    return result
-
-
-def _other_share(beyond: Floats, tail: Floats, separation: Floats) -> Floats:
-    """Return the share of a mixture that has the scores of the other class; 0 where both classes overlap too much.
-
-    Args:
-        beyond: share of the scores on the other class's side of the middle between both classes, (R,).
-        tail: share expected there without any mixture, (R,).
-        separation: distance of both classes in deviations, (R,).
-    """
-    share = np.clip((beyond - tail) / (1 - 2 * tail), 0.0, 1.0)
-    return np.where(separation > _SEPARATED, share, 0.0)
-
-
-def _averaged(values: Floats, counts: Floats) -> Floats:
-    """Return the mean (R,) of values over kinds (R, 9), weighted by their counts (R, 9)."""
-    known = np.isfinite(values) & (counts > 0)
-    return (np.where(known, values, 0.0) * counts).sum(axis=1) / np.where(known, counts, 0.0).sum(axis=1)
-
-
-def _quantile(counts: Floats, share: Floats | float) -> Floats:
-    """Return quantiles (...) of histograms (..., B) over LOGITS; NaN for empty histograms."""
-    total = counts.sum(axis=-1)
-    below = np.concatenate([np.zeros((*total.shape, 1)), np.cumsum(counts, axis=-1)], axis=-1)
-    rank = np.broadcast_to(share, total.shape) * total
-    index = np.clip((below[..., 1:] < rank[..., None]).sum(axis=-1), 0, counts.shape[-1] - 1)[..., None]
-    start = np.take_along_axis(below, index, axis=-1)[..., 0]
-    inside = np.take_along_axis(counts, index, axis=-1)[..., 0]
-    at = LOGITS[index[..., 0]] + (LOGITS[1] - LOGITS[0]) * (rank - start) / inside
-    return np.where(total > 0, at, np.nan)
-
-
-def _below(counts: Floats, level: Floats) -> Floats:
-    """Return the share of histograms (..., B) over LOGITS below levels (...)."""
-    filled = np.clip((level[..., None] - LOGITS[:-1]) / (LOGITS[1] - LOGITS[0]), 0.0, 1.0)
-    return np.asarray((counts * filled).sum(axis=-1) / counts.sum(axis=-1))
-
-
 def _people_parameters(sums: FrameSums, step: float) -> dict[str, Floats]:
     """Return the parameters of boxes and phantoms."""
     p = (sums.people.all.k / sums.people.all.n)[:, None]
@@ -442,6 +350,6 @@ def _people_parameters(sums: FrameSums, step: float) -> dict[str, Floats]:
         "size.fragments": sums.false.fragments / sums.false.pairs[:, 0] / sums.false.n.shape[1],
         "phantoms.rate": rate.mean(axis=1),
         "phantoms.life": fit_life(lags(step), step, spread[:, 1:] / spread[:, :1], np.ones_like(spread[:, 1:])),
-        "phantoms.score": expit(_quantile(row, 0.5)),
-        "phantoms.deviation": (_quantile(row, 0.75) - _quantile(row, 0.25)) / 1.349,
+        "phantoms.score": expit(quantile(row, 0.5)),
+        "phantoms.deviation": (quantile(row, 0.75) - quantile(row, 0.25)) / 1.349,
     }

@@ -167,12 +167,13 @@ def _put(tree: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _rounded(key: str, value: float) -> float:
-    """Round to four decimal places, finer than any interval.
+    """Round to four decimal places, or three digits, finer than any interval.
 
     Correlations below 0, and values that the inference raised too far are bounded.
     """
     bound = next((most for start, most in _MOST.items() if key.startswith(start)), float("inf"))
-    return round(float(min(max(value, 0.0), bound)), 4)
+    value = float(min(max(value, 0.0), bound))
+    return round(value, 4) if value >= 0.1 else float(f"{value:.3g}")
 
 
 def _wrapped(text: str) -> list[str]:
