@@ -33,7 +33,7 @@ from simharness.scenario.sections.detector_section import KINDS
 ROUNDS = 8
 """Simulations before the slopes are found, and after."""
 
-Scale = Literal["logit", "log", "fisher"]
+Scale = Literal["logit", "log", "fisher", "linear"]
 
 Scales = Mapping[Scale, tuple[str, ...]]
 
@@ -42,7 +42,7 @@ SCALES: Scales = {
         *("keypoints.jitter", "keypoints.miss", "keypoints.inversion.", "keypoints.swap", "keypoints.stray"),
         *("keypoints.guess.self_occluded", "keypoints.guess.occluded", "correlation.scatter_noise"),
         *("keypoints.drop.edge", "keypoints.drop.self_occluded", "keypoints.drop.occluded"),
-        *("boxes.missed_hidden", "keypoints.inversion_uncovered", *SHARES),
+        *("boxes.missed_hidden", "keypoints.inversion_uncovered"),
         *("scores.good", "scores.jitter", "scores.miss", "scores.inversion", "scores.swap", "scores.hidden"),
         *("scores.guess", "scores.overconfident", "scores.underconfident"),
     ),
@@ -51,13 +51,16 @@ SCALES: Scales = {
         "keypoints.drop.depth",
         *("correlation.life", "correlation.scatter_life", "boxes.life", "phantoms.rate", "scores.deviation"),
     ),
+    "linear": SHARES,
     "fisher": (
         *("correlation.views", "correlation.gross_views", "correlation.limb", "correlation.scatter_near"),
         *("correlation.scatter_views", "boxes.missed_views"),
     ),
 }
 """Inferred parameters of a recording by their scale and the beginning of their keys: shares, amounts, and correlations,
-which are on the inverse hyperbolic tangent; measured ones may be below 0."""
+which are on the inverse hyperbolic tangent; measured ones may be below 0. Shares of joints by their state are linear:
+the measured ones are mixtures of those of all states, because some joints are not in the state in which they seem. Of
+visible joints that hardly ever err, they are mostly hidden ones', which no scale without bounds can tell."""
 
 _WIDTHS = {
     **dict.fromkeys(SCALES["fisher"], (0.35, 0.0)),
@@ -72,6 +75,7 @@ the beginning of the keys: by so much the fits to MoveNet and OpenPose differ fr
 _WIDTH = (1.0, 1.0)  # of the others, which are shares
 
 _PERTURBATIONS: Mapping[Scale, float] = {"logit": 0.5, "log": 0.3, "fisher": 0.3}
+_LINEAR_STEP = 4.0  # deviations of the measured values
 _APART = 0.2
 """Distance of the left-right counterpart, heights of the box, at which inversions are inferred: joints that are told
 from their counterpart are about so far from it. Shares at no distance are extrapolated with the reach."""
@@ -191,6 +195,8 @@ class _Parameter:
         """Return a value on the scale."""
         if self.scale == "log":
             return float(np.log(max(value, _SMALLEST)))
+        if self.scale == "linear":
+            return float(value)
         if self.scale == "fisher":
             return float(np.arctanh(np.clip(value, -_STRONGEST, _STRONGEST)))
         return float(logit(np.clip(value, _LEAST, 1 - _LEAST)))
@@ -203,6 +209,8 @@ class _Parameter:
 
     def value(self, place: float) -> float:
         """Return the value at a place on the scale."""
+        if self.scale == "linear":
+            return float(np.clip(place, _LEAST, 1 - _LEAST))
         if self.scale == "fisher":
             return float(np.clip(np.tanh(place), 0.0, _STRONGEST))
         return float(np.exp(place) if self.scale == "log" else expit(place))
@@ -222,6 +230,8 @@ def _parameter(key: str, measured: MeasuredValue, prior: float, scales: Scales) 
         k = n * min(max(measured.value, 0.0), 1.0)
         counted = np.sqrt(1 / (k + _LASTING) + 1 / (n - k + _LASTING)) if scale == "logit" else np.sqrt(0.5 / n)
         observed = result.seen(measured.value)
+        if scale == "linear":
+            counted = np.sqrt((k + 1) * (n - k + 1) / (n + 2) ** 3)
         deviation = max(float(np.ptp(ends or [0.0])) / (2 * _NORMAL), float(counted))
         if scale == "logit" and measured.value == 0 and np.isfinite(measured.high):  # the interval has one end
             deviation = max((result.seen(measured.high) - observed) / _ONE_SIDED, 0.5)
@@ -244,8 +254,10 @@ class _Inference:
         self.observed = np.array([each.observed for each in self.parameters])
         self.deviation = np.array([each.deviation for each in self.parameters])
         self.at = np.where(np.isfinite(self.prior), self.prior, self.observed)
-        self.fisher = np.array([each.scale == "fisher" for each in self.parameters])
-        self.at[self.fisher] = np.maximum(self.at[self.fisher], 0.0)
+        scales = np.array([each.scale for each in self.parameters])
+        self.least = np.where(scales == "fisher", 0.0, np.where(scales == "linear", _LEAST, -np.inf))
+        self.most = np.where(scales == "linear", 1 - _LEAST, np.inf)
+        self.at = np.clip(self.at, self.least, self.most)
         self.slopes = _OWN * np.eye(len(self.parameters))
         self.reach = next((i for i, each in enumerate(self.parameters) if each.key == "keypoints.inversion_reach"), -1)
         self.apart = np.array([each.group == "keypoints.inversion" for each in self.parameters]) * (self.reach >= 0)
@@ -272,6 +284,8 @@ class _Inference:
         over = [at.get(f"{SHARES[0]}.{each.kind}", -1) if each.group in SHARES[1:3] else -1 for each in known]
         sums = np.eye(len(index))
         sums[np.array(over) >= 0, [row for row in over if row >= 0]] = 1.0
+        # Priors of linear shares are as wide as on the scale of their logit.
+        sums *= [[each.prior * (1 - each.prior) if each.scale == "linear" else 1.0] for each in known]
         covariance = sums @ covariance @ sums.T
         result, deviation = np.zeros((len(self.parameters),) * 2), np.full(len(self.parameters), np.inf)
         result[np.ix_(index, index)], deviation[index] = np.linalg.inv(covariance), np.sqrt(np.diag(covariance))
@@ -291,15 +305,15 @@ class _Inference:
         """Add the measured values of a simulation, (N,), and move towards the mean of the posterior."""
         self.places.append(self.at)
         self.measured.append(measured)
-        self.at = self.at + np.clip(self.posterior()[0] - self.at, -_STEP, _STEP)
-        self.at[self.fisher] = np.maximum(self.at[self.fisher], 0.0)
+        self.at = np.clip(self.at + np.clip(self.posterior()[0] - self.at, -_STEP, _STEP), self.least, self.most)
 
     def find_slopes(self, run: Callable[[Floats | float], Floats]) -> None:
         """Find the slopes of all measured values by the parameters of each group; levels are found anew."""
         before, slopes = run(0.0), np.zeros_like(self.slopes)
         for group, columns in self.groups.items():
             index = list(columns.values())
-            step = _PERTURBATIONS[self.parameters[index[0]].scale]
+            scale = self.parameters[index[0]].scale
+            step = _PERTURBATIONS.get(scale) or _LINEAR_STEP * float(np.median(self.deviation[index]))
             moves = np.zeros(len(self.parameters))
             moves[index] = step
             change = (run(moves) - before) / step

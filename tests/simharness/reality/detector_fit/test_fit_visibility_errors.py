@@ -95,15 +95,12 @@ def measured_of(parameters, seed):
 
 
 @pytest.mark.parametrize(
-    ("true", "expected"),
-    [((0.0002, 0.002, 60.0, 50.0), False), ((0.01, 0.02, 4.0, 10.0), True), ((0.05, 0.08, 1.0, 2.0), True)],
+    "true",
+    [(0.0002, 0.002, 60.0, 50.0), (0.01, 0.02, 4.0, 10.0), (0.05, 0.08, 1.0, 2.0)],
     ids=["visible joints hardly err", "many errors of hidden joints", "poor"],
 )
-def test_shares_of_hidden_joints_are_consistent(true, expected):
-    """Over recordings, inferred shares of hidden joints are the true ones, also where the prior is far off.
-
-    Intervals hold the parameters where these are ``expected`` by the prior.
-    """
+def test_shares_of_hidden_joints_are_consistent(true):
+    """Over recordings, inferred shares of hidden joints are the true ones, also where the prior is far off."""
     parameters = dict(zip(OF, true, strict=True))
     wanted = np.array([shares_of(*true)[key] for key in KEYS])
     found, inside = [], []
@@ -116,8 +113,8 @@ def test_shares_of_hidden_joints_are_consistent(true, expected):
         found.append([shares_of(*(inferred[key].value for key in OF))[key] for key in KEYS])
         inside.append([inferred[key].low <= each <= inferred[key].high for key, each in parameters.items()])
     error = np.log(found / wanted)
-    assert np.abs(error[:, 1:3].mean(axis=0)).max() < 0.1
+    assert np.abs(error[:, 1:3].mean(axis=0)).max() < 0.06
     # That of a count of those joints, and some of the simulations.
     deviation = np.sqrt((1 - wanted[1:3]) / (np.array(JOINTS[1:]) * wanted[1:3]))
     assert (error[:, 1:3].std(axis=0) < 1.4 * deviation).all()
-    assert np.mean(inside) > 0.9 or not expected
+    assert np.mean(inside) > 0.9
