@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import expit, logit
 
 from mvpose.arrays import Floats
-from simharness.detector.viewing_conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
+from simharness.detector.viewing_conditions import OCCLUDED, SELF_OCCLUDED
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.detector_sums import FrameSums, Trials
 from simharness.reality.detector_fit.frame_sums import APART, BORDER, DEPTHS, TERCILES, lags
@@ -83,11 +83,16 @@ def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> 
         dropped = np.where(n_drop > 0, k_drop / n_drop, (k_drop.sum(axis=1) / n_drop.sum(axis=1))[:, None])
         for index, occlusion in enumerate(STATES):
             _put_by_kind(result, f"keypoints.drop.{occlusion}", np.clip(dropped[:, index], 0.0, 1.0))
+        seen = {key: np.clip(k[key][:, 0] / n[key][:, 0], 0.0, 1.0) for key in ("miss", "jitter")}
+        for key, shown in seen.items():
+            _put_by_kind(result, f"keypoints.{key}", shown)
         if kind == "top-down":
             result |= _guesses(n, k, sums)
         else:
-            result |= _occlusion_factors(n, k, share)
             wrong = k["miss"] + k["jitter"]
+            expected = sum(n[key] * np.nan_to_num(shown)[:, None] for key, shown in seen.items())
+            for index, name in _HIDDEN:
+                _put_by_kind(result, f"keypoints.{name}", _factors(wrong[:, index], expected[:, index]))
             shares = *np.moveaxis(wrong / n["miss"], 1, 0), k["miss"].sum(axis=1) / wrong.sum(axis=1)
             for key, values in zip(SHARES, shares, strict=True):
                 _put_by_kind(result, key, np.clip(values, 0.0, 1.0))
@@ -119,30 +124,6 @@ def _put_by_kind(result: dict[str, Floats], key: str, values: Floats) -> None:
     """Store the values of each kind of joint, (R, 9), under one key for each kind."""
     for index, kind in enumerate(KINDS):
         result[f"{key}.{kind}"] = values[:, index]
-
-
-def _occlusion_factors(n: dict[str, Floats], k: dict[str, Floats], share: dict[str, Floats]) -> dict[str, Floats]:
-    """Return the factors of misses and jitter for hidden joints, and the shares for visible joints.
-
-    Args:
-        n: joints that each class could have taken, (R, 3, 9) by class.
-        k: joints that each class took, (R, 3, 9) by class.
-        share: shares taken by each class, (R, 9), by class.
-    """
-    observed, expected = np.zeros(()), np.zeros(())
-    for key in ("miss", "jitter"):
-        wrong = np.where(n[key] > 0, k[key] / n[key], 0.0)
-        observed = observed + n[key] * wrong
-        expected = expected + n[key] * wrong[:, :1]
-    factor = _factors(observed, expected)
-    factor[:, VISIBLE] = 1.0
-    result: dict[str, Floats] = {}
-    for key in ("miss", "jitter"):
-        mean = (factor * n[key]).sum(axis=1) / n[key].sum(axis=1)
-        _put_by_kind(result, f"keypoints.{key}", share[key] / mean)
-    for index, name in _HIDDEN:
-        _put_by_kind(result, f"keypoints.{name}", factor[:, index])
-    return result
 
 
 def _factors(observed: Floats, expected: Floats) -> Floats:
@@ -198,7 +179,7 @@ def _depth(drops: Trials) -> Floats:
 
 
 def _guesses(n: dict[str, Floats], k: dict[str, Floats], sums: FrameSums) -> dict[str, Floats]:
-    """Return the parameters of a detector that guesses: shares of visible joints, and shares that are guessed.
+    """Return the parameters of a detector that guesses: shares that are guessed, and factors on jitter.
 
     The share guessed begins as the share of gross errors among the joints in that state; calibration raises it, because
     many guesses are right.
@@ -209,8 +190,6 @@ def _guesses(n: dict[str, Floats], k: dict[str, Floats], sums: FrameSums) -> dic
         sums: all sums.
     """
     result: dict[str, Floats] = {}
-    for key in ("miss", "jitter"):
-        _put_by_kind(result, f"keypoints.{key}", np.clip(k[key][:, 0] / n[key][:, 0], 0.0, 1.0))
     # Kinds that are never hidden in this way count as the others.
     usual = np.nan_to_num(k["jitter"][:, 0] / n["jitter"][:, 0])
     for index, name in _HIDDEN:
