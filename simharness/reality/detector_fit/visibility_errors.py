@@ -17,7 +17,7 @@ from scipy.special import expit, logit
 
 from simharness.reality.detector_fit.detector_measurement import MeasuredValue
 from simharness.reality.detector_fit.parameters import SHARES
-from simharness.scenario.sections.detector_section import KINDS
+from simharness.scenario.sections.detector_section import KINDS, LARGEST_MULTIPLE
 
 PARAMETERS = ("keypoints.miss", "keypoints.jitter", "keypoints.self_occluded", "keypoints.occluded")
 """Keys of the parameters at which a detector has the shares of SHARES."""
@@ -43,6 +43,7 @@ def with_parameters(values: Mapping[str, float]) -> dict[str, float]:
     result = dict(values)
     for (_, shares), (_, keys) in zip(_keys(SHARES), _keys(PARAMETERS), strict=True):
         visible, *hidden, gross = (values.get(key, np.nan) for key in shares)
+        visible = max(visible, *(2 * wrong / LARGEST_MULTIPLE for wrong in hidden))  # the largest factor reaches them
         miss = visible * gross
         if miss > 0:
             jitter = (visible - miss) / (1 - miss)
