@@ -15,6 +15,7 @@ from simharness.reality.detector_fit.visibility_errors import (
     prior_shares,
     with_parameters,
 )
+from simharness.scenario.sections.detector_section import LARGEST_MULTIPLE
 
 KIND = "hips"
 KEYS = [f"{key}.{KIND}" for key in SHARES]
@@ -39,9 +40,17 @@ def shares_of(miss, jitter, *factors):
     st.tuples(st.floats(0.01, 1.0), st.floats(0.01, 1.0)),
 )
 def test_parameters_have_the_shares_that_they_are_made_of(miss, jitter, reach):
-    factors = [each / max(miss, jitter) for each in reach]  # shares of hidden joints are 1 at most
+    most = min(1 / max(miss, jitter), LARGEST_MULTIPLE / 2)  # shares of hidden joints are 1 at most
+    factors = [each * most for each in reach]
     found = with_parameters(shares_of(miss, jitter, *factors))
     assert [found[key] for key in OF] == pytest.approx([miss, jitter, *factors], rel=1e-5)
+
+
+@given(st.floats(0.0, 1e-3), st.tuples(st.floats(0.01, 0.99), st.floats(0.01, 0.99)), st.floats(0.01, 0.99))
+def test_hidden_joints_keep_their_shares_where_visible_ones_never_err(visible, hidden, gross):
+    found = with_parameters(dict(zip(KEYS, [visible, *hidden, gross], strict=True)))
+    assert max(found[key] for key in OF[2:]) <= LARGEST_MULTIPLE * (1 + 1e-9)
+    assert list(shares_of(*(found[key] for key in OF)).values())[1:] == pytest.approx([*hidden, gross], rel=1e-5)
 
 
 def test_values_without_shares_stay():
