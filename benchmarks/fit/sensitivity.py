@@ -22,7 +22,7 @@ from simharness.scenario.sections.detector_section import DetectorSection
 
 CONSTANTS = (
     *("_WIDTHS", "_WIDTH", "_PERTURBATIONS", "_APART", "_NOISE", "_NOISE_ANEW", "_STEP", "_LASTING", "_LEAST"),
-    *("_SMALLEST", "_OWN", "_STEEPEST", "_SPREAD", "_KIND_SPREAD"),
+    *("_SMALLEST", "_OWN", "_STEEPEST", "_SPREAD", "_KIND_SPREAD", "_LINEAR_STEP"),
 )
 """Constants of the inference. The others are levels of intervals and bounds of what is told."""
 

@@ -167,13 +167,13 @@ def _put(tree: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _rounded(key: str, value: float) -> float:
-    """Round to four decimal places, or three digits, finer than any interval.
+    """Round to four decimal places, finer than any interval; shares that factors multiply, to three digits.
 
     Correlations below 0, and values that the inference raised too far are bounded.
     """
     bound = next((most for start, most in _MOST.items() if key.startswith(start)), float("inf"))
     value = float(min(max(value, 0.0), bound))
-    return round(value, 4) if value >= 0.1 else float(f"{value:.3g}")
+    return float(f"{value:.3g}") if key.startswith(("keypoints.miss.", "keypoints.jitter.")) else round(value, 4)
 
 
 def _wrapped(text: str) -> list[str]:
