@@ -237,7 +237,7 @@ class LitScene:
             shade_lit(pixels, background.corners, still.faces, view.to_rays, light, (0, 0), MATTE, tone.table(), rgb)
         grid = ShadowGrid.around_probes(room)
         shape = grid.shape[0] // BLOCK, grid.shape[1] // BLOCK
-        blocks = blocks_below(background, view, grid.corner, BLOCK * grid.cell, shape)
+        blocks = blocks_below(triangle, inverse_depth, view, grid.corner, BLOCK * grid.cell, shape)
         background.lit = LitBackground(self.lighting, self.room, rgb, blocks, np.zeros((0, 0), np.float32))
         return background.lit
 

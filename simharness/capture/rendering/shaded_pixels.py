@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.backgrounds import Background
 from simharness.capture.rendering.surface_kernels import DrawnPixels, PixelRays
 
 _ZERO, _UNIT, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 HEIGHTS = np.array([0.0, 0.5, 1.1, 1.9], np.float32)
 """Heights of the maps above the floor, metres; nothing is shaded above the last."""
 
+_TOP = float(HEIGHTS[-1])
 _FLOOR = np.float32(0.02)  # metres: what is lower is the floor
 
 
@@ -36,34 +36,43 @@ class ShadowLayers(NamedTuple):
     """Blocks of ``BLOCK`` x ``BLOCK`` cells of ``fine`` in which anything is dark, (rows, columns)."""
 
 
+@njit(cache=True, error_model="numpy")
 def blocks_below(
-    background: Background, view: PixelRays, corner: NDArray[np.float64], side: float, shape: tuple[int, int]
-) -> NDArray[np.uint16]:
+    triangle: np.ndarray,
+    inverse_depth: np.ndarray,
+    view: PixelRays,
+    corner: np.ndarray,
+    side: float,
+    shape: tuple[int, int],
+) -> np.ndarray:
     """Return over which block of a map of the floor each pixel of still meshes lies, (h, w); rows * columns for none.
 
     Args:
-        background: picture of the still meshes.
+        triangle: visible faces of the still meshes, (h, w); -1 for none.
+        inverse_depth: their inverse depths, (h, w).
         view: rays of the pixels.
         corner: x and y of the corner of the map, (2,).
         side: side of a block, metres.
         shape: rows and columns of blocks.
     """
-    y, x = np.ogrid[: len(background.triangle), : background.triangle.shape[1]]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        away = 1.0 / background.inverse_depth.astype(float)
-        at = [
-            origin + away * (ray[0] * x + ray[1] * y + ray[2])
-            for origin, ray in zip(view.center, view.to_rays, strict=True)
-        ]
-        place = np.zeros(away.shape, np.int64)
-        inside = (background.triangle >= 0) & (at[2] <= HEIGHTS[-1])
-        for axis, count in ((1, shape[0]), (0, shape[1])):
-            block = (at[axis] - corner[axis]) / side
-            # The walls lie on the border of the map.
-            block = np.floor(np.where(block > 0.5 * count, block - 1e-3, block + 1e-3))
-            inside &= (block >= 0) & (block < count)
-            place = place * count + np.where(inside, block, 0).astype(np.int64)
-    return np.where(inside, place, shape[0] * shape[1]).astype(np.uint16)
+    center, rays = view
+    blocks = np.full(triangle.shape, shape[0] * shape[1], np.uint16)
+    for y in range(triangle.shape[0]):
+        for x in range(triangle.shape[1]):
+            away = 1.0 / np.float64(inverse_depth[y, x])
+            if triangle[y, x] < 0 or not center[2] + away * (rays[2, 0] * x + rays[2, 1] * y + rays[2, 2]) <= _TOP:
+                continue
+            place, inside = 0, True
+            for axis, count in ((1, shape[0]), (0, shape[1])):
+                at = center[axis] + away * (rays[axis, 0] * x + rays[axis, 1] * y + rays[axis, 2])
+                block = (at - corner[axis]) / side
+                # The walls lie on the border of the map.
+                block = np.floor(block - 1e-3 if block > 0.5 * count else block + 1e-3)
+                inside = inside and 0 <= block < count
+                place = place * count + int(block) if inside else 0
+            if inside:
+                blocks[y, x] = place
+    return blocks
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
