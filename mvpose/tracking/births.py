@@ -96,20 +96,26 @@ class Births:
         return poses
 
     def _identify(self, born: Tracks, witnesses: Integers, now: float) -> None:
-        """Give new tracks the identities of lost people who have come back, or new ones."""
+        """Give new tracks, and those that may still be ghosts, identities of lost people who came back, or new ones.
+
+        A track has its identity for good once it is reported (:meth:`Population.settle`). Until then, whoever is born
+        takes part in the same assignment, so that a ghost keeps nobody's identity.
+        """
         people = self._population
+        doubtful = np.flatnonzero(~people.tracks.reported & (len(people.lost) > 0))
+        waiting = people.tracks.select(doubtful)
         back = self._returns.match(
-            born, people.lost, time=now, motion=self._motion, trunk=self._of_joints.trunk, present=people.tracks,
-            witnesses=witnesses, scale=scale_of(self._pipeline.affinity),
+            waiting.join(born) if len(waiting) else born, people.lost, time=now, motion=self._motion,
+            trunk=self._of_joints.trunk, present=people.tracks, scale=scale_of(self._pipeline.affinity),
+            witnesses=np.concatenate([waiting.origin.sum(axis=1), witnesses]),
         )  # fmt: skip
-        for k, lost in enumerate(back):
-            if lost >= 0:
-                born.resume(k, people.lost, lost)
-            else:
-                born.ids[k], people.born = people.born, people.born + 1
-        remain = np.ones(len(people.lost), np.bool_)
-        remain[back[back >= 0]] = False
-        people.lost = people.lost.select(remain)
+        ids = np.concatenate([waiting.ids, np.full(len(born), -1)])
+        ids[np.isin(ids, people.lost.ids)] = -1
+        ids[back >= 0] = people.lost.ids[back[back >= 0]]
+        new = np.flatnonzero(ids < 0)
+        ids[new] = people.born + np.arange(len(new))
+        people.born += len(new)
+        people.tracks.ids[doubtful], born.ids[:] = np.split(ids, [len(doubtful)])
 
     def pair_with_recent(
         self, recent: RecentPictures, rig: Rig, detections: Detections, lead: Floats, owner: Integers, *,

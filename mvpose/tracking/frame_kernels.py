@@ -15,6 +15,9 @@ from mvpose.tracking.pose_update import update_people
 
 _GIVEN_UP = -7.0  # log-odds below which a track is no longer followed: one in a thousand
 _ALONE = 0.5  # seconds for which one camera alone follows somebody who is likelier a ghost: the depth is a guess
+_ONE_FRAME = 0.1  # metres: standard deviation of the place of a trunk in one frame
+_FARTHEST = 16.3  # squared distance in variances, chi-square of three degrees of freedom at 0.001
+_HIDDEN = 0.5  # part of the largest spread up to which people are followed whom pictures should show and do not
 _SAME_POSE = 0.2  # metres: distance between most joints of two poses of one person
 _ONE_PERSON = 0.12  # metres: the same, of two tracks; people who hug are further apart
 _FARTHEST_ODDS = 50.0  # log-odds beyond which a probability is 0 or 1 to the last digit
@@ -65,9 +68,12 @@ def update_tracks(tracks, groups, rays, sigmas, floor, motion, placed, ends, ela
         of these groups.
     """
     state, covariance, scores, length, variance = tracks
-    supports = np.empty(scores.shape)
+    supports, groups = np.empty(scores.shape), groups.copy()
+    before, spread = state.copy(), covariance.copy()
     update_people(state, covariance, supports, groups, rays, sigmas, floor, motion, placed)
     for t in range(len(state)):
+        if groups[t] >= 0 and _jumped(before[t], spread[t], state[t], motion.trunk):
+            groups[t], supports[t], state[t], covariance[t] = -1, 0.0, before[t], spread[t]
         for j in range(scores.shape[1]):
             faded = scores[t, j] * keep
             if supports[t, j] > MISSING_SCORE:
@@ -77,6 +83,22 @@ def update_tracks(tracks, groups, rays, sigmas, floor, motion, placed, ends, ela
         if groups[t] >= 0:
             learn_lengths(length[t], variance[t], state[t], covariance[t], ends, elapsed)
     return _owners(rays.labels, groups)
+
+
+@njit(cache=True)
+def _jumped(before, covariance, after, trunk):
+    """Return whether the trunk (J, 6) moved further than a person can: beyond all but one in a thousand predictions."""
+    way, variance, count = np.zeros(3), _ONE_FRAME * _ONE_FRAME, 0
+    for j in range(len(trunk)):
+        if trunk[j] and not np.isnan(before[j, 0]):
+            count += 1
+            for r in range(3):
+                way[r] += after[j, r] - before[j, r]
+    for j in range(len(trunk)):
+        if trunk[j] and not np.isnan(before[j, 0]):
+            for r in range(3):
+                variance += covariance[j, r, r] / (3.0 * count)
+    return count > 0 and (way**2).sum() > _FARTHEST * variance * count * count
 
 
 @njit(cache=True)
@@ -168,7 +190,9 @@ def judge_tracks(
     absorbed = _absorbed(state, spread, hits, origin)
     for t in range(n):
         earned = odds[t] > 0.0 or (odds[t] > _GIVEN_UP and now - agreed[t] < _ALONE)
-        followed[t] = earned and spread[t] < 2.0 * vague and not absorbed[t]
+        # Who is gone where pictures should show them is soon too vague to say which detections are theirs.
+        vaguest = 2.0 * vague if here[t] > 0.0 else _HIDDEN * vague
+        followed[t] = earned and spread[t] < vaguest and not absorbed[t]
         everyone = everyone and followed[t]
     false = np.zeros(len(pictures))
     for d in range(len(owner)):

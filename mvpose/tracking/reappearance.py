@@ -22,6 +22,8 @@ from mvpose.tracking.motion import MotionModel, transition
 from mvpose.tracking.tracks import Tracks
 
 _MEMORY = 60.0  # seconds that a mean covers: in a minute people show all their sides
+_HEIGHT = 0.2  # metres: standard deviation of a change of the height of a trunk, that of half of those who sit down
+_SIZE = 0.05  # standard deviation of the logarithm of the size of a body as one pose shows it
 _LONGEST = 1.0  # seconds for which one frame counts at most
 
 
@@ -107,14 +109,15 @@ def evidence_of_looks(
     if not len(born) or not len(lost) or not born.looks.shape[1]:
         return np.zeros((len(born), len(lost)))
     distance = look_distances(born.looks, lost.looks)
-    rival = np.minimum(scale.midpoint, np.minimum(lost.rival, nearest_rival(lost, present)))[None, :]
+    rival = np.minimum(lost.rival, nearest_rival(lost, present))[None, :]
     here = present.reported & (present.described > 0.0)
     for others, counts in ((present.looks, here), (born.looks, born.described > 0.0)):
         away = np.where(counts, look_distances(born.looks, others), np.inf)
         if others is born.looks:
             np.fill_diagonal(away, np.inf)
         rival = np.minimum(rival, away.min(axis=1, initial=np.inf)[:, None])
-    nats = np.maximum(rival - distance, 0.0) - np.maximum(distance - scale.midpoint, 0.0)
+    middle = scale.midpoint
+    nats = np.maximum(np.minimum(rival, middle) - distance, 0.0) - np.maximum(np.minimum(distance, rival) - middle, 0.0)
     known = (born.described > 0.0)[:, None] & (lost.described > 0.0)
     return np.where(known, nats / scale.slope * np.sqrt(witnesses)[:, None], 0.0)
 
@@ -198,13 +201,15 @@ class Reappearance:
         # Twice the negative logarithm of likelihoods; the last columns stand for nobody known.
         cost = np.full((len(born), len(lost) + len(born)), self.gate)
         here, there, gone = _center(born, trunk), _center(lost, trunk), time - lost.seen
+        other_body = _other_body(here[:, None, 2] - there[:, 2], born.length, lost.length)
         looks = 2.0 * evidence_of_looks(born, lost, present, witnesses, scale)
         anywhere = gone >= self.memory
         prior = self.gate + 2.0 * np.log(self.odds * max(int(anywhere.sum()), 1))
         for k in range(len(lost)):
             variance = transition(gone[k], *motion.trunk)[2] + self.deviation**2
-            place = prior if anywhere[k] else self._place(((here - there[k]) ** 2).sum(axis=1), variance)
-            value = place - looks[:, k]
+            way2 = ((here - there[k])[:, :2] ** 2).sum(axis=1)
+            place = prior if anywhere[k] else self._place(way2, variance)
+            value = place + other_body[:, k] - looks[:, k]
             cost[:, k] = np.where(value < self.gate, value, 2.0 * self.gate)
         for row, column in zip(*linear_sum_assignment(cost), strict=True):
             if column < len(lost) and cost[row, column] < self.gate:
@@ -222,6 +227,18 @@ class Reappearance:
         """
         ratio = self.returns / (2.0 * np.pi * variance) / (self.arrivals / self.room)
         return distance2 / variance + self.gate - min(2.0 * np.log(ratio), self.gate)
+
+
+def _other_body(change: Floats, born: Floats, lost: Floats) -> Floats:
+    """Return twice the negative log-likelihood ratio of the bodies (n, k) against the same body.
+
+    Args:
+        change: changes of the height of the trunk, (n, k), metres.
+        born: bone lengths of n tracks, (n, B), metres.
+        lost: bone lengths of k lost ones, (k, B), metres.
+    """
+    size = np.log(born.sum(axis=1)[:, None] / lost.sum(axis=1)) if born.shape[1] else 0.0
+    return (change / _HEIGHT) ** 2 + (size / _SIZE) ** 2
 
 
 def _center(tracks: Tracks, trunk: Bools) -> Floats:
@@ -258,6 +275,15 @@ class Population:
             raise ValueError(
                 f"descriptors must be (m, {known}) as in earlier frames, got (m, {dimensions}): start another tracker"
             )
+
+    def settle(self) -> None:
+        """Leave the identities of lost people to the tracks that are reported under them."""
+        if len(self.lost):
+            tracks, others = np.nonzero((self.tracks.ids[:, None] == self.lost.ids) & self.tracks.reported[:, None])
+            if len(tracks):
+                for k, other in zip(tracks, others, strict=True):
+                    self.tracks.resume(k, self.lost, other)
+                self.lost = self.lost.select(np.isin(self.lost.ids, self.lost.ids[others], invert=True))
 
     def keep(self, followed: Bools) -> Floats:
         """Stop to follow the other tracks, and return their times of birth; those who were people may come back."""

@@ -362,6 +362,7 @@ class Tracker:
 
     def _drop(self, now: float, followed: Bools, everyone: bool) -> None:
         """Stop to follow tracks; those who were people may come back."""
+        self._people.settle()
         if not everyone:
             self._clutter.vanish(now - self._people.keep(followed))
         self._people.forget(now, self.model.reappearance)

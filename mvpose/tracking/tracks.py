@@ -147,10 +147,9 @@ class Tracks:
         return np.sort(self.found, axis=1)[:, -2]
 
     def resume(self, k: int, lost: Self, other: int) -> None:
-        """Give track k the identity of a lost one, with the bone lengths and the looks that it had learned."""
-        self.ids[k] = lost.ids[other]
+        """Give track k the bone lengths and the looks that a lost one of its identity had learned."""
         self.length[k], self.variance[k] = lost.length[other], lost.variance[other]
-        self.born_at[k], self.reported[k] = lost.born_at[other], lost.reported[other]
+        self.born_at[k] = lost.born_at[other]
         self.rival[k] = lost.rival[other]
         if lost.described[other] > 0.0:
             self.looks[k], self.described[k] = lost.looks[other], lost.described[other]
