@@ -102,7 +102,10 @@ class Births:
         takes part in the same assignment, so that a ghost keeps nobody's identity.
         """
         people = self._population
-        doubtful = np.flatnonzero(~people.tracks.reported & (len(people.lost) > 0))
+        if not len(people.lost):
+            born.ids[:] = people.number(len(born))
+            return
+        doubtful = np.flatnonzero(~people.tracks.reported)
         waiting = people.tracks.select(doubtful)
         back = self._returns.match(
             waiting.join(born) if len(waiting) else born, people.lost, time=now, motion=self._motion,
@@ -112,9 +115,7 @@ class Births:
         ids = np.concatenate([waiting.ids, np.full(len(born), -1)])
         ids[np.isin(ids, people.lost.ids)] = -1
         ids[back >= 0] = people.lost.ids[back[back >= 0]]
-        new = np.flatnonzero(ids < 0)
-        ids[new] = people.born + np.arange(len(new))
-        people.born += len(new)
+        ids[ids < 0] = people.number(int((ids < 0).sum()))
         people.tracks.ids[doubtful], born.ids[:] = np.split(ids, [len(doubtful)])
 
     def pair_with_recent(

@@ -127,9 +127,9 @@ class Reappearance:
     """Model of where people who were lost come back, and of how they look then.
 
     The trunk of a person who is lost moves on as the motion model says, a random walk after a while. Somebody who
-    appears is taken for the lost person whom that motion makes likeliest, one to one, unless it is likelier that
-    somebody new has come: lost people come back at a rate of their own, near the place that the motion predicts, and
-    new ones at another, anywhere in the room.
+    appears is taken for the lost person whom that motion and the size of the body make likeliest, jointly for all who
+    are not yet known for certain, one to one, unless it is likelier that somebody new has come: lost people come back
+    at a rate of their own, near the place that the motion predicts, and new ones at another, anywhere in the room.
     Where detections carry descriptors, the likelihood of the looks (:func:`evidence_of_looks`) counts as well. It
     alone decides when the place says nothing more, and only if it outweighs the chance that somebody new is seen.
 
@@ -276,12 +276,17 @@ class Population:
                 f"descriptors must be (m, {known}) as in earlier frames, got (m, {dimensions}): start another tracker"
             )
 
+    def number(self, count: int) -> Integers:
+        """Return new identities, (count,)."""
+        self.born += count
+        return np.arange(self.born - count, self.born)
+
     def settle(self) -> None:
         """Leave the identities of lost people to the tracks that are reported under them."""
         if len(self.lost):
             tracks, others = np.nonzero((self.tracks.ids[:, None] == self.lost.ids) & self.tracks.reported[:, None])
             if len(tracks):
-                for k, other in zip(tracks, others, strict=True):
+                for k, other in zip(tracks.tolist(), others.tolist(), strict=True):
                     self.tracks.resume(k, self.lost, other)
                 self.lost = self.lost.select(np.isin(self.lost.ids, self.lost.ids[others], invert=True))
 

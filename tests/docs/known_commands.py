@@ -135,6 +135,7 @@ MODULES = tuple(
         "benchmarks.simulator",
         "benchmarks.starts",
         "benchmarks.tracking",
+        "benchmarks.tracking.reappearance",
         "benchmarks.planted_bugs",
         "benchmarks.mutation",
         "benchmarks.whole_body",
