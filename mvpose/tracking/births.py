@@ -98,8 +98,8 @@ class Births:
     def _identify(self, born: Tracks, witnesses: Integers, now: float) -> None:
         """Give new tracks, and those that may still be ghosts, identities of lost people who came back, or new ones.
 
-        A track has its identity for good once it is reported (:meth:`Population.settle`). Until then, every newborn track
-        takes part in the same assignment, so that a ghost keeps nobody's identity.
+        A track has its identity for good once it is reported (:meth:`Population.settle`). Until then, every newborn
+        track takes part in the same assignment, so that a ghost keeps nobody's identity.
         """
         people = self._population
         if not len(people.lost):
