@@ -74,6 +74,8 @@ class HuntedPoint:
     """Seed of the scene."""
     findings: tuple[HuntFinding, ...] = ()
     """What was found."""
+    sightings: tuple[tuple[int, ...], ...] = ()
+    """Circumstances of all people in all frames, as of :class:`simharness.hunt.hunted_trial.HuntOutput`."""
     error: str = ""
     """Why the trial could not be run; "" where it ran."""
 
@@ -229,7 +231,9 @@ def _stored(hunt: Hunt, path: Path) -> dict[int, HuntedPoint]:
     write_text("".join(lines) or json.dumps(heading) + "\n", path)
     points = [
         HuntedPoint(
-            **row | {"shares": tuple(row["shares"]), "findings": tuple(HuntFinding(**each) for each in row["findings"])}
+            **row
+            | {"sightings": tuple(map(tuple, row.get("sightings", ())))}
+            | {"shares": tuple(row["shares"]), "findings": tuple(HuntFinding(**each) for each in row["findings"])}
         )
         for row in rows[1:]
     ]
@@ -251,7 +255,7 @@ def _measured(hunt: Hunt, points: Sequence[HuntedPoint], client: "Client | None"
                 yield replace(of[each.unit.trial], error=each.error)
             else:
                 assert isinstance(each.output, HuntOutput)
-                yield replace(of[each.unit.trial], findings=each.output.findings)
+                yield replace(of[each.unit.trial], findings=each.output.findings, sightings=each.output.sightings)
 
 
 def _keep(hunt: Hunt, point: HuntedPoint, finding: HuntFinding) -> KeptFailure | None:

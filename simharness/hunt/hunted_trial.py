@@ -31,6 +31,9 @@ BINS: Mapping[str, tuple[float, ...]] = {
 }
 """Borders of the bins in which two failures count as near twins, by circumstance."""
 
+CIRCUMSTANCES: Mapping[str, tuple[float, ...]] = {**BINS, "people": (1.5, 3.5, 6.5), "cameras": (3.5, 5.5)}
+"""Borders of the bins of a person in a frame: those of failures, the people who are there, and the cameras."""
+
 
 @dataclass(frozen=True)
 class HuntFinding:
@@ -76,6 +79,8 @@ class HuntOutput(TrialOutput):
     results: Mapping[str, Any] = field(default_factory=dict)
     findings: tuple[HuntFinding, ...] = ()
     """Violations by property and person."""
+    sightings: tuple[tuple[int, ...], ...] = ()
+    """Bins of :data:`CIRCUMSTANCES` of all people in all frames."""
 
 
 def hunt_in_trial(
@@ -113,7 +118,8 @@ def hunt_in_trial(
             stage = stage_of(alone, violation, judge.variant)
             about = circumstances(whole.truth[frame], person)
             findings.append(HuntFinding(name, person, frame, again[name, person], stage, **about))
-    return HuntOutput(findings=tuple(findings))
+    seen = tuple(each for truth in result.recording.truth for each in sightings(truth))
+    return HuntOutput(findings=tuple(findings), sightings=seen)
 
 
 def _violations(recording: Recording, judge: Judge, properties: Sequence[str]) -> Iterator[tuple[int, Violation]]:
@@ -143,3 +149,13 @@ def circumstances(truth: Truth, person: int) -> dict[str, float]:
         "hidden": hidden_shares(truth.visibility)[:, which].mean(),
     }
     return {key: round(float(value), 3) for key, value in found.items()}
+
+
+def sightings(truth: Truth) -> list[tuple[int, ...]]:
+    """Return the bins of :data:`CIRCUMSTANCES` of each person who is present in a frame."""
+    present, cameras = np.flatnonzero(truth.present).tolist(), len(truth.visibility)
+    found = []
+    for person in present:
+        about = {**circumstances(truth, person), "people": len(present), "cameras": cameras}
+        found.append(tuple(int(np.digitize(about[key], borders)) for key, borders in CIRCUMSTANCES.items()))
+    return found

@@ -147,6 +147,9 @@ PROFILE = "python -m tools.network_profile movenet"  # tests/tools/network_profi
 PROFILE_CHECK = "python -m benchmarks.network_profile movenet FOLDER"  # half an hour; tests/benchmarks/network_profile
 FORECASTS = "python -m benchmarks.planning.blind_forecasts FOLDER --shelf SHELF"  # half an hour; data of Shelf
 ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tracking/test_shelf_losses.py
+COVERAGE = (  # tests/benchmarks/test_coverage_bins.py
+    "python -m benchmarks.hunt.coverage ci --seeds 2 --recording shelf --files FOLDER"
+)
 POWER = "python -m benchmarks.validation FOLDER"  # half an hour, and the data of Shelf; test_wrong_twins.py
 LOOP = "python -m benchmarks.fit FOLDER"  # half an hour; tests/benchmarks/fit/test_closed_loop.py
 OUT_OF_SAMPLE = "python -m benchmarks.fit FOLDER --out-of-sample"  # tests/benchmarks/fit/test_closed_loop.py
@@ -183,6 +186,7 @@ KNOWN = {
     PROFILE,
     PROFILE_CHECK,
     ON_SHELF,
+    COVERAGE,
     POWER,
     LOOP,
     OUT_OF_SAMPLE,
