@@ -128,7 +128,6 @@ MODULES = tuple(
         "benchmarks.doctor",
         "benchmarks.doctor.breaks",
         "benchmarks.expected_error",
-        "benchmarks.from_people",
         "benchmarks.hunt",
         "benchmarks.method",
         "benchmarks.pictures",
@@ -151,6 +150,10 @@ COVERAGE = (  # tests/benchmarks/test_coverage_bins.py
     "python -m benchmarks.hunt.coverage ci --seeds 2 --recording shelf --files FOLDER"
 )
 POWER = "python -m benchmarks.validation FOLDER"  # half an hour, and the data of Shelf; test_wrong_twins.py
+CALIBRATED = (  # a quarter of an hour; tests/benchmarks/test_from_people_benchmark.py
+    "python -m benchmarks.from_people --peer PROGRAM",
+    "python -m benchmarks.from_people --seconds 3",
+)
 LOOP = "python -m benchmarks.fit FOLDER"  # half an hour; tests/benchmarks/fit/test_closed_loop.py
 OUT_OF_SAMPLE = "python -m benchmarks.fit FOLDER --out-of-sample"  # tests/benchmarks/fit/test_closed_loop.py
 # tests/simharness/outputs/benchmark/test_submission.py
@@ -188,6 +191,7 @@ KNOWN = {
     ON_SHELF,
     COVERAGE,
     POWER,
+    *CALIBRATED,
     LOOP,
     OUT_OF_SAMPLE,
     LEADERBOARD,
