@@ -150,10 +150,7 @@ COVERAGE = (  # tests/benchmarks/test_coverage_bins.py
     "python -m benchmarks.hunt.coverage ci --seeds 2 --recording shelf --files FOLDER"
 )
 POWER = "python -m benchmarks.validation FOLDER"  # half an hour, and the data of Shelf; test_wrong_twins.py
-CALIBRATED = (  # a quarter of an hour; tests/benchmarks/test_from_people_benchmark.py
-    "python -m benchmarks.from_people --peer PROGRAM",
-    "python -m benchmarks.from_people --seconds 3",
-)
+CALIBRATED = "python -m benchmarks.from_people --peer PROGRAM"  # tests/benchmarks/test_from_people_benchmark.py
 LOOP = "python -m benchmarks.fit FOLDER"  # half an hour; tests/benchmarks/fit/test_closed_loop.py
 OUT_OF_SAMPLE = "python -m benchmarks.fit FOLDER --out-of-sample"  # tests/benchmarks/fit/test_closed_loop.py
 # tests/simharness/outputs/benchmark/test_submission.py
@@ -191,7 +188,7 @@ KNOWN = {
     ON_SHELF,
     COVERAGE,
     POWER,
-    *CALIBRATED,
+    CALIBRATED,
     LOOP,
     OUT_OF_SAMPLE,
     LEADERBOARD,

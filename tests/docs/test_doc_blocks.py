@@ -26,7 +26,7 @@ from simharness.scenario.sections.room_section import ClutterSection
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in FENCE.findall(page))
-    assert languages == {"python": 16, "toml": 16, "yaml": 3}
+    assert languages == {"python": 17, "toml": 16, "yaml": 3}
 
 
 def test_the_shares_of_the_face_are_valid():
@@ -158,6 +158,14 @@ def test_the_example_of_mvpose():
     for k in range(2):
         (label,) = set(labels[person == k])
         np.testing.assert_allclose(people.joints[label], true[k], atol=0.05)
+
+
+@pytest.mark.slow
+def test_the_example_of_frames_prints_each_with_its_pictures(capsys):
+    run_block("simulate_frames(")
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) > 5
+    assert all("(240, 320, 3)" in line and line.endswith(", 17, 3)") for line in lines)
 
 
 def test_people_of_a_foreign_method_are_read_as_it_wrote_them(tmp_path):
