@@ -77,7 +77,7 @@ def returns(ids: Integers, hidden: Bools, step: float) -> Iterator[bool]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make scenes, hide people in them, track, and print how many returned under their identity."""
-    parser = argparse.ArgumentParser(prog="benchmarks.tracking.reappearance", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.tracking.reappearance", description=__doc__)
     parser.add_argument("--count", type=int, default=30, help="number of scenes")
     parser.add_argument("--hidden", type=float, default=2.0, help="seconds")
     parser.add_argument("--variant", default="track", help="preset of a tracker")
