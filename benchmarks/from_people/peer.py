@@ -3,7 +3,7 @@
 It runs its whole pipeline but its networks, whose weights are not part of the package: it gets poses as if they had
 been extracted before. Pixels are those that ``mvpose calibrate`` gets; depth is the true pose relative to the pelvis
 with the error of a network that lifts poses, 47 mm on average (Pavllo et al., CVPR 2019, table 1), which changes over
-half a second. The person is told apart from others by the truth.
+half a second. Which detections are of this person is known from the truth.
 """
 
 from __future__ import annotations
@@ -20,29 +20,8 @@ from scipy.ndimage import gaussian_filter1d
 from mvpose import Rig
 from mvpose.arrays import Floats
 from mvpose.formats.calibration import pose2sim
+from mvpose.formats.detections.openpose import to_body25
 
-_OPENPOSE = (
-    0,
-    -1,
-    6,
-    8,
-    10,
-    5,
-    7,
-    9,
-    -2,
-    12,
-    14,
-    16,
-    11,
-    13,
-    15,
-    2,
-    1,
-    4,
-    3,
-)  # COCO joints of BODY_25; -1, -2: see _MIDDLES
-_MIDDLES = {1: (5, 6), 8: (11, 12)}  # those that COCO does not have: between its shoulders, and its hips
 RATE = 25.0
 """Frames a second of the recordings."""
 _ERROR, _MEMORY = 0.047, 0.5  # metres, seconds
@@ -92,14 +71,8 @@ def _black_film(file: Path, size: tuple[int, int], frames: int) -> None:
 
 
 def write_poses(folder: Path, kind: str, view: int, points: Floats, scores: Floats) -> None:
-    """Write poses (t, 17, d) of COCO with scores (t, 17) as those of BODY_25; joints without a value have score 0."""
-    shown = np.zeros((len(points), 25, points.shape[-1]))
-    certain = np.zeros((len(points), 25))
-    given = np.where(np.isfinite(points).all(-1), scores, 0.0)
-    values = np.nan_to_num(points)
-    for joint, coco in enumerate(_OPENPOSE):
-        pair = list(_MIDDLES.get(joint, (coco, coco)))
-        shown[:, joint], certain[:, joint] = values[:, pair].mean(1), given[:, pair].min(1)
+    """Write poses (t, 17, D) of COCO17 with scores (t, 17) as those of BODY_25; joints without a value have score 0."""
+    shown, certain = to_body25(points, np.where(np.isfinite(points).all(axis=-1), scores, 0.0))
     frames = [
         {"frame_index": number, "skeleton": [{"pose": pose.ravel().tolist(), "score": score.tolist()}]}
         for number, (pose, score) in enumerate(zip(shown, certain, strict=True))

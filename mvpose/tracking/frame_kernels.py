@@ -190,7 +190,7 @@ def judge_tracks(
     absorbed = _absorbed(state, spread, hits, origin)
     for t in range(n):
         earned = odds[t] > 0.0 or (odds[t] > _GIVEN_UP and now - agreed[t] < _ALONE)
-        # Who is gone where pictures should show them is soon too vague to say which detections are theirs.
+        # The prediction of a person without detections, in views that should show them, soon fits anybody's.
         vaguest = 2.0 * vague if here[t] > 0.0 else _HIDDEN * vague
         followed[t] = earned and spread[t] < vaguest and not absorbed[t]
         everyone = everyone and followed[t]

@@ -105,27 +105,40 @@ def read_frame(paths: Sequence[str | Path]) -> Detections:
 def people_file(keypoints: ArrayLike, scores: ArrayLike, *, skeleton: Skeleton = COCO17) -> dict[str, Any]:
     """Return OpenPose's file of one picture, JSON-ready. People without any keypoint are left out.
 
-    The file has BODY_25: joints that it does not know are left out, and of a skeleton without them neck and middle of
-    the hips are the midpoints of shoulders and of hips.
+    The file has the joints of :func:`to_body25`.
 
     Args:
         keypoints: (n, J, 2), pixels; NaN where missing.
         scores: score of each keypoint, (n, J); 0 where missing.
         skeleton: the J joints, which contain those of COCO17.
     """
-    keypoints, scores = np.asarray(keypoints, float), np.asarray(scores, float)
-    triples = np.where(scores[..., None] > 0, np.concatenate([keypoints, scores[..., None]], axis=-1), 0.0)
-    body = np.zeros((len(scores), len(_BODY25), 3))
+    body, certain = to_body25(keypoints, scores, skeleton=skeleton)
+    triples = np.concatenate([body, certain[..., None]], axis=-1)
+    return {"version": _VERSION, "people": [_person(each) for each in triples[(np.asarray(scores) > 0).any(axis=1)]]}
+
+
+def to_body25(values: ArrayLike, scores: ArrayLike, *, skeleton: Skeleton = COCO17) -> tuple[Floats, Floats]:
+    """Return poses on BODY_25, (n, 25, D), and their scores, (n, 25); both are 0 where a joint is missing.
+
+    Joints that BODY_25 does not know are left out; of a skeleton without them neck and middle of the hips are the
+    midpoints of shoulders and of hips, with the lower of their scores.
+
+    Args:
+        values: pixels or metres, (n, J, D); NaN where missing.
+        scores: score of each joint, (n, J); 0 where missing.
+        skeleton: the J joints, which contain those of COCO17.
+    """
+    values, scores = np.asarray(values, float), np.asarray(scores, float)
+    values = np.where(scores[..., None] > 0, values, 0.0)
+    body, certain = np.zeros((len(scores), len(_BODY25), values.shape[-1])), np.zeros((len(scores), len(_BODY25)))
     for row, joint in enumerate(_BODY25.joints):
-        if joint in skeleton.joints:
-            body[:, row] = triples[:, skeleton.index(joint)]
-    for joint, end in _MIDDLES.items():
-        if joint in skeleton.joints:
-            continue
-        ends = triples[:, [skeleton.index(f"left_{end}"), skeleton.index(f"right_{end}")]]
-        middle = np.concatenate([ends[..., :2].mean(axis=1), ends[..., 2:].min(axis=1)], axis=-1)
-        body[:, _BODY25.joints.index(joint)] = np.where(middle[:, 2:] > 0, middle, 0.0)
-    return {"version": _VERSION, "people": [_person(each) for each in body[(scores > 0).any(axis=1)]]}
+        ends = [skeleton.index(joint)] if joint in skeleton.joints else []
+        if not ends and joint in _MIDDLES:
+            ends = [skeleton.index(f"{side}_{_MIDDLES[joint]}") for side in ("left", "right")]
+        if ends:
+            certain[:, row] = scores[:, ends].min(axis=1)
+            body[:, row] = np.where(certain[:, row, None] > 0, values[:, ends].mean(axis=1), 0.0)
+    return body, certain
 
 
 def _person(body: Floats) -> dict[str, Any]:

@@ -279,7 +279,7 @@ class _Inference:
             own, common = next((each for start, each in _WIDTHS.items() if one.key.startswith(start)), _WIDTH)
             covariance[row] = [common**2 * bool(one.kind and one.group == other.group) for other in known]
             covariance[row, row] += own**2
-        # The prior of shares of hidden joints is of their odds over those of visible ones.
+        # The prior of a hidden share is relative to the visible one: the ratio of their odds.
         at = {each.key: row for row, each in enumerate(known)}
         over = [at.get(f"{SHARES[0]}.{each.kind}", -1) if each.group in SHARES[1:3] else -1 for each in known]
         sums = np.eye(len(index))
