@@ -7,7 +7,8 @@ DEV    := $(VENV)/.dev
 WORKERS ?= 2
 # Oracles of tests whose requirements stay out: opencv-python of trackeval would overwrite opencv-python-headless.
 ORACLES := trackeval==1.3.0
-STUDIES := angle calibration clocks clutter crowd detector failure_modes look_alike panoptic phantoms repair stress sync tracking views views_corners views_side
+# failure_modes_pixels needs a network: mvpose networks get movenet.
+STUDIES := angle calibration clocks clutter crowd detector failure_modes failure_modes_pixels look_alike panoptic phantoms repair stress sync tracking views views_corners views_side
 
 PROJECTS := pyproject.toml mvpose/pyproject.toml tools/build_backend.py
 

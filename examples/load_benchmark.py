@@ -21,7 +21,7 @@ from simharness.reality.recording_file import read_recording
 
 
 def samples(benchmark: Path, split: str) -> Iterator[tuple[Rig, Detections, Floats]]:
-    """Yield cameras, detections, and true joints (P, 14, 3), metres, of every frame of a split."""
+    """Yield cameras, detections, and the 14 joints of Shelf (P, 14, 3), metres, of every frame of a split."""
     for sequence in json.loads((benchmark / "benchmark.json").read_text())["sequences"]:
         if sequence["split"] == split:
             recording = read_recording(benchmark / sequence["name"])

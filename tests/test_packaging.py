@@ -4,14 +4,11 @@ import ast
 import fnmatch
 import importlib
 import re
-import shutil
-import subprocess
-import sys
 import tomllib
 import zipfile
-from pathlib import Path
 
 import pytest
+from built_wheels import ROOT, build_wheels, packaged_files
 from packaging.metadata import Metadata
 from packaging.requirements import Requirement
 
@@ -19,19 +16,8 @@ from simharness.capture.rendering import gl
 from simharness.capture.rendering.raster import make_renderer
 from simharness.capture.rendering.renderer import Unavailable
 
-ROOT = Path(__file__).parents[1]
 SIMHARNESS, MVPOSE = (tomllib.loads((ROOT / each).read_text()) for each in ("pyproject.toml", "mvpose/pyproject.toml"))
 PACKAGING = {"pyproject.toml", "README.md", "LICENSE"}
-
-
-def files(package):
-    """All files of a package, by their path in it, without what Python and builds leave."""
-    folder = ROOT / package
-    for file in sorted(folder.rglob("*")):
-        inside = file.relative_to(folder)
-        left = {"__pycache__", "build"} & set(inside.parts) or any(part.endswith(".egg-info") for part in inside.parts)
-        if file.is_file() and not left and not file.name.startswith("."):
-            yield inside
 
 
 def names(requirements):
@@ -40,7 +26,7 @@ def names(requirements):
 
 class TestPyproject:
     def test_the_list_of_packages_of_mvpose_is_complete(self):
-        folders = {file.parent for file in files("mvpose") if file.name == "__init__.py"}
+        folders = {file.parent for file in packaged_files("mvpose") if file.name == "__init__.py"}
         assert sorted(MVPOSE["tool"]["setuptools"]["packages"]) == sorted(
             ".".join(("mvpose", *each.parts)) for each in folders
         )
@@ -50,13 +36,13 @@ class TestPyproject:
     )
     def test_all_data_is_packaged(self, package, project):
         patterns = project["tool"]["setuptools"]["package-data"][package]
-        data = [file for file in files(package) if file.suffix != ".py" and str(file) not in PACKAGING]
+        data = [file for file in packaged_files(package) if file.suffix != ".py" and str(file) not in PACKAGING]
         assert data
         assert [str(file) for file in data if not any(fnmatch.fnmatch(str(file), each) for each in patterns)] == []
 
     def test_all_scenarios_are_packaged(self):
         patterns = SIMHARNESS["tool"]["setuptools"]["package-data"]["simharness.scenarios"]
-        shipped = list(files("scenarios"))
+        shipped = list(packaged_files("scenarios"))
         assert [str(file) for file in shipped if not any(fnmatch.fnmatch(str(file), each) for each in patterns)] == []
 
     def test_both_have_one_version_and_one_license(self):
@@ -83,7 +69,7 @@ def test_only_compiled_functions_go_without_types():
     """Mypy lets the packages with kernels define untyped functions; these must be compiled by Numba."""
     untyped = []
     for package in ("mvpose", "simharness"):
-        for inside in files(package):
+        for inside in packaged_files(package):
             if inside.suffix != ".py":
                 continue
             for node in ast.walk(ast.parse((ROOT / package / inside).read_text(encoding="utf-8"))):
@@ -108,18 +94,8 @@ def test_without_pyrender_the_rasteriser_renders(monkeypatch):
 
 @pytest.fixture(scope="module")
 def wheels(tmp_path_factory):
-    """Both wheels by name, built in a copy of the checkout by the command of `make wheels`."""
-    copy = tmp_path_factory.mktemp("checkout")
-    for package in ("mvpose", "simharness", "scenarios"):
-        for inside in files(package):
-            (copy / package / inside).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / package / inside, copy / package / inside)
-    (copy / "tools").mkdir()
-    for file in ("pyproject.toml", "MANIFEST.in", "README.md", "LICENSE", "tools/build_backend.py"):
-        shutil.copy2(ROOT / file, copy / file)
-    (recipe,) = re.findall(r"-m (pip wheel .*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M)
-    subprocess.run([sys.executable, "-m", *recipe.split()], cwd=copy, check=True)
-    return {file.name.split("-")[0]: file for file in (copy / "dist").iterdir()}
+    """Both wheels by name."""
+    return build_wheels(tmp_path_factory.mktemp("checkout"))
 
 
 @pytest.fixture(scope="module")
@@ -154,9 +130,9 @@ class TestWheels:
     def test_a_wheel_holds_its_package_and_nothing_else(self, wheels, name):
         with zipfile.ZipFile(wheels[name]) as opened:
             held = {each for each in opened.namelist() if ".dist-info/" not in each}
-        expected = {f"{name}/{each}" for each in files(name) if str(each) not in PACKAGING}
+        expected = {f"{name}/{each}" for each in packaged_files(name) if str(each) not in PACKAGING}
         if name == "simharness":
-            expected |= {f"simharness/scenarios/{each}" for each in files("scenarios")}
+            expected |= {f"simharness/scenarios/{each}" for each in packaged_files("scenarios")}
         assert held == expected
 
 

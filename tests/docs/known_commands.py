@@ -18,7 +18,7 @@ ALONE = {
     "simharness run quickstart --set detector.skeleton=halpe26": RAYS,
     "simharness run quickstart --set people.count=6 --set cameras.count=3 --seed 1 --workers 2": ONE_WORKER,
     "simharness export gathering benchmark": f"{PICTURES} --every 2",
-    "simharness export gathering benchmark --sequences 20 --workers 2 --also depth,ids,coco": (
+    "simharness export gathering many --sequences 20 --workers 2 --also depth,ids,coco": (
         f"{PICTURES} --every 2 --sequences 2 --workers 1"
     ),
     "simharness render gathering --video --overlay truth,detections,estimates": PICTURES,
@@ -66,7 +66,7 @@ SHELF = (
 OWN_RECORDING = "simharness evaluate hall.toml"
 FROM_PICTURES = (  # run by tests/benchmarks/pictures and tests/simharness/reality/test_people_evaluation.py
     "cd benchmark/gathering",
-    "mvpose run calibration_gathering.json hdImgs --detector det.onnx --pose pose.onnx --out results",
+    "mvpose run calibration_believed_gathering.json hdImgs --fps 10 --out results",
     "simharness evaluate poses . results",
     "simharness evaluate poses RECORDING RESULTS",
 )
@@ -101,7 +101,16 @@ PLAN = (  # run by tests/simharness/planning
     "simharness plan my-room.toml --cameras 6 --lens wide --failing 1 --workers 2",
     "simharness rehearse results/plans/lab/planned.toml --people 4",
 )
-MAKE = ("make demo", "make test", "make test-slow", "make docs", "make lint", "make lint docs", "make results")
+MAKE = (
+    "make demo",
+    "make test",
+    "make test-slow",
+    "make docs",
+    "make lint",
+    "make lint docs",
+    "make results",
+    "make wheels",
+)
 CI = ".ci/run"
 PYTEST = ('pytest -m "not slow"', "pytest tests/simharness/detector")
 MVPOSE = (  # run by tests/mvpose/cli
@@ -154,7 +163,7 @@ CALIBRATED = "python -m benchmarks.from_people --peer PROGRAM"  # tests/benchmar
 LOOP = "python -m benchmarks.fit FOLDER"  # half an hour; tests/benchmarks/fit/test_closed_loop.py
 OUT_OF_SAMPLE = "python -m benchmarks.fit FOLDER --out-of-sample"  # tests/benchmarks/fit/test_closed_loop.py
 # tests/simharness/outputs/benchmark/test_submission.py
-SCORED = ("simharness score SUBMISSION benchmark/gathering", "simharness score FILE benchmark/gathering")
+SCORED = ("simharness score SUBMISSION many/gathering", "simharness score FILE benchmark/gathering")
 SEED_SCORES = "python -m tools.paper_tables.seed_scores"  # tests/tools/test_seed_scores.py
 LEADERBOARD = (
     "python -m benchmarks.leaderboard FOLDER --shelf SHELF"  # a quarter of an hour; tests/benchmarks/leaderboard
