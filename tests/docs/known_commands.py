@@ -99,7 +99,7 @@ PLAN = (  # run by tests/simharness/planning
     "simharness plan lab --cameras 5",
     "simharness plan lab --preview",
     "simharness plan my-room.toml --cameras 6 --lens wide --failing 1 --workers 2",
-    "simharness rehearse results/plans/lab/planned.toml --people 4",
+    "simharness rehearse results/plans/lab/planned.toml --room lab",
 )
 MAKE = (
     "make demo",
