@@ -33,7 +33,7 @@ _PUBLISHED = Path(__file__).parent / "published_rigs.toml"
 _TEMPLATES = Path(__file__).parent / "templates"
 
 TITLES: Mapping[str, str] = {
-    "conditions": "Twelve conditions",
+    "conditions": "Fourteen conditions",
     "views": "Number of views",
     "rigs": "Other rigs of Panoptic",
     "shelf": "Real Shelf",

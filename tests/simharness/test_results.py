@@ -29,7 +29,7 @@ PAPER = {
     "campus": "campus/variants.json",
     "shelf": "shelf/variants.json",
 }
-EVALUATIONS = sorted({*PAPER.values(), "shelf/twin.json"})
+EVALUATIONS = sorted(PAPER.values())
 
 
 def numbers_in_tables(text):
@@ -97,10 +97,9 @@ def test_an_evaluation_says_where_it_comes_from(name):
     if what == "shelf":
         asked = [value for option, value in given if option == "--method"]
     else:
-        seeds = int(dict(given)["--seeds" if what == "seeds" else "--twins"])
-        assert len(told["seeds"]) == len(set(told["seeds"])) == seeds
-        file = ROOT / (subject if what == "seeds" else "scenarios/shelf.toml")
-        asked = load(file, overrides=[value for option, value in given if option == "--set"]).method.variants
+        assert what == "seeds"
+        assert len(told["seeds"]) == len(set(told["seeds"])) == int(dict(given)["--seeds"])
+        asked = load(ROOT / subject, overrides=[value for option, value in given if option == "--set"]).method.variants
     assert list(told["variants"]) == list(asked)
 
 

@@ -272,7 +272,7 @@ def test_finished_methods_of_a_recording_are_kept(tmp_path):
 def test_the_page_names_methods_numbers_and_what_is_missing(trials):
     entries = [FULL, RANSAC]
     page = render({"conditions": study_figures(trials, entries, "case")}, entries, {"pose2sim": "it is <not> there"})
-    for text in ("Leaderboard", "Twelve conditions", "87.5", "−3.2", "plain baseline", "it is &lt;not&gt; there"):
+    for text in ("Leaderboard", "Fourteen conditions", "87.5", "−3.2", "plain baseline", "it is &lt;not&gt; there"):
         assert text in page
     assert "Real Shelf" not in page
 
