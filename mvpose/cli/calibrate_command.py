@@ -43,8 +43,10 @@ def calibrate(
     with PROGRAM.exit_on_error():
         from mvpose.calibration.from_people import calibrate_from_people
         from mvpose.commands.output_files import check_new
+        from mvpose.formats.calibration.calibration_formats import check_writable
 
         check_new(out)
+        check_writable(intrinsics)
         measured = _distance(distance)
         if measured is not None and given("stature"):
             raise ValueError("--stature and --distance: give one of them")

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 Calibration = Annotated[
     Path,
     typer.Argument(
-        help="Calibration of the cameras: a file of OpenCV, EasyMocap, Pose2Sim, Anipose, VoxelPose or Panoptic, or a "
+        help="Calibration of the cameras: a file of OpenCV, EasyMocap, Pose2Sim, Anipose, caliscope, "
+        "COLMAP, Qualisys, VoxelPose or Panoptic, or a "
         "folder with a file for each camera.",
         metavar="CALIBRATION",
     ),

@@ -58,6 +58,7 @@ def repair(
         from mvpose.calibration.mends import Mend
         from mvpose.commands.errors import failing
         from mvpose.commands.output_files import check_new
+        from mvpose.formats.calibration.calibration_formats import check_writable
 
         if out is None and new_times is None:
             raise ValueError(
@@ -65,6 +66,7 @@ def repair(
             )
         if out is not None:
             check_new(out)
+            check_writable(calibration)
         elif free is not None or mend:
             raise ValueError("--mend and --free change the calibration: give --out")
         if new_times is not None and choices.sync:

@@ -50,7 +50,7 @@ def recording_group(help_text: str) -> typer.Typer:
     )
 
 
-app = recording_group("Score methods on a recording with truth, or a scenario by the rules of recordings.")
+app = recording_group("Score methods, or files of people, on a recording with truth.")
 
 Head = Annotated[
     HeadMapping,

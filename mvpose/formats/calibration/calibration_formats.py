@@ -39,6 +39,17 @@ FORMATS: list[CalibrationFormat] = [
 """Registered formats; the first that recognises a file reads it."""
 
 
+def check_writable(original: str | Path) -> None:
+    """Check that a rig can be written in the format of a calibration.
+
+    Raises:
+        ValueError: an unknown format, or one that can only be read.
+    """
+    _, chosen = _format_of(Path(original))
+    if chosen is not None and chosen.write is None:
+        raise ValueError(f"{original}: calibrations of {chosen.name} can be read, but not written")
+
+
 def write_like(original: str | Path, path: str | Path, rig: Rig) -> None:
     """Write a rig in the format of another calibration.
 
@@ -51,12 +62,11 @@ def write_like(original: str | Path, path: str | Path, rig: Rig) -> None:
         ValueError: an unknown or read-only format, or a rig that it cannot hold.
         OSError: the file cannot be written.
     """
+    check_writable(original)
     place, chosen = _format_of(Path(original))
-    if chosen is None:
+    if chosen is None or chosen.write is None:
         Path(path).mkdir(parents=True, exist_ok=True)
         write_folder(Path(path), rig, suffix=suffix_of(place))
-    elif chosen.write is None:
-        raise ValueError(f"{original}: calibrations of {chosen.name} can be read, but not written")
     else:
         target = Path(path) / place.name if Path(original).is_dir() else Path(path)
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -10,7 +10,7 @@ OpenCV prescribes no layout for many cameras. The reader accepts:
   calibrated yet;
 - one file for each camera, whose name is that of the file: :mod:`.camera_folder`.
 
-The writer uses the first layout.
+The writer uses the first layout; for a file ``.toml``, which OpenCV does not write, that of Pose2Sim.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ import numpy as np
 from mvpose import Camera, Rig
 from mvpose.camera import UnlikelyRigError
 from mvpose.files.message_text import listed, prefixed
-from mvpose.formats.calibration import file_storage
+from mvpose.formats.calibration import file_storage, pose2sim
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
 from mvpose.formats.calibration.camera_entry import check_names, is_camera, lacking, read_camera
 
@@ -89,12 +89,15 @@ def _check_calibrated(entries: dict[str, dict[str, Any]]) -> None:
 
 
 def write_calibration(path: str | Path, rig: Rig) -> None:
-    """Write a rig as a list ``cameras``, readable by OpenCV.
+    """Write a rig as a list ``cameras``, readable by OpenCV; into a file ``.toml``, as Pose2Sim does.
 
     Raises:
         ValueError: camera names that are missing or not distinct, or that begin or end with a space, which OpenCV
             drops.
     """
+    if Path(path).suffix.lower() == ".toml":
+        pose2sim.write_calibration(path, rig)
+        return
     check_names(rig)
     for each in rig:
         if each.name != each.name.strip():

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import tomllib
 from dataclasses import replace
 
 import cv2
@@ -13,7 +14,7 @@ from typer.testing import CliRunner
 from mvpose import Rig
 from mvpose.cli.app import app
 from mvpose.formats.calibration import panoptic, pose2sim, voxelpose
-from mvpose.formats.calibration.calibration_formats import read_calibration
+from mvpose.formats.calibration.calibration_formats import read_calibration, write_like
 from mvpose.formats.calibration.file_storage import write_storage
 
 RIG = studio()
@@ -102,6 +103,14 @@ class TestCaliscope:
         read = read_calibration(tmp_path / "camera_array.toml", size=(1, 1))
         assert [camera.name for camera in read] == ["0", "1", "2", "3"]
         np.testing.assert_allclose(read.packed, RIG.packed, atol=1e-9)
+
+    def test_they_are_written_as_toml(self, tmp_path):
+        """OpenCV writes no TOML: before, YAML went into such a file."""
+        old, new = tmp_path / "camera_array.toml", tmp_path / "new.toml"
+        write_caliscope(old, RIG)
+        write_like(old, new, read_calibration(old, size=(1, 1)))
+        assert {"0", "1", "2", "3"} <= tomllib.loads(new.read_text()).keys()
+        np.testing.assert_allclose(read_calibration(new, size=(1, 1)).packed, RIG.packed, atol=1e-9)
 
     @pytest.mark.parametrize(
         ("missing", "said"),

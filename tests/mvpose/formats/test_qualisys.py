@@ -1,9 +1,13 @@
 """Calibrations of Qualisys: its formula, what is wrong with a file, and a real one."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
 
+from mvpose.cli.app import app
 from mvpose.formats.calibration.calibration_formats import read_calibration
 
 CAMERA = """<camera active="{active}" model="{model}" serial="{name}" viewrotation="{turn}">
@@ -91,3 +95,15 @@ def test_the_calibration_of_pose2sim_is_that_which_it_made_of_it(shared_data):
         for key in ("K", "R", "t"):
             np.testing.assert_allclose(getattr(one, key), getattr(other, key), atol=1e-9)
         np.testing.assert_allclose(one.distortion, 64 * other.distortion, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "command", [("repair", "c.xml", "nowhere", "--out", "new"), ("calibrate", "nowhere", "--intrinsics", "c.xml")]
+)
+def test_what_cannot_be_written_is_refused_before_anything_is_estimated(tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    Path("c.xml").write_text(text({}, {}), encoding="utf-8")
+    result = CliRunner().invoke(app, [*command, *(("--out", "new") if "--out" not in command else ())])
+    assert result.exit_code == 2
+    assert "c.xml: calibrations of Qualisys" in result.stderr
+    assert "not written" in result.stderr
