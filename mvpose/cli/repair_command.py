@@ -66,7 +66,6 @@ def repair(
             )
         if out is not None:
             check_new(out)
-            check_writable(calibration)
         elif free is not None or mend:
             raise ValueError("--mend and --free change the calibration: give --out")
         if new_times is not None and choices.sync:
@@ -76,6 +75,8 @@ def repair(
             )
         if new_times is not None:
             check_new(new_times, option="--new-times")
+        if out is not None:
+            check_writable(calibration)
         mends = [Mend.parsed(text) for text in mend or []]
         chosen = free if free is not None else "" if mends or out is None else "extrinsics"
         freedoms, decides = _freedoms(chosen), _size(rig_size)
