@@ -23,7 +23,7 @@ PERIOD = 0.1  # seconds between frames
 
 def estimate(folder: Path, name: str) -> People:
     """Return tracked people from the calibration and the detections in a folder; the truth beside them is not read."""
-    rig = read_calibration(folder / f"calibration_{name}.json")  # calibration_believed_... where the scenario has faults
+    rig = read_calibration(folder / f"calibration_{name}.json")  # believed_{name} where the rig has faults
     views = [sorted((folder / "openpose" / camera.name).glob("*.json")) for camera in rig]
 
     def frames() -> Iterator[Detections]:

@@ -76,7 +76,7 @@ def test_links_to_files_resolve(name):
 
 OUTPUT = {
     "run": "results/runs/*/report.html",
-    "export": "benchmark/gathering/**/manifest.json",
+    "export": "*/gathering/**/manifest.json",
     "render": "results/renders/gathering/mosaic*",
     "study": "results/*/*/report.html",
 }
