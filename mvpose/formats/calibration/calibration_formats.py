@@ -14,7 +14,7 @@ Readers convert to our conventions: metres, z up, ``x_cam = R x + t``, OpenCV's 
 """
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,9 +45,7 @@ def check_writable(original: str | Path) -> None:
     Raises:
         ValueError: an unknown format, or one that can only be read.
     """
-    _, chosen = _format_of(Path(original))
-    if chosen is not None and chosen.write is None:
-        raise ValueError(f"{original}: calibrations of {chosen.name} can be read, but not written")
+    _writer_of(original)
 
 
 def write_like(original: str | Path, path: str | Path, rig: Rig) -> None:
@@ -62,15 +60,26 @@ def write_like(original: str | Path, path: str | Path, rig: Rig) -> None:
         ValueError: an unknown or read-only format, or a rig that it cannot hold.
         OSError: the file cannot be written.
     """
-    check_writable(original)
-    place, chosen = _format_of(Path(original))
-    if chosen is None or chosen.write is None:
+    place, write = _writer_of(original)
+    if write is None:
         Path(path).mkdir(parents=True, exist_ok=True)
         write_folder(Path(path), rig, suffix=suffix_of(place))
     else:
         target = Path(path) / place.name if Path(original).is_dir() else Path(path)
         target.parent.mkdir(parents=True, exist_ok=True)
-        chosen.write(target, rig)
+        write(target, rig)
+
+
+def _writer_of(original: str | Path) -> tuple[Path, Callable[[Path, Rig], None] | None]:
+    """Return the file or folder of a calibration, and what writes its format; None for a file for each camera.
+
+    Raises:
+        ValueError: an unknown format, or one that can only be read.
+    """
+    place, chosen = _format_of(Path(original))
+    if chosen is not None and chosen.write is None:
+        raise ValueError(f"{original}: calibrations of {chosen.name} can be read, but not written")
+    return place, None if chosen is None else chosen.write
 
 
 def _format_of(path: Path) -> tuple[Path, CalibrationFormat | None]:
