@@ -23,7 +23,7 @@ import numpy as np
 from mvpose import Camera, Rig
 from mvpose.camera import UnlikelyRigError
 from mvpose.files.message_text import one_line
-from mvpose.formats.calibration import colmap, easymocap, opencv, panoptic, pose2sim, qualisys, voxelpose
+from mvpose.formats.calibration import caliscope, colmap, easymocap, opencv, panoptic, pose2sim, qualisys, voxelpose
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
 from mvpose.formats.calibration.camera_folder import only_file, read_folder, suffix_of, unit_of, write_folder
 
@@ -34,6 +34,7 @@ FORMATS: list[CalibrationFormat] = [
     easymocap.FORMAT,
     pose2sim.FORMAT,
     colmap.FORMAT,
+    caliscope.FORMAT,
     opencv.FORMAT,  # after EasyMocap and Pose2Sim, which write the same kinds of files: it takes the rest
 ]
 """Registered formats; the first that recognises a file reads it."""

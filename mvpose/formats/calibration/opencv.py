@@ -10,7 +10,7 @@ OpenCV prescribes no layout for many cameras. The reader accepts:
   calibrated yet;
 - one file for each camera, whose name is that of the file: :mod:`.camera_folder`.
 
-The writer uses the first layout; for a file ``.toml``, which OpenCV does not write, that of Pose2Sim.
+The writer uses the first layout.
 """
 
 from collections.abc import Sequence
@@ -22,18 +22,19 @@ import numpy as np
 from mvpose import Camera, Rig
 from mvpose.camera import UnlikelyRigError
 from mvpose.files.message_text import listed, prefixed
-from mvpose.formats.calibration import file_storage, pose2sim
+from mvpose.formats.calibration import file_storage
 from mvpose.formats.calibration.calibration_file import CalibrationFile, CalibrationFormat
 from mvpose.formats.calibration.camera_entry import check_names, is_camera, lacking, read_camera
 
 _K = ("camera_matrix", "K", "cameraMatrix", "intrinsics", "M")  # of a stereo pair, with 1 and 2 appended
 _TERMS = ("distortion_coefficients", "dist", "distCoeffs", "distortion", "D")
 _SIZE = ("size", "image_size", "imageSize", "image_width", "image_height")
-_EXPECTS = (
+EXPECTS = (
     "a map for each camera with camera_matrix, distortion_coefficients, R or rvec, T and "
     "image_width, image_height; or M1 D1 M2 D2 R T of a stereo pair"
 )
-_WHAT = f"an OpenCV calibration: {_EXPECTS}"
+"""Content of a file, for messages."""
+_WHAT = f"an OpenCV calibration: {EXPECTS}"
 _LONGEST_BASELINE = 20.0  # metres, between the cameras of a stereo pair
 
 
@@ -57,7 +58,7 @@ def read_calibration(path: str | Path, *, size: tuple[int, int], only: Sequence[
     values = file_storage.read_beside(path, what=_WHAT) if plain is None else plain
     with prefixed(path):
         stereo = _stereo(values, path)
-        entries = stereo or _entries(values)
+        entries = stereo or camera_entries(values)
         if not entries:
             keys = ", ".join(list(values)[:8]) or "no keys"
             raise ValueError(f"no camera found, only {keys}; expected {_WHAT}")
@@ -89,15 +90,12 @@ def _check_calibrated(entries: dict[str, dict[str, Any]]) -> None:
 
 
 def write_calibration(path: str | Path, rig: Rig) -> None:
-    """Write a rig as a list ``cameras``, readable by OpenCV; into a file ``.toml``, as Pose2Sim does.
+    """Write a rig as a list ``cameras``, readable by OpenCV.
 
     Raises:
         ValueError: camera names that are missing or not distinct, or that begin or end with a space, which OpenCV
             drops.
     """
-    if Path(path).suffix.lower() == ".toml":
-        pose2sim.write_calibration(path, rig)
-        return
     check_names(rig)
     for each in rig:
         if each.name != each.name.strip():
@@ -135,17 +133,18 @@ def values_of(file: CalibrationFile) -> dict[str, Any]:
 
 FORMAT = CalibrationFormat(
     "OpenCV (YAML, XML, JSON)",
-    _EXPECTS,
-    lambda file: file.storage is not None or bool(_entries(file.json or file.toml or {})),
+    EXPECTS,
+    lambda file: file.storage is not None or bool(camera_entries(file.json or {})),
     read_calibration,
     write_calibration,
 )
 
 
-def _entries(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
+def camera_entries(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the values of each camera by its name; none where the file has no camera of this layout."""
     found = values.get("cameras")
     if isinstance(found, dict):
-        known = _entries(found) or any(isinstance(each, dict) and "size" in each for each in found.values())
+        known = camera_entries(found) or any(isinstance(each, dict) and "size" in each for each in found.values())
         return {name: each for name, each in found.items() if isinstance(each, dict)} if known else {}
     if isinstance(found, list):
         if not all(isinstance(each, dict) for each in found):
