@@ -98,7 +98,8 @@ def _format_of(path: Path) -> tuple[Path, CalibrationFormat | None]:
     file = CalibrationFile(place, f"a camera calibration: {', '.join(each.name for each in FORMATS)}")
     chosen = next((each for each in FORMATS if each.recognises(file)), None)
     if file.json == {}:
-        raise ValueError(f"{place}: an empty object, without cameras; expected {file.expected}")
+        of_json = ", ".join(each.name for each in FORMATS if "JSON" in each.name)
+        raise ValueError(f"{place}: an empty object, without cameras; expected a camera calibration: {of_json}")
     if chosen is None:
         known = "; ".join(f"{each.name}: {one_line(each.expects, 30)}" for each in FORMATS)
         raise ValueError(f"{place}: not a known calibration: found {file.summary}; expected one of {known}")
