@@ -46,7 +46,7 @@ def test_the_network_of_the_detector_is_named():
 def test_objects_of_files_are_named_by_a_scenario():
     (block,) = {block for block in blocks("toml") if "objects = [" in block}
     assert (
-        len(ClutterSection.model_validate_json(json.dumps(tomllib.loads(block)["clutter"]), strict=True).objects) == 2
+        len(ClutterSection.model_validate_json(json.dumps(tomllib.loads(block)["clutter"]), strict=True).objects) == 3
     )
 
 

@@ -1,4 +1,4 @@
-"""Make the gallery: pictures of twelve scenes as JPEG, with an index.
+"""Make the gallery: pictures of scenes as JPEG, with an index.
 
     python -m tools.gallery results/gallery
 

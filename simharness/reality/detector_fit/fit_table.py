@@ -207,7 +207,7 @@ def plot_comparison(measurements: Sequence[MeasuredDetector], path: str | Path) 
             kinds = KINDS if by == "kinds" else _BINS
             _draw(ax, measurements, [f"{key}.{kind}" for kind in kinds], scale=scale)
             ax.set_title(title)
-            labels = [f"{bearing}°" for bearing in BEARINGS] if kinds == _BINS else kinds
+            labels = [f"{each}°" * (each % 45 == 0) for each in BEARINGS] if kinds == _BINS else kinds
             ax.set_xticks(range(len(kinds)), labels, fontsize=7.5)
         others = _labels()["plot"]["others"]
         _draw(axes[-1], measurements, list(others))
@@ -241,9 +241,10 @@ def _draw(ax: Axes, measurements: Sequence[MeasuredDetector], keys: Sequence[str
         ax.plot(at, values, "o", color=color, ms=4, label=f"{measurement.name}, {measurement.frames} frames")
     ax.set_xlim(-0.6, len(keys) - 0.4)
     ax.tick_params(axis="x", length=0)
-    if keys[0].startswith("scores.joint"):
-        ax.set_ylim(0.7, 1.1)
-    elif "occluded" in keys[0] and "drop" not in keys[0]:
+    if "occluded" in keys[0] and "drop" not in keys[0]:
         ax.set_yscale("log")
-    elif all(measurement[key].low >= 0 for measurement in measurements for key in keys if measurement[key].known):
+        ax.yaxis.set_major_formatter("{x:g}")
+    elif not keys[0].startswith("scores.joint") and all(
+        measurement[key].low >= 0 for measurement in measurements for key in keys if measurement[key].known
+    ):
         ax.set_ylim(bottom=0)

@@ -64,8 +64,8 @@ class ClutterSection(Section):
     carts: Count = key(0, "carts that move about")
     objects: tuple[str, ...] = key(
         (),
-        "files of further objects, each placed once: MJCF (.xml), or OBJ (.obj) with its MTL; in metres, "
-        "z up, front towards +x; paths relative to the scenario file",
+        "files of further objects, each placed once: MJCF (.xml), or OBJ (.obj) with its MTL, z up and front towards "
+        "+x, or glTF (.glb, .gltf); in metres; paths relative to the scenario file",
         max_length=50,
     )
     coverage: Share | None = key(
@@ -78,9 +78,10 @@ class ClutterSection(Section):
     @classmethod
     def _objects(cls, objects: tuple[str, ...]) -> tuple[str, ...]:
         for file in objects:
-            if not file.lower().endswith((".xml", ".obj")):
+            if not file.lower().endswith((".xml", ".obj", ".glb", ".gltf")):
                 raise ValueError(
-                    f"{file!r} is no file of an object: expected a name that ends in .xml (MJCF) or .obj (OBJ)"
+                    f"{file!r} is no file of an object: expected a name that ends in .xml (MJCF), .obj (OBJ), .glb or "
+                    ".gltf (glTF)"
                 )
         return objects
 

@@ -1,4 +1,4 @@
-"""Objects from files: MJCF with geoms, meshes and textures, or OBJ with its MTL; those of users and those shipped.
+"""Objects from files: MJCF with geoms, meshes and textures, OBJ with its MTL, or glTF; of users, and shipped.
 
 What pictures show is what MuJoCo shows of the file: its visible geoms (groups 0 to 2) at their initial positions, with
 their colours, materials and textures. The same geoms stop rays and people. A site for each of the COCO-17 joints
@@ -26,6 +26,7 @@ from mvpose.skeleton import COCO17
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
 from simharness.world.scene.objects.geoms import Box, Surface
+from simharness.world.scene.objects.gltf_objects import gltf_dependencies, read_gltf
 from simharness.world.scene.objects.materials import Sheet
 from simharness.world.scene.objects.shapes import bar_mesh, box_mesh, joined, lathe
 from simharness.world.scene.objects.solids import ObjectModel
@@ -42,6 +43,10 @@ _DEFAULT_COLOR = (0.5, 0.5, 0.5, 1.0)  # of geoms in MuJoCo; a material replaces
 _KEPT = 64  # files, at most about 1 MB each
 _FLAT = 1e-4  # metres: a thinner part is a sheet
 _REFLECTS = 0.5  # reflectance from which a material is a mirror
+
+
+_OTHER_FILES = {".obj": (read_obj, obj_dependencies)} | dict.fromkeys((".glb", ".gltf"), (read_gltf, gltf_dependencies))
+"""Readers of files that MuJoCo does not read, and of the names of the files that belong to them."""
 
 
 @dataclass(frozen=True)
@@ -162,23 +167,24 @@ def draw_shipped(rng: np.random.Generator, name: str, stretch: float, *, height:
 
 def object_dependencies(path: Path) -> tuple[Path, ...]:
     """Return the files of an object: the file itself, and meshes, textures and materials that it names."""
-    if path.suffix.lower() == ".obj":
-        return obj_dependencies(path)
+    if path.suffix.lower() in _OTHER_FILES:
+        return _OTHER_FILES[path.suffix.lower()][1](path)
     if not path.is_file():
         return (path,)
     return tuple(Path(file) for file in sorted(mujoco.mju_getXMLDependencies(str(path))))
 
 
 def load_object(path: Path) -> ObjectFile:
-    """Return the object of a file, MJCF (.xml) or OBJ (.obj).
+    """Return the object of a file, MJCF (.xml), OBJ (.obj) or glTF (.glb, .gltf).
 
     Raises:
         ValueError: the file does not exist, cannot be read, shows nothing, or is too large or too small; the message
             names the file and what to change.
     """
-    read_bytes(path, what="an object as MJCF (.xml) or OBJ (.obj)")
+    read_bytes(path, what="an object as MJCF (.xml), OBJ (.obj) or glTF (.glb, .gltf)")
     try:
-        spec = read_obj(path) if path.suffix.lower() == ".obj" else mujoco.MjSpec.from_file(str(path))
+        read, _ = _OTHER_FILES.get(path.suffix.lower(), (_read_mjcf, None))
+        spec = read(path)
         result = _object_file(path, spec)
     except ValueError as error:
         raise ValueError(f"{path}: cannot be read as an object: {one_line(str(error))}") from None
@@ -195,6 +201,10 @@ def load_object(path: Path) -> ObjectFile:
 
 load_shipped = lru_cache(maxsize=_KEPT)(load_object)
 """Loading of a shipped object, read once in a process."""
+
+
+def _read_mjcf(path: Path) -> mujoco.MjSpec:
+    return mujoco.MjSpec.from_file(str(path))
 
 
 def _object_file(path: Path, spec: mujoco.MjSpec) -> ObjectFile:

@@ -9,8 +9,10 @@ from pathlib import Path
 import cv2
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.files.input_files import read_bytes
+from simharness.world.scene.objects.surfaces import add_surface
 
 _GREY = (0.7, 0.7, 0.7)  # of faces without a material
 
@@ -77,31 +79,25 @@ def _add_group(
 ) -> None:
     """Add the faces of one material: vertices (n, 3), texture coordinates (m, 2), and their indices (k, 3, 2)."""
     corners, faces = np.unique(triangles.reshape(-1, 2), axis=0, return_inverse=True)
-    points = vertices[corners[:, 0]]
-    is_flat = np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-6) < 3
-    points = np.concatenate([points, points[:1].repeat(max(4 - len(points), 0), axis=0)])  # MuJoCo wants four or more
-    mesh = spec.add_mesh(
-        name=name,
-        uservert=points.ravel(),
-        userface=faces.astype(np.int32).ravel(),
-        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+    has_places = picture is not None and (corners[:, 1] >= 0).all()
+    add_surface(
+        spec,
+        name,
+        vertices[corners[:, 0]],
+        faces,
+        color,
+        places=places[corners[:, 1]] if has_places else None,
+        picture=_picture(picture) if picture is not None and has_places else None,
     )
-    material = spec.add_material(name=name, rgba=[*color, 1.0])
-    if picture is not None and (corners[:, 1] >= 0).all():
-        place = np.zeros((len(points), 2))
-        place[: len(corners)] = places[corners[:, 1]] * [1, -1] + [0, 1]
-        mesh.usertexcoord = place.ravel()
-        encoded = np.frombuffer(read_bytes(picture, what="a texture (map_Kd of the MTL file)"), np.uint8)
-        content = cv2.imdecode(encoded, cv2.IMREAD_COLOR) if len(encoded) else None
-        if content is None:
-            raise ValueError(f"picture {picture} cannot be read: expected a PNG or JPEG file (map_Kd of its MTL file)")
-        spec.assets[f"{name}.png"] = cv2.imencode(".png", content)[1].tobytes()
-        spec.add_texture(name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, file=f"{name}.png")
-        material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
-    touches = {} if not is_flat else {"contype": 0, "conaffinity": 0}  # a flat mesh has no hull for contacts
-    spec.worldbody.add_geom(
-        name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, material=material.name, **touches
-    )
+
+
+def _picture(path: Path) -> NDArray[np.uint8]:
+    """Return a picture, (h, w, 3), blue first."""
+    encoded = np.frombuffer(read_bytes(path, what="a texture (map_Kd of the MTL file)"), np.uint8)
+    content = cv2.imdecode(encoded, cv2.IMREAD_COLOR) if len(encoded) else None
+    if content is None:
+        raise ValueError(f"picture {path} cannot be read: expected a PNG or JPEG file (map_Kd of its MTL file)")
+    return content.astype(np.uint8, copy=False)
 
 
 def _lines(path: Path) -> Iterator[tuple[int, tuple[str, list[str]]]]:

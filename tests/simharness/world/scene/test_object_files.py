@@ -1,4 +1,4 @@
-"""Objects from files, MJCF and OBJ: what they show and stop, where they stand, messages, identity; those shipped."""
+"""Objects from files: what they show and stop, where they stand, messages, identity; those shipped."""
 
 from typing import get_args
 
@@ -6,6 +6,8 @@ import cv2
 import mujoco
 import numpy as np
 import pytest
+import trimesh
+from PIL import Image
 from walkers import Rays, space
 
 from mvpose.skeleton import COCO17
@@ -140,6 +142,64 @@ def test_an_obj_file_has_the_colours_of_its_materials(write):
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces].astype(float), 1, 0)
     assert len(mesh.vertices) == 24, "edges of a box are sharp"
     assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a + b + c - 3 * np.array([0, 0, 0.5])) > 0).all()
+
+
+def gltf(path, *meshes):
+    """Write meshes of trimesh, each with its place and material, as a glTF file."""
+    scene = trimesh.Scene()
+    for mesh, place, material, uv in meshes:
+        mesh.visual = trimesh.visual.TextureVisuals(uv=uv, material=trimesh.visual.material.PBRMaterial(**material))
+        scene.add_geometry(mesh, transform=trimesh.transformations.translation_matrix(place))
+    scene.export(path)
+    return path
+
+
+@pytest.mark.parametrize("name", ["bed.glb", "bed.gltf"])
+def test_a_gltf_file_is_shown_upright_with_its_nodes_and_base_colours(tmp_path, name):
+    # In glTF x is to the left, y up and z to the front: a bed 1 wide and 2 long, with a pillow on its front end.
+    bed = trimesh.creation.box((1.0, 0.4, 2.0)), (0, 3, 0), {"baseColorFactor": [0.5, 0.2, 0.0, 1.0]}, None
+    pillow = trimesh.creation.box((0.5, 0.1, 0.3)), (0.2, 3.25, 0.85), {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]}, None
+    file = gltf(tmp_path / name, bed, pillow)
+    mesh = load_object(file).mesh()
+    is_white = mesh.colors[:, 1] > 0.99
+    on_top, below = (mesh.vertices[mesh.faces[each]].reshape(-1, 3) for each in (is_white, ~is_white))
+    np.testing.assert_allclose([below.min(axis=0), below.max(axis=0)], [[-1, -0.5, 0], [1, 0.5, 0.4]], atol=1e-5)
+    np.testing.assert_allclose([on_top.min(axis=0), on_top.max(axis=0)], [[0.7, -0.05, 0.4], [1, 0.45, 0.5]], atol=1e-5)
+    # sRGB values of the linear ones (IEC 61966-2-1), which the file keeps in steps of 1/255.
+    np.testing.assert_allclose(mesh.colors[~is_white][0], [0.735, 0.485, 0.0], atol=0.005)
+    assert volume(mesh) == pytest.approx(0.8 + 0.015, rel=1e-5), "faces look outwards"
+    beside = {each for each in tmp_path.iterdir() if each != file}
+    assert set(object_dependencies(file)) == {file, *beside}
+    assert bool(beside) == (name == "bed.gltf")
+
+
+def test_the_picture_of_a_gltf_material_is_upright(tmp_path):
+    picture = np.full((8, 8, 3), 255, np.uint8)
+    picture[:4] = (30, 200, 10)  # the upper half
+    corners = [[-1, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 1, 0]]
+    board = trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
+    material = {"baseColorTexture": Image.fromarray(picture)}
+    mesh = load_object(
+        gltf(tmp_path / "board.glb", (board, (0, 0, 0), material, [[0, 0], [1, 0], [1, 1], [0, 1]]))
+    ).mesh()
+    height = mesh.vertices[mesh.faces][..., 2].mean(axis=1)
+    column, row = np.moveaxis((mesh.uv.mean(axis=1) * mesh.texture.shape[1::-1]).astype(int), -1, 0)
+    upper, lower = mesh.texture[row, column][np.argsort(height)[::-1]].tolist()
+    assert (upper, lower) == ([30, 200, 10], [255, 255, 255])
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(b"glTF", "not a valid glTF 2.0 file"), (b"", "not a valid glTF 2.0 file"), (None, "it has no triangles")],
+)
+def test_a_file_that_is_no_gltf_object_is_refused(tmp_path, content, message):
+    file = tmp_path / "bed.glb"
+    if content is None:
+        trimesh.Scene([trimesh.load_path([[0, 0, 0], [1, 0, 0]])]).export(file)
+    else:
+        file.write_bytes(content)
+    with pytest.raises(ValueError, match=rf"bed.glb: cannot be read as an object: {message}"):
+        load_object(file)
 
 
 def test_files_beside_an_object_belong_to_it(write, tmp_path):
