@@ -49,6 +49,7 @@ def rows_of(results: Results) -> list[Row]:
         _share("Shelf, one camera 1 degree and 5 cm off: the right one named", by["moved"], "named", 95.0),
         _share("   and no other alarm", by["moved"], "alone", None),
         _share("untouched Shelf and clean rigs: false alarms", by["clean"], "false_alarm", 2.0, most=True),
+        _share("   called fine", [{"fine": each["verdict"] == "fine"} for each in by["clean"]], "fine", None),
         *_repaired_rows(by["repaired"]),
         *_convention_rows(by["conventions"]),
         _share("other faults named", by["faults"], "named", None),
