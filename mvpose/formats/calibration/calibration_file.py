@@ -96,8 +96,6 @@ class CalibrationFormat:
 
     name: str
     """Name in messages, with the kind of file: "VoxelPose (JSON)"."""
-    expects: str
-    """Content of a file, for the message about a file of no known format."""
     recognises: Callable[[CalibrationFile], bool]
     """Test of a file's content."""
     read: Read

@@ -95,13 +95,13 @@ def _format_of(path: Path) -> tuple[Path, CalibrationFormat | None]:
         if found is None or found.is_dir():
             return found or path, None
         place = found
-    file = CalibrationFile(place, f"a camera calibration: {', '.join(each.name for each in FORMATS)}")
+    known = ", ".join(each.name for each in FORMATS)
+    file = CalibrationFile(place, f"a camera calibration: {known}")
     chosen = next((each for each in FORMATS if each.recognises(file)), None)
     if file.json == {}:
         of_json = ", ".join(each.name for each in FORMATS if "JSON" in each.name)
         raise ValueError(f"{place}: an empty object, without cameras; expected a camera calibration: {of_json}")
     if chosen is None:
-        known = "; ".join(f"{each.name}: {one_line(each.expects, 30)}" for each in FORMATS)
         raise ValueError(f"{place}: not a known calibration: found {file.summary}; expected one of {known}")
     return place, chosen
 

@@ -9,7 +9,6 @@ from mvpose.formats.calibration.calibration_file import CalibrationFormat
 
 FORMAT = CalibrationFormat(
     "caliscope (TOML)",
-    opencv.EXPECTS,
     lambda file: file.storage is None and bool(opencv.camera_entries(file.toml or {})),
     opencv.read_calibration,
     pose2sim.write_calibration,

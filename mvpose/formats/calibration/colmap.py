@@ -96,7 +96,6 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
 
 FORMAT = CalibrationFormat(
     "COLMAP (text)",
-    f"{CAMERAS}, {IMAGES}",
     lambda file: file.path.name in FILES,
     read_calibration,
     write_calibration,

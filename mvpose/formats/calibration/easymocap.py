@@ -16,8 +16,7 @@ from mvpose.formats.calibration.calibration_file import CalibrationFormat
 from mvpose.formats.calibration.camera_entry import camera, check_names, image_size
 from mvpose.formats.calibration.file_storage import matrix, missing_half, read_beside, write_storage
 
-_EXPECTS = "a list names, and for each name K_, dist_, R_ or Rot_, and T_"
-_WHAT = f"EasyMocap's intri.yml and extri.yml: {_EXPECTS}"
+_WHAT = "EasyMocap's intri.yml and extri.yml: a list names, and for each name K_, dist_, R_ or Rot_, and T_"
 
 
 def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
@@ -69,7 +68,6 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
 
 FORMAT = CalibrationFormat(
     "EasyMocap (YAML)",
-    _EXPECTS,
     lambda file: isinstance((file.storage or {}).get("names"), list),
     lambda path, *, size, only: read_calibration(path, size=size),
     lambda path, rig: write_calibration(path.parent, rig),

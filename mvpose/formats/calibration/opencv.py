@@ -29,12 +29,11 @@ from mvpose.formats.calibration.camera_entry import check_names, is_camera, lack
 _K = ("camera_matrix", "K", "cameraMatrix", "intrinsics", "M")  # of a stereo pair, with 1 and 2 appended
 _TERMS = ("distortion_coefficients", "dist", "distCoeffs", "distortion", "D")
 _SIZE = ("size", "image_size", "imageSize", "image_width", "image_height")
-EXPECTS = (
+_EXPECTS = (
     "a map for each camera with camera_matrix, distortion_coefficients, R or rvec, T and "
     "image_width, image_height; or M1 D1 M2 D2 R T of a stereo pair"
 )
-"""Content of a file, for messages."""
-_WHAT = f"an OpenCV calibration: {EXPECTS}"
+_WHAT = f"an OpenCV calibration: {_EXPECTS}"
 _LONGEST_BASELINE = 20.0  # metres, between the cameras of a stereo pair
 
 
@@ -133,7 +132,6 @@ def values_of(file: CalibrationFile) -> dict[str, Any]:
 
 FORMAT = CalibrationFormat(
     "OpenCV (YAML, XML, JSON)",
-    EXPECTS,
     lambda file: file.storage is not None or bool(camera_entries(file.json or {})),
     read_calibration,
     write_calibration,

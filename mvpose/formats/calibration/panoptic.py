@@ -20,8 +20,7 @@ from mvpose.formats.calibration.calibration_file import CalibrationFile, Calibra
 from mvpose.formats.calibration.camera_entry import camera, check_names, image_size, is_camera
 
 _KEYS = ("name", "resolution", "K", "distCoef", "R", "t")
-_EXPECTS = "{'cameras': [{" + ", ".join(_KEYS) + "}, ...]}"
-_WHAT = f"a Panoptic calibration: {_EXPECTS}"
+_WHAT = "a Panoptic calibration: {'cameras': [{" + ", ".join(_KEYS) + "}, ...]}"
 _AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # X = x, Y = -z, Z = y
 _CENTIMETRES = 100.0
 
@@ -94,7 +93,6 @@ def _recognises(file: CalibrationFile) -> bool:
 
 FORMAT = CalibrationFormat(
     "Panoptic (JSON)",
-    _EXPECTS,
     _recognises,
     lambda path, *, size, only: read_calibration(path, types=() if only else ("hd",)),
     write_calibration,

@@ -21,8 +21,7 @@ from mvpose.formats.calibration.camera_entry import camera, check_names, image_s
 
 _KEYS = ("size", "matrix", "distortions", "rotation", "translation")
 _METADATA = "metadata"
-_EXPECTS = "a section for each camera, with " + ", ".join(_KEYS)
-_WHAT = f"a Pose2Sim calibration (TOML): {_EXPECTS}"
+_WHAT = "a Pose2Sim calibration (TOML): a section for each camera, with " + ", ".join(_KEYS)
 
 
 def read_calibration(path: str | Path, *, only: Sequence[str] = ()) -> Rig:
@@ -80,7 +79,6 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
 
 FORMAT = CalibrationFormat(
     "Pose2Sim (TOML)",
-    _EXPECTS,
     lambda file: any(isinstance(entry, dict) and "matrix" in entry for entry in (file.toml or {}).values()),
     lambda path, *, size, only: read_calibration(path, only=only),
     write_calibration,

@@ -81,7 +81,6 @@ def _values(entry: ElementTree.Element, name: str, part: str, keys: tuple[str, .
 
 FORMAT = CalibrationFormat(
     "Qualisys (XML)",
-    _EXPECTS,
     lambda file: file.content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and b"<fov_video" in file.content,
     lambda path, *, size, only: read_calibration(path),  # noqa: PLW0108  the file has sizes, and all cameras are read
     unit="mm",

@@ -18,8 +18,7 @@ from mvpose.formats.calibration.calibration_file import CalibrationFormat
 from mvpose.formats.calibration.camera_entry import camera, check_names
 
 _KEYS = ("fx", "fy", "cx", "cy", "R", "T", "k", "p")
-_EXPECTS = "an object of cameras, each with " + ", ".join(_KEYS)
-_WHAT = f"a VoxelPose calibration: {_EXPECTS}"
+_WHAT = "a VoxelPose calibration: an object of cameras, each with " + ", ".join(_KEYS)
 _METRES = 50.0  # centres that all lie within 50 mm of the origin were written in metres
 
 
@@ -77,7 +76,6 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
 
 FORMAT = CalibrationFormat(
     "VoxelPose (JSON)",
-    _EXPECTS,
     lambda file: any(isinstance(entry, dict) and "fx" in entry for entry in (file.json or {}).values()),
     lambda path, *, size, only: read_calibration(path, size=size),
     write_calibration,
