@@ -29,11 +29,10 @@ from mvpose.formats.calibration.camera_entry import check_names, is_camera, lack
 _K = ("camera_matrix", "K", "cameraMatrix", "intrinsics", "M")  # of a stereo pair, with 1 and 2 appended
 _TERMS = ("distortion_coefficients", "dist", "distCoeffs", "distortion", "D")
 _SIZE = ("size", "image_size", "imageSize", "image_width", "image_height")
-_EXPECTS = (
-    "a map for each camera with camera_matrix, distortion_coefficients, R or rvec, T and "
+_WHAT = (
+    "an OpenCV calibration: a map for each camera with camera_matrix, distortion_coefficients, R or rvec, T and "
     "image_width, image_height; or M1 D1 M2 D2 R T of a stereo pair"
 )
-_WHAT = f"an OpenCV calibration: {_EXPECTS}"
 _LONGEST_BASELINE = 20.0  # metres, between the cameras of a stereo pair
 
 

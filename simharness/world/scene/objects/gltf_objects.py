@@ -6,6 +6,7 @@ front is +x.
 
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import mujoco
 import numpy as np
@@ -34,7 +35,7 @@ def read_gltf(path: Path) -> mujoco.MjSpec:
         ) from None
     try:
         meshes = trimesh.load_scene(path, process=False).dump()
-    except Exception as error:  # trimesh lets through whatever its parsers raise
+    except Exception as error:  # a damaged file raises errors of many types
         raise ValueError(f"not a valid glTF 2.0 file: {error or type(error).__name__}") from error
     spec = mujoco.MjSpec()
     for k, mesh in enumerate(each for each in meshes if isinstance(each, trimesh.Trimesh) and len(each.faces)):
@@ -51,8 +52,9 @@ def gltf_dependencies(path: Path) -> tuple[Path, ...]:
     if path.suffix.lower() == ".glb" or not path.is_file():
         return (path,)
     content = read_json_object(path, what="an object as glTF")
-    names = [each.get("uri", "data:") for key in ("buffers", "images") for each in content.get(key, [])]
-    return (path, *(path.parent / name for name in dict.fromkeys(names) if not name.startswith("data:")))
+    listed = (each for key in ("buffers", "images") if isinstance(content.get(key), list) for each in content[key])
+    names = dict.fromkeys(str(each["uri"]) for each in listed if isinstance(each, dict) and "uri" in each)
+    return (path, *(path.parent / unquote(name) for name in names if not name.startswith("data:")))
 
 
 def _material(visual: Any) -> tuple[tuple[float, ...], NDArray[np.uint8] | None]:

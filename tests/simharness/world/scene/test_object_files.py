@@ -173,6 +173,12 @@ def test_a_gltf_file_is_shown_upright_with_its_nodes_and_base_colours(tmp_path, 
     assert bool(beside) == (name == "bed.gltf")
 
 
+def test_names_in_a_gltf_file_are_percent_encoded_and_may_be_damaged(tmp_path):
+    file = tmp_path / "bed.gltf"
+    file.write_text('{"buffers": [{"uri": "my%20bed.bin"}, {"uri": "data:;base64,AA=="}, 3], "images": 7}')
+    assert object_dependencies(file) == (file, tmp_path / "my bed.bin")
+
+
 def test_the_picture_of_a_gltf_material_is_upright(tmp_path):
     picture = np.full((8, 8, 3), 255, np.uint8)
     picture[:4] = (30, 200, 10)  # the upper half
