@@ -19,6 +19,8 @@ from mvpose.calibration import Diagnosis, Repair, diagnose, estimate_clocks, rep
 from mvpose.calibration.repair import Size
 from mvpose.calibration.repaired_pipeline import resampled
 
+TURNS = ("0.5", "1")
+"""Degrees by which one camera is turned: from the size of an alarm to that which "fine" excludes."""
 EVERY = 5  # frames: of those that the slower variants estimate
 _NORMAL = 1.6449  # standard deviations, half the width of an interval that holds 90 %
 
@@ -64,11 +66,14 @@ def trials(recordings: Mapping[str, BenchRecording], draws: int | None = None) -
         for view in range(len(recordings[name].rig)):
             for draw in range(draws or 20):
                 yield TrialKey("moved", name, str(view), draw)
-            for draw in range(draws or 4):
+            for draw in range(draws or 10):
                 yield TrialKey("repaired", name, str(view), draw)
         yield TrialKey("repaired", name, "untouched")
     for name in [*shelf, *rigs]:
         yield TrialKey("clean", name)
+        for case in TURNS:
+            for draw in range(draws or 4):
+                yield TrialKey("turned", name, case, draw)
         for case in faults.CONVENTIONS:
             yield TrialKey("conventions", name, case)
         for case in faults.OTHERS:
@@ -122,6 +127,13 @@ def _clean(key: TrialKey, recordings: Mapping[str, BenchRecording]) -> Result:
     recording = recordings[key.recording]
     _, result = _diagnosed(faults.Case(recording.rig, recording.frames), recording)
     return {**result, "false_alarm": bool(_alarms(result))}
+
+
+def _turned(key: TrialKey, recordings: Mapping[str, BenchRecording]) -> Result:
+    recording, rng = recordings[key.recording], key.rng
+    view = int(rng.integers(len(recording.rig)))
+    _, result = _diagnosed(faults.move_one(recording, view, float(key.case), 0.0, rng), recording)
+    return {**result, "named": ("moved-camera", view) in _alarms(result)}
 
 
 def _named(key: TrialKey, recordings: Mapping[str, BenchRecording]) -> Result:
@@ -254,6 +266,7 @@ def _refusals(key: TrialKey, recordings: Mapping[str, BenchRecording]) -> Result
 _EXPERIMENTS = {
     "moved": _moved,
     "clean": _clean,
+    "turned": _turned,
     "conventions": _named,
     "faults": _named,
     "repaired": _repaired,

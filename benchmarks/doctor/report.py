@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from mvpose.calibration.findings import KINDS
+from mvpose.calibration.findings import EXCLUDED, KINDS
 
 Results = Mapping[str, Mapping[str, Any]]
 _NOTHING, _UNSURE = "nothing", "cannot tell"
 _ONE_MOVED = "one camera 1 degree and 5 cm off"
-_DIAGNOSED = ("clean", "moved", "conventions", "faults", "refusals")
+_DIAGNOSED = ("clean", "turned", "moved", "conventions", "faults", "refusals")
 """Experiments in which a recording is diagnosed."""
 
 
@@ -49,7 +49,8 @@ def rows_of(results: Results) -> list[Row]:
         _share("Shelf, one camera 1 degree and 5 cm off: the right one named", by["moved"], "named", 95.0),
         _share("   and no other alarm", by["moved"], "alone", None),
         _share("untouched Shelf and clean rigs: false alarms", by["clean"], "false_alarm", 2.0, most=True),
-        _share("   called fine", [{"fine": each["verdict"] == "fine"} for each in by["clean"]], "fine", None),
+        _fine(by["clean"]),
+        *_turned_rows(by["turned"]),
         *_repaired_rows(by["repaired"]),
         *_convention_rows(by["conventions"]),
         _share("other faults named", by["faults"], "named", None),
@@ -73,7 +74,11 @@ def confusion_of(results: Results) -> dict[str, Counter[str]]:
         if experiment not in _DIAGNOSED or "findings" not in result:
             continue
         kinds = {each["kind"] for each in result["findings"] if each["severity"] == "alarm"}
-        name = f"{recording}, {_ONE_MOVED}" if experiment == "moved" else case or "no fault"
+        name = case or "no fault"
+        if experiment == "moved":
+            name = f"{recording}, {_ONE_MOVED}"
+        elif experiment == "turned":
+            name = _turn(case)
         row = matrix.setdefault(name, Counter())
         row.update(kinds or {_UNSURE if result["verdict"] == _UNSURE else _NOTHING})
         row["recordings"] += 1
@@ -89,6 +94,7 @@ def misses_of(results: Results) -> list[str]:
             continue
         right = {
             "clean": lambda each: not each["false_alarm"],
+            "turned": lambda each: each["named"] or each["verdict"] == _UNSURE,
             "refusals": lambda each: each["unchanged"] and each["verdict"] == _UNSURE,
         }.get(experiment, lambda each: each["named"] and each.get("camera", True))
         if not right(result):
@@ -136,6 +142,27 @@ def _share(
     met = None if bound is None else share <= bound if most else share >= bound
     text = "" if bound is None else f"{'<=' if most else '>='} {bound:g} %"
     return Row(what, text, f"{share:.1f} %", met, len(results))
+
+
+def _fine(results: Sequence[Mapping[str, Any]], bound: float | None = None) -> Row | None:
+    found = [{"fine": each["verdict"] == "fine"} for each in results]
+    return _share("   called fine", found, "fine", bound, most=True)
+
+
+def _turn(case: str) -> str:
+    return f"one camera turned by {case} degree{'s' * (float(case) != 1)}"
+
+
+def _turned_rows(results: Sequence[Mapping[str, Any]]) -> list[Row | None]:
+    rows: list[Row | None] = []
+    for case in dict.fromkeys(each["case"] for each in results):
+        some = [each for each in results if each["case"] == case]
+        excluded = float(case) >= EXCLUDED["degrees"]
+        rows += [
+            _share(f"{_turn(case)}: named", some, "named", None),
+            _fine(some, 5.0 if excluded else None),
+        ]
+    return rows
 
 
 def _convention_rows(results: Sequence[Mapping[str, Any]]) -> list[Row | None]:

@@ -9,7 +9,7 @@ from scipy.special import ndtri
 
 from mvpose.arrays import Floats
 from mvpose.calibration.cameras import CameraFault, CameraFit
-from mvpose.calibration.findings import Finding, is_excluded, judged
+from mvpose.calibration.findings import Finding, is_fine, judged
 from mvpose.calibration.mends import Mend
 from mvpose.camera import Camera, Rig
 
@@ -226,7 +226,7 @@ def _remark(fit: CameraFit, view: int, names: Sequence[str], depth: Floats, dete
     size, interval = _pose_size(total, _draws(total, full))
     cost = (np.radians(size["degrees"]) * depth[view] + size["metres"]) / len(names)
     high = possible_errors(fit, view)
-    if determined and not is_excluded(high):
+    if determined and not is_fine(size, high):
         text = f"{names[view]} may be off by up to {high['degrees']:.2f} degrees and {100 * high['metres']:.0f} cm: its"
         text += f" estimated correction of {size['degrees']:.2f} degrees and {100 * size['metres']:.1f} cm is too "
         text += "uncertain"

@@ -31,10 +31,11 @@ ALARM: Mapping[str, float] = MappingProxyType(
 outermost tenth of the people, clock, and residual over the usual one. Errors of good rigs are smaller: the corrections
 that are estimated for careful, published calibrations are 0.05 to 0.28 degrees and 1 to 2.5 cm (Shelf)."""
 
-EXCLUDED: Mapping[str, float] = MappingProxyType({"degrees": 0.5, "metres": 0.12})
+EXCLUDED: Mapping[str, float] = MappingProxyType({"degrees": 1.0, "metres": 0.12})
 """Sizes of which "fine" says that no camera has them: the upper end of the 90 % interval of the estimate without trust
-in the calibration is below. Shifts are less certain than turns: detectors place joints differently from different
-sides, which imitates shifts of 5 cm (Shelf's published cameras), and of distant cameras 9 cm."""
+in the calibration is below; turns must be estimated as smaller than an alarm, too. Ten seconds of four people determine
+exact cameras to 0.5 to 0.9 degrees. Shifts are less certain than turns: detectors place joints differently from
+different sides, which imitates shifts of 5 cm (Shelf's published cameras), and of distant cameras 9 cm."""
 
 _CLEAR = 2.0  # times the size of an alarm, in a recording that does not determine smaller ones
 _SURE = 0.95
@@ -69,9 +70,14 @@ def judged(
     return "alarm" if determined or (clear and probability >= _SURE) else "unknown"
 
 
-def is_excluded(high: Mapping[str, float]) -> bool:
-    """Whether the errors that a camera may have, by name, are within what "fine" promises."""
-    return all(value < EXCLUDED[name] for name, value in high.items())
+def is_fine(size: Mapping[str, float], high: Mapping[str, float]) -> bool:
+    """Whether a camera has no errors of the sizes that "fine" excludes, and none of the size of an alarm is likely.
+
+    Args:
+        size: its error as estimated without trust in the calibration: turn (``"degrees"``) and shift (``"metres"``).
+        high: upper ends of the 90 % intervals of these.
+    """
+    return size["degrees"] < ALARM["degrees"] and all(value < EXCLUDED[name] for name, value in high.items())
 
 
 @dataclass(frozen=True)

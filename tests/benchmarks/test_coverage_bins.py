@@ -72,6 +72,7 @@ def test_words_of_bins_are_distinct_and_have_the_borders():
             assert all(any(f"{border:g}" in text for text in texts if text.startswith(name)) for border in borders)
 
 
+@pytest.mark.slow
 def test_people_of_a_frame_are_in_the_bins_of_their_circumstances():
     recording = crowd()
     for truth in recording.truth:

@@ -26,7 +26,7 @@ def test_the_guide_has_the_sizes_of_alarms():
     (lens,) = (size for what, size in rows.items() if what.startswith("lens"))
     assert lens == f"{number(ALARM['edge_px'])} px"
     assert f"with {number(ALARM['times_usual'])} times as much or more" in GUIDE
-    excluded = f"{number(EXCLUDED['degrees'])} degrees or {number(100 * EXCLUDED['metres'])} cm"
+    excluded = f"{number(EXCLUDED['degrees'])} degree or {number(100 * EXCLUDED['metres'])} cm"
     assert f"no camera can be off by {excluded}" in " ".join(GUIDE.split())
 
 

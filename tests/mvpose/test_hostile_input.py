@@ -51,6 +51,7 @@ def test_the_largest_frame_is_estimated():
     assert attempt("fast", lambda: (ring(40), uniform(MOST_DETECTIONS, 40))) is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["full", "fast"])
 def test_two_hundred_views_of_two_people(preset):
     rig, people = ring(200), crowd(2)

@@ -123,6 +123,7 @@ def test_the_next_start_compiles_nothing(toy):
     assert not compiled(second.outer)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "old", "new", "difference"),
     [
@@ -291,6 +292,7 @@ def test_a_renamed_module_is_compiled_again_without_a_warning(toy):
         assert not compiled_again(toy)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["empty", "cut", "flipped", "of another kernel"])
 def test_a_damaged_entry_is_compiled_again(toy, damage):
     toy.start().outer(5.0)
@@ -312,6 +314,7 @@ def test_a_damaged_entry_is_compiled_again(toy, damage):
     assert not compiled_again(toy)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owner here")
 @pytest.mark.parametrize("distrusted", ["writable by others", "of another user"])
 def test_code_that_others_may_have_written_is_not_loaded(toy, tmp_path, distrusted):

@@ -133,6 +133,7 @@ class TestBadInput:
         assert list(tmp_path.rglob("*.json")) == list(tmp_path.rglob("*.html")) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [ValueError("wrong turn"), KeyError("lost"), RunError("film: frame 3")])
 def test_an_internal_error_shows_its_traceback(simharness, monkeypatch, tmp_path, error):
     def broken(*_args, **_options):

@@ -279,6 +279,7 @@ class TestBadInput:
     def test_a_baseline_that_cannot_be_written(self, check, written):
         refused(check("--update-baseline", baseline="small.toml/b.json"), "--baseline small.toml/b.json: cannot be")
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("option", ["--junit", "--summary"])
     def test_a_report_of_a_comparison_that_is_not_made(self, check, written, option):
         refused(check("--update-baseline", option, "out"), f"{option}: cannot be combined with --update-baseline")

@@ -41,12 +41,14 @@ def test_the_command_writes_a_sequence_and_prints_the_folder(call, tmp_path, mon
     assert content["provenance"]["command"] == "simharness export quickstart.toml bench"
 
 
+@pytest.mark.slow
 def test_pictures_may_be_left_out(call, tmp_path):
     assert call(QUICKSTART, "bench", *TINY, "--no-pictures", "--every", "2").exit_code == 0
     assert not list(tmp_path.rglob("*.jpg"))
     assert len(list(tmp_path.rglob("body3DScene_*.json"))) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -70,6 +72,7 @@ def test_bad_input_gives_one_message(call, tmp_path, arguments, message):
     assert not (tmp_path / "bench").exists()
 
 
+@pytest.mark.slow
 def test_an_internal_error_shows_its_traceback(call, tmp_path, monkeypatch):
     def broken(*_args, **_options):
         raise ValueError("wrong turn")

@@ -94,6 +94,7 @@ def test_a_place_that_holds_nothing(hostile, command, place):
     hostile([place if each == "{}" else each for each in COMMANDS[command]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", NUMBERS, ids=lambda each: ascii(" ".join(each))[:60])
 def test_wrong_numbers_and_files(hostile, arguments):
     hostile(arguments)

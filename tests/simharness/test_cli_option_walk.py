@@ -378,12 +378,14 @@ def test_every_option_of_every_command_has_a_row():
     assert len(CASES) >= 106
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", BASES)
 def test_a_command_repeats_itself(walk, command):
     words = f"{command} {BASES[command]}"
     assert walk.run(words) == walk.run(f"{words} ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "name"), CASES)
 def test_an_option_changes_the_result_or_is_refused(walk, command, name):
     row = ROWS[command][name]
@@ -392,6 +394,7 @@ def test_an_option_changes_the_result_or_is_refused(walk, command, name):
     assert walk.effect(base, row.words) in ("changes", "refused", "says"), walk.run(f"{base} {row.words}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("base", "option"), COMBINATIONS)
 def test_an_option_counts_beside_others(walk, base, option):
     assert walk.run(base).code == 0, walk.run(base).told

@@ -197,6 +197,7 @@ def test_colour_histograms_retrieve_a_person_in_other_views(crops):
     assert retrieval.rank1 > 0.75  # chance level with three people: one third
 
 
+@pytest.mark.slow
 def test_crops_are_reproducible_and_do_not_depend_on_the_number_of_moments(crops, poses):
     again = crops_of_group(GROUP, replace(PLAIN, moments=2), poses=poses)
     np.testing.assert_array_equal(again.images, crops.images)
@@ -204,6 +205,7 @@ def test_crops_are_reproducible_and_do_not_depend_on_the_number_of_moments(crops
     np.testing.assert_array_equal(one.images, crops[crops.moment == 0].images)
 
 
+@pytest.mark.slow
 def test_look_alike_changes_clothes_only(crops, poses):
     alike = crops_of_group(replace(GROUP, look_alike=1.0), replace(PLAIN, moments=2), poses=poses)
     both = set(zip(crops.person, crops.moment, crops.view, strict=True)) & set(

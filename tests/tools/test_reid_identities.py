@@ -48,6 +48,7 @@ def test_runs_and_counts_out_of_range_are_refused(run, count):
         groups("training", run, count, size=4)
 
 
+@pytest.mark.slow
 def test_identities_are_the_people_of_a_scenario_of_that_seed():
     people = PeopleSection(count=3, activities=("stand",), children=CHILDREN, look_alike=0.6)
     scenario = Scenario(name="same", seed=41, duration=0.1, people=people)

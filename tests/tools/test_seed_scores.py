@@ -79,6 +79,7 @@ def test_seeds_are_paired_between_variants(scenario):
     assert len(result.pooled("fast").frames) == sum(each.annotated for each in result.evaluations.values())
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_table_and_writes_all_results(tmp_path, capsys):
     file = tmp_path / "seeds.json"
     quick = [

@@ -183,6 +183,7 @@ def test_a_table_has_as_many_cells_as_headings(tmp_path):
         assert len({line.count("|") for line in table}) == 1
 
 
+@pytest.mark.slow
 def test_the_picture_is_one_document_with_every_plot_inside(tmp_path):
     study = make_study(tmp_path, factors={"cameras.count": COUNTS, "people.count": [1, 4]})
     drawn = curves(study)
@@ -254,6 +255,7 @@ def test_a_mean_over_cases_or_other_keys_is_labelled(cases):
     assert "over case" not in text
 
 
+@pytest.mark.slow
 def test_every_case_has_its_panels_on_one_scale(cases):
     drawn = ElementTree.fromstring(curves(cases))
     panels = drawn.findall(SVG + "svg")
@@ -266,6 +268,7 @@ def test_every_case_has_its_panels_on_one_scale(cases):
         assert one == other  # the same ticks on both axes, and the same words
 
 
+@pytest.mark.slow
 def test_many_cases_stand_in_few_even_rows(tmp_path):
     study = make_study(tmp_path, factors={"cameras.count": COUNTS}, cases=("a", "b", "c", "d"))
     panels = ElementTree.fromstring(curves(study)).findall(SVG + "svg")
@@ -290,6 +293,7 @@ def test_a_plot_without_a_size_is_refused():
 class TestFiles:
     """Files of a digest."""
 
+    @pytest.mark.slow
     def test_a_digest_replaces_an_older_one_and_nothing_else(self, study, tmp_path):
         folder = tmp_path / "kept"
         for _ in range(2):
@@ -325,6 +329,7 @@ def test_scores_over_time_are_there_where_a_variant_tracks_people(study, tmp_pat
     assert "HOTA" not in markdown(plain)
 
 
+@pytest.mark.slow
 def test_the_command(study, tmp_path, capsys):
     (tmp_path / "study").mkdir()
     write_study(tmp_path / "study", study.info, Tables(study.trials, study.frames, study.people, study.failures), "")

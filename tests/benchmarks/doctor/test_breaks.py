@@ -54,6 +54,7 @@ def test_a_break_is_found_named_and_mended_by_what_is_printed(lab, tmp_path, nam
         assert f"--fps 10 --frames {FIRST}:{FIRST + 39}" in row.command  # as given, else the rate would be another
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [0.6, 1.0])
 def test_a_camera_that_is_off_is_never_called_fine(lab, tmp_path, degrees):
     """By any axis: a turn about the axis of the view shows least."""

@@ -202,6 +202,7 @@ def test_a_terminal_without_symbols_gets_ascii():
     assert encodable(text, "ascii") == "+ ! -- ## 5x4"
 
 
+@pytest.mark.slow
 def test_peak_memory_is_that_of_the_process_only():
     """It excludes the memory of the parent process, which getrusage includes."""
     ballast = np.ones(40_000_000)  # 320 MB

@@ -67,6 +67,7 @@ def test_a_smaller_sample_is_the_beginning_of_a_larger_one():
     assert list(sample(files, 12, seed=1)) != list(sample(files, 12))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", PACKAGES)
 def test_mutants_of_the_packages_apply_and_have_tests(package):
     for each in mutants_of(package, 3, seed=5):

@@ -49,6 +49,7 @@ def test_the_peer_gets_the_same_places_and_volume(seed):
     assert (given["camera_sets"][0]["fov_h_landscape"], given["camera_sets"][0]["fov_h_portrait"]) == (wide, tall)
 
 
+@pytest.mark.slow
 def test_rooms_are_the_same_by_seed_and_have_four_to_eight_cameras():
     rooms = [draw_room(seed) for seed in range(30)]
     assert all(each.keys == draw_room(seed).keys for seed, each in enumerate(rooms))

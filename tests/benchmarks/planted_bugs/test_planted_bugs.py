@@ -17,6 +17,7 @@ BUG = Bug("sign", "sums.py", (("a + b", "a - b"),), "sums are differences", ("te
 
 
 class TestCatalogue:
+    @pytest.mark.slow
     def test_every_bug_applies_to_the_code(self):
         """Where this fails the code has changed: write the edit of the named bug for the present code."""
         assert unplantable(read_catalogue(), ROOT) == []

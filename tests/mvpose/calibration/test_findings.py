@@ -17,7 +17,7 @@ from mvpose.calibration.findings import (
     Diagnosis,
     Finding,
     camera_names,
-    is_excluded,
+    is_fine,
     joined_options,
     judged,
 )
@@ -106,9 +106,14 @@ def test_no_error_as_large_as_an_alarm_is_a_note(name):
 
 
 def test_fine_excludes_each_size():
-    assert is_excluded({name: 0.99 * limit for name, limit in EXCLUDED.items()})
+    size = {"degrees": 0.99 * ALARM["degrees"], "metres": 2 * ALARM["metres"]}
+    assert is_fine(size, {name: 0.99 * limit for name, limit in EXCLUDED.items()})
     for name in EXCLUDED:
-        assert not is_excluded({**{each: 0.0 for each in EXCLUDED}, name: EXCLUDED[name]})
+        assert not is_fine(size, {**{each: 0.0 for each in EXCLUDED}, name: EXCLUDED[name]})
+
+
+def test_a_turn_as_large_as_an_alarm_is_not_fine():
+    assert not is_fine({"degrees": ALARM["degrees"], "metres": 0.0}, dict.fromkeys(EXCLUDED, 0.0))
 
 
 def test_options_of_all_alarms_make_one_command():

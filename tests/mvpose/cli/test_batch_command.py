@@ -61,6 +61,7 @@ def test_every_trial_has_a_folder_and_a_row(lab, monkeypatch):
         assert (lab / "results" / "day" / name / "poses.csv").is_file()
 
 
+@pytest.mark.slow
 def test_a_finished_trial_is_not_done_again_unless_its_inputs_changed(lab, monkeypatch):
     done = []
     real = estimate_command.estimate_into

@@ -54,6 +54,7 @@ def distances(table, joints):
 
 
 class TestEstimate:
+    @pytest.mark.slow
     @pytest.mark.parametrize("given", ["openpose", "project"])
     def test_people_are_where_they_were(self, lab, tmp_path, given):
         folder, _, joints, _ = lab
@@ -83,6 +84,7 @@ class TestEstimate:
         np.testing.assert_allclose(table["time"].unique().sort(), 5 + np.arange(2, 10) / 30, atol=1e-6)
         assert not list((tmp_path / "out").glob("*.trc"))
 
+    @pytest.mark.slow
     def test_a_second_run_replaces_the_first_and_other_folders_are_left_alone(self, lab, tmp_path):
         folder = lab[0]
         call = [
@@ -109,6 +111,7 @@ class TestEstimate:
         (tmp_path / "thesis" / "chapter.txt").write_text("years of work")
         ends(run(*call, tmp_path / "thesis"), 2, "is no result of mvpose estimate")
 
+    @pytest.mark.slow
     def test_sizes_that_no_file_states_are_named(self, lab, tmp_path):
         folder = lab[0]
         result = run("estimate", folder / "unsized.json", folder / "openpose", "--no-page", "--out", tmp_path / "out")
@@ -177,6 +180,7 @@ class TestRefusals:
             ends(result, 2, "mvpose doctor")
             assert not (tmp_path / "out").exists()
 
+    @pytest.mark.slow
     def test_trust_writes_and_says_so(self, lab, tmp_path):
         folder, rig, _, _ = lab
         wide = [replace(camera, K=camera.K * [[1.4, 1, 1], [1, 1.4, 1], [1, 1, 1]]) for camera in rig]

@@ -28,6 +28,7 @@ def estimate(lab, out, *options):
     return CliRunner().invoke(app, [str(each) for each in given])
 
 
+@pytest.mark.slow
 def test_files_have_the_axis_up_and_those_for_our_own_commands_do_not(lab, tmp_path):
     out = tmp_path / "out"
     options = ("--format", "trc,csv,c3d,bvh,gltf,lengths,json,opensim,mot,angles", "--files-up", "y", "--together")
@@ -53,6 +54,7 @@ def test_a_wrong_axis_is_found_before_anything_is_read(lab, tmp_path):
     assert "--files-up must be y or z, got 'x'" in result.stderr
 
 
+@pytest.mark.slow
 def test_what_is_left_out_is_told_in_the_note_the_manifest_and_the_page(lab, tmp_path):
     options = ("--method", "track-fast", "--format", "trc,bvh", "--max-error", "0.03", "--page")
     result = estimate(lab, tmp_path / "out", *options)

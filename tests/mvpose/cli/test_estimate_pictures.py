@@ -38,6 +38,7 @@ def estimate(lab, out, *options):
     return CliRunner().invoke(app, list(map(str, words)))
 
 
+@pytest.mark.slow
 def test_films_show_the_pictures_of_the_frames(lab, tmp_path):
     result = estimate(lab, tmp_path / "out", "--pictures", lab / "pictures", "--frames", "1:3")
     assert result.exit_code == 0, result.output
@@ -118,11 +119,13 @@ class TestPicturesOfAnotherRecording:
         with pytest.raises(ValueError, match="has 20 pictures, and the detections have 601 frames"):
             source.numbered_for(list(range(601)))
 
+    @pytest.mark.slow
     def test_more_pictures_than_frames_are_noted(self, lab, tmp_path, other):
         result = estimate(lab, tmp_path / "out", "--pictures", other(count=30), "--no-films")
         assert result.exit_code == 0
         assert "cam0: has 30 pictures for frames 0 to 3; check that they are of this recording" in result.stderr
 
+    @pytest.mark.slow
     def test_the_rate_is_that_of_the_videos(self, lab, tmp_path, other):
         words = ["estimate", lab / "Calib.toml", lab / "openpose", "--out", tmp_path / "out", "--method", "fast"]
         words += ["--pictures", other(video=True), "--no-films"]
@@ -130,6 +133,7 @@ class TestPicturesOfAnotherRecording:
         assert json.loads((tmp_path / "out" / "inputs.json").read_text())["fps"] == 50
 
 
+@pytest.mark.slow
 def test_films_may_be_left_out(lab, tmp_path):
     result = estimate(lab, tmp_path / "out", "--pictures", lab / "pictures", "--no-films")
     assert result.exit_code == 0, result.output
@@ -145,6 +149,7 @@ def test_pictures_of_other_cameras_are_refused_before_the_estimation(lab, tmp_pa
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_pictures_that_codecs_cut_are_not_scaled(lab, tmp_path):
     assert is_cut((1080, 1920), (1088, 1920))
     assert not any(is_cut(size, (1088, 1920)) for size in ((1088, 1920), (1072, 1920), (1096, 1920), (544, 960)))

@@ -65,6 +65,7 @@ def verdicts(result):
 
 
 class TestCommand:
+    @pytest.mark.slow
     def test_a_short_recording_tells_nothing(self, lab):
         (line,) = verdicts(estimate(lab))
         assert line.startswith(

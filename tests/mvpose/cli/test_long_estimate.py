@@ -147,6 +147,7 @@ def test_a_killed_estimation_goes_on_with_the_same_bytes(
     assert not list(tmp_path.glob(".*"))
 
 
+@pytest.mark.slow
 def test_parts_of_other_detections_or_of_another_method_are_not_used(lab, tmp_path, in_parts, monkeypatch):
     in_parts(8)
     monkeypatch.setattr("mvpose.cli.results.write_results", lambda *_, **__: (_ for _ in ()).throw(Killed))

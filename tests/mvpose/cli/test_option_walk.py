@@ -189,6 +189,7 @@ def test_an_option_changes_the_result_or_is_refused(walk, command, name, monkeyp
     assert walk.effect(base, row.words) in ("changes", "refused", "says"), walk.run(f"{base} {row.words}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("base", "option"), NO_EFFECT)
 def test_an_option_without_effect_says_so(walk, base, option):
     assert walk.effect(base, option) == "says"

@@ -89,6 +89,7 @@ def test_without_it_the_files_are_refused_and_it_is_named(lab):
     assert "--sync" in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "message"),
     [

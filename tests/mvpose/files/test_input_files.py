@@ -155,6 +155,7 @@ def calls(file):
                 yield node, name
 
 
+@pytest.mark.slow
 def test_no_module_reads_files_around_the_one_reader():
     found = {}
     for package in ("mvpose", "simharness"):

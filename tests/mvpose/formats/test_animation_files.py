@@ -265,6 +265,7 @@ def test_bone_lengths(export):
     assert {bone: float(metres) for _, bone, metres in rows[1:]}["thigh"] == pytest.approx(0.245 * 1.7, rel=0.01)
 
 
+@pytest.mark.slow
 def test_bvh_of_real_people_on_shelf(shared_data):
     folder = shared_data / "shelf"
     rig = read_calibration(folder / "calibration_shelf.json", size=(1032, 776))

@@ -23,6 +23,7 @@ ENTRIES = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(entries=st.lists(ENTRIES, max_size=12), indent=st.sampled_from([None, 1]), size=st.integers(1, 90))
 def test_a_list_in_parts_has_the_entries_of_the_whole(tmp_path_factory, entries, indent, size):

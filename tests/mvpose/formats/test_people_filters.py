@@ -66,6 +66,7 @@ def test_noise_falls_and_slow_motion_stays(name):
     assert np.sqrt(np.mean(left**2)) < 0.5 * 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["butterworth", "spline"])
 def test_stretches_are_filtered_for_themselves_and_gaps_stay(name):
     joints = swinging(2.0).joints.copy()

@@ -101,6 +101,7 @@ def dot_finder(tmp_path_factory):
     return MoveNet(path, least=0.3, sizes=(320,))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(640, 480), (480, 640), (200, 150), (1920, 1080)])
 def test_people_are_placed_in_pictures_of_any_shape(dot_finder, size):
     places = np.array([(0.2, 0.3), (0.8, 0.75)]) * size

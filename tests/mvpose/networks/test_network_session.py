@@ -101,6 +101,7 @@ def test_a_session_can_be_sent_to_another_process(tmp_path):
     np.testing.assert_array_equal(twin(crops())[0], session(crops())[0])
 
 
+@pytest.mark.slow
 def test_importing_networks_imports_neither_onnxruntime_nor_opencv():
     code = "import sys, mvpose.networks; print(*(m for m in ('onnxruntime', 'onnx', 'cv2') if m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split() == []

@@ -32,6 +32,7 @@ def shrinks(head, box):
     return max(1.25 * box[2] / head.session.size[0], 1.25 * box[3] / head.session.size[1])
 
 
+@pytest.mark.slow
 @given(
     st.sampled_from(["stride", "span", "area", "wide", "simcc", "simcc3"]), st.booleans(),
     st.floats(-200, 600), st.floats(-200, 440), st.floats(20, 900), st.floats(20, 900), st.floats(0.1, 0.9),

@@ -39,6 +39,7 @@ def frames_of(path):
         found.append(picture[..., ::-1].astype(int))
 
 
+@pytest.mark.slow
 def test_people_are_drawn_where_they_are(tmp_path):
     rig, frames, people = recording(1, frames=5, cameras=3)
     done = []

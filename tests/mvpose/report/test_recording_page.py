@@ -60,6 +60,7 @@ def test_names_are_escaped(tmp_path):
     assert next(iter(numbers["cameras"])) == "<b>&0$x$"
 
 
+@pytest.mark.slow
 def test_of_many_people_those_who_are_there_longest_have_columns_of_their_own(tmp_path):
     rig, frames, people = recording(11, frames=4)
     joints = people.joints.copy()
@@ -76,6 +77,7 @@ def test_of_many_people_those_who_are_there_longest_have_columns_of_their_own(tm
     assert "Of 11 people the 8 who are there longest." in page
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("people", ["nobody", "no detections", "no covariance", "one frame", "a person without hips"])
 def test_any_recording_has_a_page(tmp_path, people):
     rig, frames, found = recording(2, frames=5)

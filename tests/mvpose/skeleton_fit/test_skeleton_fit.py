@@ -147,6 +147,7 @@ class TestFit:
         for name, length in TRUE_LENGTHS.items():  # how the trunk bends between its ends is not seen
             assert fit.lengths[name] == pytest.approx(length, rel=0.02 if name == "trunk" else 0.01)
 
+    @pytest.mark.slow
     def test_noise_is_reduced_and_makes_short_lengths_less_long(self):
         times, pose = moving(80)
         people = recorded(times, pose, noise=0.03)

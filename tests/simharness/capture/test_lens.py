@@ -27,6 +27,7 @@ def bent_camera(distortion, *, size=(320, 240), fov=75.0, center=(3.0, -1.0, 2.0
     return replace(camera, distortion=np.array(distortion))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distortion", LENSES)
 def test_a_dot_is_drawn_at_its_projection(renderer, distortion):
     camera = bent_camera(distortion, size=(640, 480), shift=(4.3, -2.6))
@@ -61,6 +62,7 @@ def test_edges_lie_within_a_pixel(renderer, distortion):
     np.testing.assert_array_equal((image.ids == 0)[~near], inside[~near])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distortion", LENSES)
 def test_depth_is_that_along_the_own_ray_of_every_pixel(renderer, distortion):
     """Closed form of planes: exact on a floor, and of one of two surfaces where a box stands on it."""

@@ -116,6 +116,7 @@ def test_a_person_outside_the_image_has_no_box():
         assert left > right
 
 
+@pytest.mark.slow
 def test_boxes_of_bands_join_to_the_whole():
     body = make_body(Shape())
     transforms = neutral_transforms(body)

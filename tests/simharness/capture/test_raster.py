@@ -30,6 +30,7 @@ def brute_force(camera, corners):
     return depth.min(axis=-1), np.where(hit.any(axis=-1), depth.argmin(axis=-1), -1)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), size=st.sampled_from([0.05, 0.5, 5.0]))
 def test_random_triangles_match_brute_force(seed, size):

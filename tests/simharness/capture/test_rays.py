@@ -82,6 +82,7 @@ def test_rays_and_pictures_agree_in_every_scene(name):
     assert np.trace(table[2:4, 2:4]) / hidden > 0.85
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_pixels_are_the_same_and_boxes_nearly(name):
     off = []

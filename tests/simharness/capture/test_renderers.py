@@ -276,6 +276,7 @@ def test_the_renderers_agree_on_people_of_a_scenario(raster, gl):
     assert same >= 0.999 * joints
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lighting", [Lighting(), SLANTING], ids=["day", "slanting"])
 def test_the_renderers_agree_on_colours(raster, gl, lighting):
     scene = crowd(24)

@@ -94,6 +94,7 @@ def test_every_score_is_guarded_in_its_own_direction(score, variant):
     assert not better.with_verdict("unexpected")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("score", GATED)
 def test_a_gain_beyond_its_bound_is_unexpected(score):
     gain, size = -2.2 * bad_step(score), {"cases": CASES[:2]}
@@ -140,6 +141,7 @@ class TestRareEvents:
             }
         )
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("before", [[0] * 12, [3, 0, 9, 0, 1, 0, 0, 4, 0, 0, 2, 0]])
     def test_one_person_lost_in_a_frame_of_fifty_is_found(self, before):
         """Two events in the hundred frames of a seed on average, none in some seeds."""
@@ -166,6 +168,7 @@ class TestRareEvents:
         assert sum(bool(each.with_verdict("worse") or each.with_verdict("unexpected")) for each in runs) <= 8
 
 
+@pytest.mark.slow
 def test_on_another_processor_a_frame_may_take_longer():
     here = as_measurement(measured().scores, "a")
     there = as_measurement(measured(lambda trial: {TIME: 0.4}).scores, "b")
@@ -174,6 +177,7 @@ def test_on_another_processor_a_frame_may_take_longer():
     assert compare(here, there, GateSection(slowdown_elsewhere=1.3)).with_verdict("worse")
 
 
+@pytest.mark.slow
 def test_a_certain_loss_within_its_tolerance_is_no_regression():
     assert not regressions(lambda trial: {key: 0.9 * bad_step(key) for key in GATED})
     assert regressions(lambda trial: {"pcp": -0.6})
@@ -383,6 +387,7 @@ def test_a_tolerance_of_zero_is_valid():
     assert named(regressions(lambda trial: {"pcp": -0.01}, strict)) >= {("pcp", "full", None)}
 
 
+@pytest.mark.slow
 def test_scores_that_the_baseline_lacks_are_named():
     after = measured()
     old = as_measurement({trial: scores | {"hota": None, "map": None} for trial, scores in after.scores.items()})

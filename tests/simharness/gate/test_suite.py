@@ -81,6 +81,7 @@ class Busy:
             self.work()
 
 
+@pytest.mark.slow
 def test_times_are_in_units_of_the_reference_on_any_machine(study):
     detected = run_trial(study.at(study.settings[0], 0), until="detect").detected
     times = relative_times(detected, {"one": Busy(1), "three": Busy(3), "six": Busy(6)}, repetitions=5)
@@ -253,6 +254,7 @@ class TestInterruption:
         assert unfinished.update(path) == (0, "", trials)  # times are measured anew
         assert (tmp_path / "small.json").read_text() == continued
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("name", ["code_version", "processor", "fingerprint"])
     def test_a_trial_of_other_code_or_of_another_machine_is_run_again(self, tmp_path, unfinished, monkeypatch, name):
         path = tmp_path / "small.toml"

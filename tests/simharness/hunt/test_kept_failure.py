@@ -87,6 +87,7 @@ def call(*arguments):
     return CliRunner().invoke(app, ["shrink", *map(str, arguments)])
 
 
+@pytest.mark.slow
 def test_the_command_shrinks_and_replays(tmp_path):
     made = call("quickstart", *SMALL, "--seed", 1, "--out", tmp_path)
     assert made.exit_code == 0, made.output
@@ -117,6 +118,7 @@ def test_a_run_is_shrunk_as_its_scenario(tmp_path):
     assert one.read_bytes() == other.read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "what"),
     [

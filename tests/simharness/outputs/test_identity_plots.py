@@ -104,6 +104,7 @@ def test_paths_end_where_an_identity_goes_over_to_another_person_or_is_lost():
     assert ">switch<" not in trajectories("t", lost)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("draw", [timeline, trajectories])
 @pytest.mark.parametrize(
     "case",
@@ -136,6 +137,7 @@ def test_runs_of_equal_values():
     assert list(runs_of(np.zeros(0))) == []
 
 
+@pytest.mark.slow
 def test_the_page_shows_identities_of_variants_that_have_them():
     record = make_record()
     assert "People through time" not in render(record)

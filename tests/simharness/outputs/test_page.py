@@ -91,6 +91,7 @@ def test_the_numbers_of_the_page_are_those_of_the_summary():
     assert "75.0" in page  # person 0 was found in 3 of 4 frames
 
 
+@pytest.mark.slow
 def test_every_score_that_a_variant_has_is_on_the_page():
     record = make_record()
     one, other = deepcopy(record.summary["variants"]["full"]), {"scores": {"jitter_mm": 0.5}}

@@ -37,6 +37,7 @@ def draw_all(people: int = 3, frames: int = 6) -> list[str]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frames", [1, 6])
 @pytest.mark.parametrize("people", [1, 3])
 def test_every_plot_is_one_svg_element_in_the_colours_of_the_page(people, frames):
@@ -61,6 +62,7 @@ def test_every_reference_has_its_target():
         assert {a or b for a, b in references} <= targets
 
 
+@pytest.mark.slow
 def test_plots_are_the_same_every_time():
     assert draw_all() == draw_all()
 

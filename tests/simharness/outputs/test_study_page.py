@@ -63,6 +63,7 @@ def cells_of(page, row):
     return re.findall(r"<td[^>]*>([^<]*)", found.group(1))
 
 
+@pytest.mark.slow
 def test_the_headline_is_the_mean_over_everything(tmp_path):
     page = render_study(make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}))
     for variant in ("full", "fast"):
@@ -70,6 +71,7 @@ def test_the_headline_is_the_mean_over_everything(tmp_path):
         assert cells_of(page, variant)[0] == f"{expected:.1f}"
 
 
+@pytest.mark.slow
 def test_figures_are_the_plots_of_the_page_and_the_points_of_its_curves(tmp_path):
     results = make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}, cases=("crowd", "empty"))
     results = dataclasses.replace(results, failures=results.failures.clear())  # no frame is shown
@@ -87,6 +89,7 @@ def test_figures_are_the_plots_of_the_page_and_the_points_of_its_curves(tmp_path
     assert (rows["seeds"] == 4).all()
 
 
+@pytest.mark.slow
 def test_every_score_that_applies_has_its_mean(tmp_path):
     results = make_study(tmp_path, factors={"cameras.count": [2, 3]}, variants=("full", "track"))
     trials = results.trials.with_columns(pl.lit(None, pl.Float64).alias("phantoms_pruned"))
@@ -105,6 +108,7 @@ def test_every_score_that_applies_has_its_mean(tmp_path):
     assert rows == len(SCORES) - 1
 
 
+@pytest.mark.slow
 def test_every_value_of_a_factor_has_its_number(tmp_path):
     page = render_study(make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}))
     for value in (2, 3, 5):
@@ -126,6 +130,7 @@ def test_it_is_one_whole_document(page):
     assert "nan" not in re.sub(r"<[^>]*>", " ", page.split("</head>")[1]).lower().split()
 
 
+@pytest.mark.slow
 def test_it_needs_nothing_from_elsewhere(page, shown, ran):
     for text in (page, render_study(ran, shown=[picture for picture, _ in shown])):
         for tag, attributes in Reader(text).tags:
@@ -139,6 +144,7 @@ def test_it_needs_nothing_from_elsewhere(page, shown, ran):
         }
 
 
+@pytest.mark.slow
 def test_failed_trials_are_listed_before_any_number(tmp_path):
     failed = ({"case": "", "factors": {"cameras.count": 2}, "seed": 9, "error": "RunError: <b>out of memory"},) * 30
     page = render_study(make_study(tmp_path, failed=failed))
@@ -167,12 +173,14 @@ def test_one_seed_has_no_intervals_and_no_tests(tmp_path):
     assert "Holm" not in page
 
 
+@pytest.mark.slow
 def test_a_variant_that_is_significantly_worse_is_bold(tmp_path):
     page = render_study(make_study(tmp_path, seeds=12))  # p = 2^-12 stays significant after Holm's correction
     row = re.search(r'<th scope="row">fast<small class="note"> − full</small></th>(<td[^>]*>[^<]*)', page).group(1)
     assert row == '<td class="strong">−4.0'
 
 
+@pytest.mark.slow
 def test_the_page_has_breaking_points_of_the_given_thresholds(tmp_path):
     results = make_study(tmp_path)
     assert "PCP under 90 %" in render_study(results)
@@ -182,12 +190,14 @@ def test_the_page_has_breaking_points_of_the_given_thresholds(tmp_path):
     assert "below 3.92" in page  # (80 - 60.375) / 5 = 3.925
 
 
+@pytest.mark.slow
 def test_two_factors_of_a_grid_have_heat_maps_and_one_at_a_time_has_none(tmp_path, page, page_of_grid):
     assert page.count("Both factors") == 2 * 2  # cases and variants
     assert page_of_grid.count("Both factors") == 2
     assert "Both factors" not in render_study(make_study(tmp_path, factors=GRID, one_at_a_time=True))
 
 
+@pytest.mark.slow
 def test_every_case_has_a_row_for_each_variant(page, tmp_path):
     for case in ("crowd", "empty"):
         rows = re.search(rf'<th scope="rowgroup" colspan="9">{case}</th></tr>(.*?)</tbody>', page, re.DOTALL).group(1)
@@ -214,6 +224,7 @@ def test_curves_and_breaking_points_are_of_one_case_each(tmp_path, page_of_grid)
     assert "<td>crowd</td>" not in page_of_grid
 
 
+@pytest.mark.slow
 def test_text_of_the_user_is_escaped(tmp_path):
     page = render_study(make_study(tmp_path, description="<script>alert(1)</script>", command="a <b> & c"))
     assert "<script>alert" not in page
@@ -244,6 +255,7 @@ def test_a_frame_without_a_failure_is_no_worst_frame(tmp_path):
     assert worst_frames(dataclasses.replace(made, failures=made.failures.clear())) == []
 
 
+@pytest.mark.slow
 def test_failures_have_their_definition_and_the_worst_kinds_first(tmp_path):
     results = make_study(tmp_path)
     page = render_study(results)
@@ -256,6 +268,7 @@ def test_failures_have_their_definition_and_the_worst_kinds_first(tmp_path):
     assert float(dict(rows)["missed"]) == pytest.approx(100 * len(full) / frames, abs=0.05)
 
 
+@pytest.mark.slow
 def test_what_cost_the_score_stands_on_the_page(tmp_path):
     results = make_study(tmp_path)
     assert "--blame 10</pre>" in render_study(results)

@@ -98,6 +98,7 @@ class TestScenes:
 
 
 class TestVisibility:
+    @pytest.mark.slow
     def test_agrees_with_points_along_every_ray(self, pool):
         scenes = standing_scenes(Volume.box(3, 3), pool, people=4, spacing=1.0, repeats=2)
         table = Box((0.3, -0.5, 0.4), (0.6, 0.35, 0.4), yaw=0.6)

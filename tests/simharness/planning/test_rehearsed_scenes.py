@@ -68,6 +68,7 @@ def test_the_world_may_be_moved_with_its_rig_and_volume(scene):
     assert moved.scores[Condition(WHOLE)].pcp > 95
 
 
+@pytest.mark.slow
 def test_an_obstacle_before_two_cameras_costs_what_their_failure_does():
     walls = []
     for camera in list(read_rig("ring5"))[:2]:

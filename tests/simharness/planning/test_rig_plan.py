@@ -169,6 +169,7 @@ def test_usual_rigs_hang_where_cameras_may(make: Any) -> None:
     assert all(lab.may_hang(lab.mounts[each.mount], np.array(each.place)) for each in rig)
 
 
+@pytest.mark.slow
 def test_nobody_visible() -> None:
     low = [{"center": (0.0, 0.0), "size": (3.4, 3.4, 0.2), "base": 2.2}]
     walls = [
@@ -195,6 +196,7 @@ def test_command_line_reports_mistakes(tmp_path: Path) -> None:
         assert message in " ".join(result.stderr.split())
 
 
+@pytest.mark.slow
 def test_the_key_of_a_drawing_names_only_what_is_drawn() -> None:
     empty, lab = render_preview(small_room()), render_preview(read_room("lab"))
     for word in ("Blue", "Green", "Grey", "Yellow", "Orange", "Violet"):

@@ -109,6 +109,7 @@ class TestDrawn:
             correlation = (rest[:-lag] * rest[lag:]).mean()
             assert correlation == pytest.approx(0.7 * np.exp(-lag * STEP / 0.4), abs=0.02)
 
+    @pytest.mark.slow
     def test_gaps_between_frames_count_as_they_last(self, still):
         joints = still[0][:1000]
         time = STEP * (np.arange(1000) + 100 * (np.arange(1000) // 2))  # pairs of frames, 4 s apart
@@ -201,12 +202,14 @@ class TestFitted:
         assert annotation.life == pytest.approx(0.2, abs=0.08)
         assert annotation.noise == pytest.approx(0.2, abs=0.15)
 
+    @pytest.mark.slow
     def test_an_exact_truth_has_small_errors(self, filmed):
         recordings = [filmed.recording(seed=seed, keypoints={"scatter": 0.3}) for seed in (1, 2)]
         fitted = fitted_annotation(recordings[0], recordings[1:])
         assert np.abs(fitted.annotation.shift[:, LIMBS]).max() < 0.01
         assert fitted.annotation.deviation[:, LIMBS].mean() < 0.008
 
+    @pytest.mark.slow
     def test_actors_who_are_never_annotated_have_the_usual_errors(self, known, exact):
         def with_another(recording):
             recording = recording.during(np.arange(80))
@@ -220,6 +223,7 @@ class TestFitted:
         assert np.isfinite(fitted.annotation.shift).all()
         assert 0.01 < fitted.annotation.deviation[3].mean() < 0.03
 
+    @pytest.mark.slow
     def test_an_unannotated_recording_has_an_exact_annotation(self, filmed):
         recording = filmed.recording().during(np.arange(60))
         recording = replace(recording, truth=np.full(recording.truth.shape, np.nan))

@@ -102,6 +102,7 @@ def test_short_gaps_are_filled_along_the_movement(filmed):
     assert np.median(away) < 0.05
 
 
+@pytest.mark.slow
 def test_people_who_leave_and_come_back_are_absent_in_between_and_keep_their_actor(filmed):
     """Actor 1 is away for 2 s, twice as long as a gap that is filled."""
     recording = filmed.recording()
@@ -145,6 +146,7 @@ def test_gaps_between_frames_are_not_bridged(filmed):
     np.testing.assert_allclose(tracks.joints[:80], whole.joints[:, order], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_actors_without_any_estimate_are_taken_from_the_annotation(filmed):
     """Nobody detects actor 0: the person is where the annotation is, and hides others all the same."""
     recording = filmed.recording()

@@ -346,6 +346,7 @@ class TestNames:
             read_recording(tmp_path / "hall.toml")
 
 
+@pytest.mark.slow
 def test_campus_with_detections_of_a_top_down_detector(shared_data, tmp_path):
     """The published calibration, with truth and detections in the layout of the published files."""
     from scipy.io import savemat

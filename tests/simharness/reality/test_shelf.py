@@ -59,6 +59,7 @@ def test_detections_and_truth_belong_to_the_same_frames(shelf):
     np.testing.assert_allclose(medians, [16.1, 8.6, 8.8, 11.1, 12.3], atol=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("head", "actors", "average"),
     [("voxelpose", (99.5, 93.5, 98.5), 97.2), ("2019", (98.5, 91.9, 98.6), 96.3)],

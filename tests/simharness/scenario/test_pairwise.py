@@ -16,6 +16,7 @@ def pairs(combinations):
     return {pair for each in combinations for pair in itertools.combinations(enumerate(each), 2)}
 
 
+@pytest.mark.slow
 @hypothesis.settings(deadline=None, max_examples=30)
 @hypothesis.given(st.lists(st.integers(1, 5), max_size=6).map(tuple))
 def test_every_pair_of_values_occurs_in_no_more_settings_than_there_are_combinations(sizes):

@@ -220,6 +220,7 @@ class TestPairing:
         assert before == after
         assert len(before) > 10
 
+    @pytest.mark.slow
     def test_pictures_that_arrive_are_seen_alike_however_many_others_are_dropped(self):
         few, many = (see(setting("sync", {"faults.dropped": share})) for share in (0.1, 0.4))
         assert many.real == {key: few.real[key] for key in many.real}
@@ -233,6 +234,7 @@ class TestPairing:
             assert np.array_equal(before.truth.pixels, after.truth.pixels)
             assert np.array_equal(before.truth.visibility, after.truth.visibility)
 
+    @pytest.mark.slow
     def test_detectors_look_at_the_same_people_among_the_same_things(self):
         good, bad = (see(setting("detector", {"detector.profile": profile})) for profile in ("perfect", "poor"))
         assert np.array_equal(good.sequence.joints, bad.sequence.joints)

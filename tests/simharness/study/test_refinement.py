@@ -57,6 +57,7 @@ def points(results):
     return factor.values, factor_breaking_points(factor, ["full"], "pcp", 90.0)[0].point
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("one", [True, False])
 def test_values_are_added_where_the_score_breaks(tmp_path, study_at, one):
     swept, point = points(run_study(study_at(0, one=one), out=tmp_path / "plain", measure=Knee()))

@@ -114,6 +114,7 @@ def test_a_changed_score_is_computed_without_simulation(run, stages, code, monke
     assert (again.info["kept"], again.info["run"]) == (3, 0)
 
 
+@pytest.mark.slow
 def test_unchanged_code_scores_stored_estimates_as_it_scored_them_fresh(run, stages, code):
     before = run()
     calls(stages)
@@ -127,6 +128,7 @@ def test_unchanged_code_scores_stored_estimates_as_it_scored_them_fresh(run, sta
         assert getattr(after, table).equals(getattr(before, table))
 
 
+@pytest.mark.slow
 def test_a_changed_method_estimates_anew_from_the_stored_detections(run, stages, code):
     before = run()
     calls(stages)
@@ -152,6 +154,7 @@ def test_changed_simulation_or_lost_detections_run_everything_again(run, stages,
     assert calls(stages)["capture_trial"] == 3
 
 
+@pytest.mark.slow
 def test_an_entry_knows_its_state(run, code, tmp_path):
     run()
     study = load_study(QUICKSTART, overrides=CHEAP, seeds=1, variants=["full"])

@@ -106,6 +106,7 @@ class TestClusters:
         assert len(again) == 1
         assert times(fake.calls) == {0: 2, 1: 2, 2: 3 + 2, 3: 1, 4: 1}
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://x"])
     def test_a_missing_scheduler_is_reported(self, tmp_path, monkeypatch, address):
         monkeypatch.setattr(scheduling, "_PATIENCE", 0.5)

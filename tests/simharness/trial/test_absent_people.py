@@ -54,6 +54,7 @@ def captured(trial):
     return capture_trial(trial, Stages(Silence()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("renderer", ["rays", "raster"])
 def test_views_without_an_absent_person_are_those_of_a_scene_without_the_person(renderer):
     one, two = trial_of(1, renderer), trial_of(2, renderer)

@@ -67,6 +67,7 @@ def test_reconstruction_alone_is_compiled_for_what_the_method_gives_it():
     subprocess.run([sys.executable, "-c", RECONSTRUCTION], check=True, cwd=Path(__file__).parent)
 
 
+@pytest.mark.slow
 def test_a_failed_compilation_does_not_end_the_run():
     compilation = Compilation(["no such preset"])
     compilation.start()

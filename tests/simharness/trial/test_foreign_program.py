@@ -53,6 +53,7 @@ def shell(text, **bounds):
     return ForeignProgram(["/bin/sh", "-c", f"echo $$ >> pids; {text}"], **bounds)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -126,6 +127,7 @@ def test_an_estimate_is_that_of_the_answer():
     np.testing.assert_allclose(request["keypoints"], np.nan_to_num(SEEN.keypoints), atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_it_ends_with_the_process_that_started_it(number, tmp_path):
     text = (
@@ -140,6 +142,7 @@ def test_it_ends_with_the_process_that_started_it(number, tmp_path):
         parent.kill()
 
 
+@pytest.mark.slow
 def test_a_command_ends_with_one_line_and_exit_code_3():
     Path("wrapped.py").write_text(
         "from simharness import ForeignProgram\n"

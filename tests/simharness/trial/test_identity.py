@@ -188,6 +188,7 @@ class TestCode:
                 file.write_bytes(content)
                 os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("file", "counts"),
         [

@@ -110,6 +110,7 @@ def test_another_seed_gives_other_detections(done, tmp_path):
     assert (again / "detections.npz").read_bytes() != (done / "detections.npz").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sections", "people"),
     [
@@ -133,6 +134,7 @@ def test_a_run_without_people_or_detections_is_valid(tmp_path, sections, people)
     assert "<svg" in (folder / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stage", ["simulate", "CaptureFrames", "detect", "assess", "write_run"])
 def test_a_stage_that_fails_leaves_no_result(tmp_path, monkeypatch, stage):
     def broken(*_args, **_options):
@@ -201,6 +203,7 @@ class TestScoring:
         assert running.score_table({"full": VariantScores(score_frames(np.zeros((0, 0, 17, 3)), []))}).height == 0
 
 
+@pytest.mark.slow
 def test_without_colour_there_is_no_film_and_the_same_detections(tmp_path, done):
     folder = run(tiny(rendering=RenderingSection(color=False)), out=tmp_path)
     assert {path.name for path in folder.iterdir()} == FILES - {"film.mp4"}

@@ -124,6 +124,7 @@ def test_a_study_does_not_depend_on_the_number_of_workers(tmp_path):
         assert without_times(getattr(one, table)).equals(without_times(getattr(two, table)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("more", "filmed"),
     [

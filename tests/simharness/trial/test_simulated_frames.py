@@ -6,6 +6,7 @@ import weakref
 from dataclasses import fields
 
 import numpy as np
+import pytest
 
 import simharness
 from simharness.trial.stages.build_trial import build_trial
@@ -37,6 +38,7 @@ def test_frames_have_the_bytes_of_the_whole_recording():
         assert frame.pictures == ()
 
 
+@pytest.mark.slow
 def test_pictures_are_those_of_the_cameras_and_are_not_kept():
     scenario = simharness.load_scenario("quickstart", overrides=[*KEYS, "faults.dropped=0.3"], seed=3)
     trial = build_trial(scenario)

@@ -50,6 +50,7 @@ def test_no_camera_without_a_picture_has_detections(trial):
         assert np.isfinite(frame.detections.time[frame.detections.view]).all()
 
 
+@pytest.mark.slow
 def test_free_running_cameras_are_tracked_at_their_times(trial):
     result = trial('cameras.trigger="free"', "duration=1.5", "rate=25")
     offset = result.trial.exposures.known_time - result.recording.time[:, None]
@@ -61,6 +62,7 @@ def test_free_running_cameras_are_tracked_at_their_times(trial):
     assert scores[0]["mpjpe_mm"] < scores[1]["mpjpe_mm"] + 5
 
 
+@pytest.mark.slow
 def test_the_readout_of_a_rolling_shutter_helps_trackers_only(trial):
     runners = ('people.activities=["run"]', "duration=2.0", "rate=25", "faults.rolling_shutter=0.03")
     result = trial(*runners, 'detector.profile="perfect"')

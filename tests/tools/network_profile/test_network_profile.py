@@ -86,6 +86,7 @@ def test_a_known_bias_is_found(known):
     np.testing.assert_allclose(bias[KINDS.index("elbows")], 0.0, atol=0.006)
 
 
+@pytest.mark.slow
 def test_known_parameters_are_found_against_exact_truth(known):
     """Sampling errors: of 20,000 joints and 2,000 people, whose errors last for one frame."""
     labels = labels_of(known, measure_bias(known, [each.found for each in known]))
@@ -181,6 +182,7 @@ def _gross_hidden(labels):
     return (judged & ~np.isin(labels.error, (KeypointError.GOOD, KeypointError.JITTER))).sum() / judged.sum()
 
 
+@pytest.mark.slow
 def test_a_profile_is_read_back(known, tmp_path, monkeypatch):
     profile = fit_network(known, name="known", rounds=0)
     monkeypatch.chdir(tmp_path)

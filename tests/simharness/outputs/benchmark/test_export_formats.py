@@ -126,6 +126,7 @@ def test_feet_are_written_where_they_are_detected(name):
     np.testing.assert_allclose(written["mid_hip"][:2], middle)
 
 
+@pytest.mark.slow
 def test_an_export_holds_the_feet_that_its_detector_reports(tmp_path, scenario):
     plan = ExportPlan(tmp_path / "feet", pictures=False)
     folder = export_sequence(scenario(detector=DetectorSection(skeleton="halpe26")), plan)

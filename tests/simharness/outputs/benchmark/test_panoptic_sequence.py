@@ -259,6 +259,7 @@ def test_swapped_and_dead_cameras_and_clocks_are_in_the_manifest(scenario, tmp_p
         assert np.linalg.norm(content["cameras"][view]["drift"]["turn"]) > 0
 
 
+@pytest.mark.slow
 def test_repeated_pictures_are_in_the_manifest(scenario, tmp_path):
     made, content = exported(scenario(faults=FaultsSection(frozen=1.0)), tmp_path / "tiny")
     for camera in content["cameras"]:

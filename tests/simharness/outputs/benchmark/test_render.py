@@ -10,6 +10,8 @@ from simharness.scenario.sections.people_section import PeopleSection
 from simharness.scenario.sections.room_section import ClutterSection
 from simharness.scenario.sections.scenario import Scenario
 
+pytestmark = pytest.mark.slow
+
 
 def tiny(**sections) -> Scenario:
     defaults = {

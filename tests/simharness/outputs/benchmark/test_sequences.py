@@ -15,6 +15,8 @@ from simharness.outputs.benchmark.sequences import SPLITS, export_benchmark
 from simharness.scenario.load import load
 from simharness.types.views import Visibility
 
+pytestmark = pytest.mark.slow
+
 TINY = (
     *("people.count=2", "cameras.count=3", "duration=0.2", "clutter.shelves=0", "clutter.boxes=1"),
     *("cameras.size=[160, 120]", "room.walls=false"),
@@ -47,7 +49,6 @@ def contents(folder):
     return {each.relative_to(folder).as_posix(): each.read_bytes() for each in files}
 
 
-@pytest.mark.slow
 def test_a_sequence_is_that_of_its_seed_alone(benchmark, scenario, tmp_path):
     alone = export_sequence(scenario.model_copy(update={"seed": 8}), PLAN(tmp_path / "alone"))
     assert contents(alone) == contents(benchmark / "quickstart_0008")

@@ -108,6 +108,7 @@ def test_a_folder_without_truth_is_refused(people, tmp_path):
         score_submission(written(people, tmp_path), tmp_path / "other")
 
 
+@pytest.mark.slow
 def test_a_benchmark_is_scored_by_split(trial, exported, people, tmp_path):
     benchmark = tmp_path / "benchmark"
     export_benchmark(trial.scenario, benchmark, BARE, sequences=2)

@@ -37,6 +37,7 @@ def test_wrong_distortion_is_seen_in_the_residuals():
     assert np.nanmax(np.abs(found.predicted - keypoints)) > 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("views", [3, 5])
 def test_noise_of_predictions_is_that_of_repeated_draws(views):
     """Residuals from the other views have the variance (1 + noise) sigma²."""

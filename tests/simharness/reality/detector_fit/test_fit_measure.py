@@ -21,6 +21,8 @@ from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.profile import as_toml, settings
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, DetectorSection
 
+pytestmark = pytest.mark.slow
+
 LIMB_KINDS = KINDS[3:]
 EARS = [0.3, 0.1, 0.05, 0.05, 0.05, 0.08, 0.1, 0.6, 0.95, 0.97, 0.97, 0.8]
 NOSE = [0.02, 0.02, 0.05, 0.05, 0.1, 0.3, 0.9, 0.3, 0.1, 0.05, 0.05, 0.02]

@@ -103,6 +103,7 @@ def measured_of(parameters, seed):
     return {**result, **dict.fromkeys(OF, unused)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "true",
     [(0.0002, 0.002, 60.0, 50.0), (0.01, 0.02, 4.0, 10.0), (0.05, 0.08, 1.0, 2.0)],

@@ -112,6 +112,7 @@ class TestBones:
         assert np.isnan(bone_variation(np.full((5, 2, 2, 4), np.nan))).all()
 
 
+@pytest.mark.slow
 def test_shelf_has_the_measured_facts(shared_data):
     """Shelf's detections: bottom-up tree, ears, bones and ambiguity, as measured independently."""
     values = measure_detections(annotated(read_recording("shelf", shared_data / "shelf"))).values()

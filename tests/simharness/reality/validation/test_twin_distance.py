@@ -34,6 +34,7 @@ def test_a_further_twin_is_noticed_as_often_as_promised(twins):
     assert np.mean(np.array(chances) < 0.5) == pytest.approx(0.5, abs=0.1)
 
 
+@pytest.mark.slow
 def test_wrong_twins_are_noticed():
     rng = np.random.default_rng(0)
     noticed = []

@@ -71,6 +71,7 @@ def test_the_json_has_the_documented_keys(summary):
     assert sum(summary["counts"].values()) == len(names)
 
 
+@pytest.mark.slow
 def test_a_recording_is_its_own_twin(recorded):
     own = validate(recorded, [recorded] * 4, plan=PLAN)
     apart = [each for each in own.verdicts if np.isfinite(each.real) and each.difference != pytest.approx(0, abs=1e-9)]
@@ -83,6 +84,7 @@ def test_a_recording_is_its_own_twin(recorded):
     assert own.distance.value == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_skill_is_against_the_rivals_that_are_given(recorded):
     worse = filmed(noise=25.0, seed=3)
     twins = [filmed(seed=seed) for seed in (1, 2)]
@@ -122,6 +124,7 @@ def test_twins_in_which_nobody_is_found_are_refused(recorded):
         validate(recorded, [silent], plan=PLAN)
 
 
+@pytest.mark.slow
 def test_every_verdict_is_in_the_tables_of_the_page(validation):
     made = provenance(command="simharness validate", seeds=range(TWINS), variants=PLAN.variants, seconds=1.0)
     page = render_validation(validation, provenance=made)

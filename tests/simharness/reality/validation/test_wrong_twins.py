@@ -48,6 +48,7 @@ def test_right_twins_are_not(power):
     assert found.fails == 0
 
 
+@pytest.mark.slow
 def test_distances_from_some_twins_are_those_of_their_own_comparison(power):
     figures = compare_whole(power.real, [*power.right, *power.others]).figures
     alone = compare_whole(power.real, power.right).distance

@@ -72,6 +72,7 @@ def people():
     ]
 
 
+@pytest.mark.slow
 def test_accessories_have_their_shares():
     """Of 2,000 people, within three standard deviations; the shares are those of the module's sources."""
     for sex, glasses, backpack, shoulder in (("female", 0.52, 0.08, 0.20), ("male", 0.42, 0.12, 0.10)):

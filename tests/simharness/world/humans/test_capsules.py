@@ -127,6 +127,7 @@ def from_the_capsules(name):
     return cKDTree(on_skin(body, 60_000)).query(on_capsules(*placed(body, fitted(name))))[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distances", [from_the_skin, from_the_capsules])
 def test_skin_and_capsules_differ_little(name, distances):
     """Mean within 1 cm, 95 % within 2 cm; more for skirts and long hair, which are not shaped like capsules."""

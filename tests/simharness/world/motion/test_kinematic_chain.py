@@ -30,6 +30,7 @@ def posed(kinematics, **angles):
     return data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_trunk_and_arm_agree_with_mujoco(kinematics, side):
     trunk, arm = kinematics.trunks[side], kinematics.arms[side]

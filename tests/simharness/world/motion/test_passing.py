@@ -52,6 +52,7 @@ def test_people_who_pass_change_sides():
     assert np.corrcoef(*along)[0, 1] < -0.95
 
 
+@pytest.mark.slow
 def test_eight_people_are_two_ranks_that_go_through_each_other():
     _, cast, performance = played("cross", 8, group=8, passing=0.5)
     assert penetration(cast, performance.motions, TIME[::12]).max() < 0.02

@@ -24,6 +24,8 @@ from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop, Spot, make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
 
+pytestmark = pytest.mark.slow
+
 ACTIVITIES = ("walk", "reach", "squat", "turn", "talk", "dance")
 RATE, DURATION = 25.0, 3.0
 TIME = np.arange(0.0, DURATION, 1 / RATE)
@@ -163,7 +165,6 @@ def test_a_moved_recording_gives_the_moved_motion(recorded, person):
     np.testing.assert_allclose(moved.angles, still.angles, atol=0.02)
 
 
-@pytest.mark.slow
 def test_the_rate_of_the_recording_does_not_matter(recorded):
     joints = np.stack([record(name, k, rate=50.0)[1] for k, name in enumerate(ACTIVITIES)], axis=1)
     for person, mover in enumerate(recorded.cast):
@@ -192,7 +193,6 @@ class TestScenario:
 
         return partial(plan, recorded.tracks.joints)
 
-    @pytest.mark.slow
     def test_people_perform_their_tracks_from_the_start_on(self, recorded, planned):
         plan = planned(start=1.0)
         assert plan.props == ()

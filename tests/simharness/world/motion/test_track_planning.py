@@ -24,6 +24,7 @@ def apart(tracks, wishes, *, span, step=1 / 50):
     return least, np.abs(ways).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(
     ("wishes", "area", "spacing"),
@@ -48,6 +49,7 @@ def test_everyone_is_apart_and_inside_at_all_times(seed, wishes, area, spacing):
             assert track.speed <= wish.fastest
 
 
+@pytest.mark.slow
 def test_ten_minutes_of_twenty_people_are_planned():
     wishes = [WALK, STAND] * 10
     tracks = plan_tracks(0, wishes, area=4.0, spacing=0.8, span=(-1.0, 601.0))

@@ -115,6 +115,7 @@ def test_the_method_agrees_with_the_truth(camera):
     np.testing.assert_allclose(camera.rays(true)[imaged], rays[imaged], atol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("renderer", ["rays", "raster"])
 def test_a_simulation_never_asks_the_method_where_a_point_is(monkeypatch, renderer):
     changes = ["duration=0.2", "people.count=3", "cameras.count=3", "cameras.size=[160, 120]", "clutter.boxes=2"]
@@ -132,6 +133,7 @@ def test_a_simulation_never_asks_the_method_where_a_point_is(monkeypatch, render
     assert sum(map(len, before.detections)) > 0
 
 
+@pytest.mark.slow
 def test_the_simulation_does_not_use_the_projection_of_the_method():
     """World, capture and detector take numbers from cameras; what these compute would share the method's faults."""
     folder = Path(simharness.__file__).parent

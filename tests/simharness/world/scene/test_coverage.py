@@ -21,6 +21,7 @@ def measured(free, solids) -> float:
     return hidden / count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("requested", [0.1, 0.25, 0.4])
 @pytest.mark.parametrize("seed", range(2))
 def test_the_requested_share_is_occluded(requested, seed):
@@ -29,6 +30,7 @@ def test_the_requested_share_is_occluded(requested, seed):
     assert measured(free, solids) == pytest.approx(requested, abs=0.05)
 
 
+@pytest.mark.slow
 def test_requested_objects_and_moving_carts_count():
     free = space(seed=3, duration=10.0)
     requested = ClutterSection(boxes=3, shelves=1, carts=1, coverage=0.3)
@@ -39,6 +41,7 @@ def test_requested_objects_and_moving_carts_count():
     assert lines_in(free).hidden(solids).mean() == pytest.approx(measured(free, solids), abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_larger_share_adds_to_the_same_objects():
     free = space(seed=1)
     less, more = (place_clutter(1, ClutterSection(coverage=share), free) for share in (0.2, 0.35))

@@ -32,6 +32,7 @@ def furnished(kind, *, size=(7.0, 7.0, 3.0), people=3, area=1.8, seed=1):
     return room, free, openings, place_furniture(seed, free, openings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("size", "people", "area"), [((5.0, 5.5, 2.7), 1, 1.0), ((9.0, 7.0, 3.2), 8, 2.0)])
 @pytest.mark.parametrize("kind", KINDS)
 def test_furniture_leaves_people_cameras_and_openings_free(kind, size, people, area):
@@ -51,6 +52,7 @@ def test_furniture_leaves_people_cameras_and_openings_free(kind, size, people, a
         assert not free.obstructed(solid.hull)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_rays_hit_what_pictures_show(kind):
     """The first triangle of a mesh on the way of a ray is where MuJoCo's ray hits a geom."""
@@ -75,6 +77,7 @@ def first_hit(start, end, triangles):
     return t[hit].min(initial=np.inf)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", list(room_kinds()))
 def test_fittings_lie_nearer_to_the_walls_than_any_camera(kind):
     room, _, openings, furniture = furnished(kind)
@@ -153,6 +156,7 @@ def test_scenarios_with_kinds_are_read():
     assert not load("quickstart", overrides=["room.kind=outdoors"]).room.walls
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_truth_fits_the_pictures_of_each_kind(kind):
     scenario = Scenario(

@@ -141,6 +141,7 @@ class TestInPictures:
         both = (by_rays & by_picture).sum()
         assert both >= 0.9 * (by_rays | by_picture).sum()
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", ["poster", "mannequin", "coat stand", "mirror"])
     def test_there_is_something_of_every_kind_to_be_seen(self, kind):
         for k in (0, 1):

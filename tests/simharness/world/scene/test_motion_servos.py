@@ -93,6 +93,7 @@ def test_assistance_above_the_weight_carries_a_person():
     assert misplaced(plan, let_go).max() > 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kinematics", [MAN, WOMAN, CHILD], ids=["man", "woman", "child"])
 def test_free_walking_follows_the_plan(kinematics):
     plan = walking(kinematics, duration=3.0)
@@ -124,6 +125,7 @@ def test_assistance_stays_within_its_bound():
     assert max(forces) == pytest.approx(150.0)  # the bound is reached
 
 
+@pytest.mark.slow
 def test_a_push_displaces_and_a_small_one_is_recovered_from():
     plan = walking(MAN, duration=3.0)
     scene = room([MAN])
@@ -211,6 +213,7 @@ def test_nobody_is_pushed_by_an_impulse_of_zero():
     np.testing.assert_array_equal(one.angles, other.angles)
 
 
+@pytest.mark.slow
 def test_people_whose_plans_intersect_collide():
     cast = [MAN, WOMAN]
     plans = [walking(MAN, start=(0.0, -1.2)), walking(WOMAN, start=(0.1, 1.2), ahead=-1.0, seed=2)]
@@ -263,6 +266,7 @@ def test_model_and_plan_are_unchanged_and_results_repeat():
     np.testing.assert_array_equal(scene.geom_size, before[2])
 
 
+@pytest.mark.slow
 def test_the_duration_does_not_change_earlier_frames():
     long, scene = walking(MAN, duration=3.0), room([MAN])
     short = Motion(long.time[:150], long.root[:150], long.angles[:150])

@@ -128,6 +128,7 @@ def test_ground_goes_on_without_a_gap_to_the_meadow(far_rig):
     np.testing.assert_allclose(ground.mesh.texture, floor.mesh.texture)
 
 
+@pytest.mark.slow
 def test_the_panorama_repeats_by_its_seed_and_shows_ground_below_the_horizon_and_sky_above():
     weather = replace(WEATHERS["side"], bearing=0.4)
     one = read_panorama(4, "side", 0.4)

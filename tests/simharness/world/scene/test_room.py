@@ -103,6 +103,7 @@ def test_a_finish_changes_only_its_surface():
     np.testing.assert_array_equal(one["wall +x"].mesh.texture, three["wall +x"].mesh.texture)
 
 
+@pytest.mark.slow
 def test_any_draws_each_finish():
     floors, walls = set(), set()
     for seed in range(5):

@@ -49,6 +49,7 @@ def test_a_scene_after_others_and_after_their_trials_is_that_of_a_new_process(no
         np.testing.assert_array_equal(first, second)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("other", ["seed=4", "people.look_alike=1.0", "people.children=1.0"])
 def test_other_people_are_not_taken_for_these(nobody_made, other):
     here, there = built("seed=3"), built("seed=3", other)
