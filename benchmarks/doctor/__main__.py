@@ -41,7 +41,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         results = read_results(options.trials)
         print_report(results)
         if options.out is not None:
+            from benchmarks.doctor.confusion_page import write_page  # needs the extra mvpose[recordings]
+
             write_report(results, options.out)
+            write_page(options.out)
     return int(failed > 0)
 
 

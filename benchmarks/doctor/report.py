@@ -118,7 +118,7 @@ def print_report(results: Results) -> None:
 
 
 def write_report(results: Results, folder: Path) -> None:
-    """Write bounds, confusion matrix and misses into a folder: ``doctor.json``, ``doctor.md``, ``confusion.html``."""
+    """Write bounds, confusion matrix and misses into a folder: ``doctor.json`` and ``doctor.md``."""
     folder.mkdir(parents=True, exist_ok=True)
     rows, matrix, misses = rows_of(results), confusion_of(results), misses_of(results)
     summary = {
@@ -128,9 +128,6 @@ def write_report(results: Results, folder: Path) -> None:
     }
     (folder / "doctor.json").write_text(json.dumps(summary, indent=1) + "\n")
     (folder / "doctor.md").write_text(_markdown(rows, matrix, misses))
-    from benchmarks.doctor.confusion_page import write_page  # needs the extra mvpose[recordings]
-
-    write_page(folder)
 
 
 def _share(

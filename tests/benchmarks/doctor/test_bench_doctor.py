@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.doctor import faults, runner
+from benchmarks.doctor.confusion_page import write_page
 from benchmarks.doctor.experiments import TrialKey, trials, true_corrections
 from benchmarks.doctor.measures import aligned, camera_errors
 from benchmarks.doctor.recordings import BenchRecording, Recordings, write
@@ -120,8 +121,26 @@ def test_tables_count_alarms_by_fault_and_list_what_was_missed(tmp_path):
     missed = [line.split(":")[0] for line in misses_of(results)]
     assert missed == ["clean/rig01//0", "faults/rig01/x/0, camera 2", "refusals/rig01/two cameras/0"]
     write_report(results, tmp_path)
+    write_page(tmp_path)
+    assert all(fault in (tmp_path / "confusion.html").read_text() for fault in confusion_of(results))
     assert all(line in (tmp_path / "doctor.md").read_text() for line in misses_of(results))
     assert json.loads((tmp_path / "doctor.json").read_text())["misses"] == misses_of(results)
+
+
+def test_a_turned_camera_may_be_unsure_but_not_fine():
+    verdicts = ("faults", "cannot tell", "fine", "faults")  # the last of another camera
+    results = {
+        f"turned/rig00/1/{draw}": {"view": 1, "verdict": verdict, "findings": [], "named": draw == 0}
+        for draw, verdict in enumerate(verdicts)
+    }
+    assert [line.split(",")[0] for line in misses_of(results)] == ["turned/rig00/1/2", "turned/rig00/1/3"]
+    named, fine = rows_of(results)
+    assert named.what == "one camera turned by 1 degree: named"
+    assert (named.measured, named.met) == ("25.0 %", None)
+    assert (fine.measured, fine.met) == ("25.0 %", False)
+    smaller = {key.replace("/1/", "/0.5/"): result for key, result in results.items()}
+    assert [row.met for row in rows_of(smaller)] == [None, None]
+    assert list(confusion_of(smaller)) == ["one camera turned by 0.5 degrees"]
 
 
 def test_true_corrections_turn_the_believed_rig_into_the_true_one(recording):
