@@ -17,7 +17,7 @@ PROJECTS := pyproject.toml mvpose/pyproject.toml tools/build_backend.py
 demo: $(RUN)
 	$(BIN)/simharness run quickstart
 
-# Those marked `slow`, one in twenty, take two thirds of the time of all; CI runs both parts.
+# Those marked `slow`, one in nine, take four fifths of the time of all; CI runs both parts.
 test: $(DEV)
 	$(BIN)/python -m pytest --numprocesses auto --dist worksteal -m "not slow"
 
