@@ -132,7 +132,11 @@ def _write_page(
 
 def _lines(diagnosis: "Diagnosis", mends: str) -> list[str]:
     """Return the diagnosis for a reader: the verdict, findings with what mends them, and the numbers."""
+    from mvpose.report.verdict import sentence
+
     lines = [f"verdict: {diagnosis.verdict}"]
+    if diagnosis.verdict == "fine":
+        lines.append(f"  {sentence(diagnosis)}")
     for finding in diagnosis.findings:
         lines.append(f"{_MARKS[finding.severity]} {finding.text}")
         lines += [f"    {line}" for line in finding.mend.splitlines()]

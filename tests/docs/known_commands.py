@@ -66,8 +66,8 @@ SHELF = (
 OWN_RECORDING = "simharness evaluate hall.toml"
 FROM_PICTURES = (  # run by tests/benchmarks/pictures and tests/simharness/reality/test_people_evaluation.py
     "cd benchmark/gathering",
-    "mvpose run calibration_believed_gathering.json hdImgs --fps 10 --out results",
-    "simharness evaluate poses . results",
+    "mvpose run calibration_believed_gathering.json hdImgs --fps 10 --out people",
+    "simharness evaluate poses . people",
     "simharness evaluate poses RECORDING RESULTS",
 )
 OWN_STUDY = {
@@ -114,9 +114,9 @@ MAKE = (
 CI = ".ci/run"
 PYTEST = ('pytest -m "not slow"', "pytest tests/simharness/detector")
 MVPOSE = (  # run by tests/mvpose/cli
-    "mvpose estimate CALIBRATION DETECTIONS --out results",
-    "mvpose estimate CALIBRATION DETECTIONS --sync --out results",
-    "mvpose estimate CALIBRATION DETECTIONS --format trc,opensim,mot,angles --out results",
+    "mvpose estimate CALIBRATION DETECTIONS --out people",
+    "mvpose estimate CALIBRATION DETECTIONS --sync --out people",
+    "mvpose estimate CALIBRATION DETECTIONS --format trc,opensim,mot,angles --out people",
     "opensim-cmd run-tool person_3_scale.xml",  # tests/mvpose/formats/test_opensim_files.py
     "opensim-cmd run-tool person_3_ik.xml",
     "mvpose doctor CALIBRATION DETECTIONS",
@@ -125,10 +125,10 @@ MVPOSE = (  # run by tests/mvpose/cli
     "mvpose repair CALIBRATION DETECTIONS --mend inverted --mend unit:0.001@cam2 --free extrinsics "
     "--out mended/Calib.toml",
     "mvpose networks get movenet",
-    "mvpose run CALIBRATION VIDEO... --out results",
-    "mvpose run CALIBRATION VIDEO... --detector det.onnx --pose pose.onnx --out results",
+    "mvpose run CALIBRATION VIDEO... --out people",
+    "mvpose run CALIBRATION VIDEO... --detector det.onnx --pose pose.onnx --out people",
     "mvpose batch PROJECT",
-    "mvpose view results",
+    "mvpose view people",
 )
 SHELL = (". .venv/bin/activate",)
 MODULES = tuple(

@@ -30,16 +30,16 @@ detections = "{_SEQUENCE}/openpose"
 COMMANDS = {
     "simharness check ci --workers 2": "--baseline own.json --update-baseline --workers 1",
     "simharness export gathering benchmark": PICTURES.replace("duration=0.4", "duration=3"),
-    "mvpose estimate CALIBRATION DETECTIONS --out results": "--fps 5",
+    "simharness plan lab --cameras 5": "--scenes 0 --cameras 3",
+    "simharness rehearse ring5 --volume 6x6 --people 4": "--scenes 2 --people 2 --workers 1",
+    "mvpose estimate CALIBRATION DETECTIONS --out people": "--fps 5",
     "simharness score FILE benchmark/gathering": "",
     "mvpose doctor CALIBRATION DETECTIONS": "--fps 5",
     "mvpose batch PROJECT": "",
-    "simharness plan lab --cameras 5": "--scenes 0 --cameras 3",
-    "simharness rehearse ring5 --volume 6x6 --people 4": "--scenes 2 --people 2 --workers 1",
     "simharness study my-lab.toml --workers 2": f"{LAB} --seeds 1",
     "simharness run passage": ALONE["simharness run passage"],
 }
-GET, BY_A_NETWORK = "mvpose networks get movenet", "mvpose run CALIBRATION VIDEO... --out results"
+GET, BY_A_NETWORK = "mvpose networks get movenet", "mvpose run CALIBRATION VIDEO... --out people"
 # Of a checkout.
 ELSEWHERE = {
     "make demo",
@@ -53,7 +53,7 @@ ELSEWHERE = {
 GIVEN = {
     "CALIBRATION": _CALIBRATION,
     "DETECTIONS": f"{_SEQUENCE}/openpose",
-    "FILE": "results",
+    "FILE": "people",
     "PROJECT": "project.toml",
     "VIDEO...": f"{_SEQUENCE}/hdImgs",
 }
@@ -105,7 +105,7 @@ def test_the_commands(installed):
     printed = {command: installed.run(command, more) for command, more in COMMANDS.items()}
     assert "PCP" in printed["simharness score FILE benchmark/gathering"]
     assert "first" in printed["mvpose batch PROJECT"]
-    for made in ("results/recording.html", "results/runs/*/report.html", "results/studies/my-lab/report.html"):
+    for made in ("people/recording.html", "results/runs/*/report.html", "results/studies/my-lab/report.html"):
         assert list(installed.work.glob(made)), made
 
 

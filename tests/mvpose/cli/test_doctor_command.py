@@ -32,7 +32,8 @@ def call(tmp_path, monkeypatch):
     def run(findings, *options):
         def diagnose(rig, frames, *, period, up):
             got.update(rig=rig, frames=frames, period=period, up=up)
-            return Diagnosis.of_findings(findings, evidence=["3 frames"], cameras=NAMES, residuals=np.full(4, 2.5))
+            seen = {"cameras": NAMES, "residuals": np.full(4, 2.5), "within": {"degrees": 0.44, "metres": 0.051}}
+            return Diagnosis.of_findings(findings, evidence=["3 frames"], **seen)
 
         monkeypatch.setattr("mvpose.calibration.diagnose", diagnose)
         arguments = ["doctor", tmp_path / "Calib.toml", tmp_path / "openpose", *options]
@@ -52,6 +53,13 @@ def test_faults_are_named_with_what_mends_them(call, tmp_path):
     ]  # fmt: skip
     assert got["period"] == 0.02
     assert [len(frame) for frame in got["frames"]] == [8, 8, 8]
+
+
+def test_fine_says_what_it_excludes(call):
+    result, _ = call([])
+    assert result.stdout.splitlines()[:2] == [
+        "verdict: fine", "  Nothing is wrong with the cameras: none is off by more than 0.4 degrees or 5 cm."
+    ]  # fmt: skip
 
 
 def test_json_is_that_of_the_diagnosis(call):
