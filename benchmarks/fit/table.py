@@ -37,7 +37,7 @@ def inside(values: Mapping[str, float], *, level: float = 0.95) -> float:
     if not (np.isfinite(low) and np.isfinite(high)):
         return np.nan
     share = norm.ppf((1 + level) / 2) / norm.ppf(0.975)
-    if low > 0:
+    if min(low, fitted) > 0:  # profiles round tiny values to 0
         low, high = (fitted * (end / fitted) ** share for end in (low, high))
     else:
         low, high = (fitted + share * (end - fitted) for end in (low, high))

@@ -112,3 +112,9 @@ def test_other_detectors_are_predicted_out_of_sample():
 def test_constants_of_the_sensitivity_are_those_of_the_inference():
     assert all(hasattr(inference, name) for name in CONSTANTS)
     assert _times({"a": (1.0, 2.0), "b": 3}, 2.0) == {"a": (2.0, 4.0), "b": 6.0}
+
+
+def test_a_value_that_was_rounded_to_zero_has_an_interval():
+    values = {"true": 0.0, "fitted": 0.0, "low": 1e-10, "high": 3e-7}
+    assert inside(values, level=0.9) == 1.0
+    assert inside({**values, "true": 1e-3}, level=0.9) == 0.0
