@@ -251,6 +251,7 @@ def nonsense(draw):
     return Rig(cameras), view, keypoints, scores
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", SEEING)
 @settings(max_examples=25)
 @given(nonsense())

@@ -76,6 +76,7 @@ def test_a_pose_on_its_original_body_is_the_planned_pose():
         assert skin[:, 2].min() == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_poses_face_along_x_and_placed_bodies_have_the_given_position_and_direction():
     poses = plan_poses(5, frames=2, takes=1)
     assert len(poses) >= 2 * len(activities())

@@ -11,6 +11,7 @@ from tools.paper_tables import seed_scores
 CHEAP = ("rendering.renderer=rays", "duration=0.4", "rate=5", "people.count=2", "cameras.count=3")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", ["none", "64x48"])
 def test_heat_maps_reach_the_method(monkeypatch, size):
     scenario = load("quickstart", overrides=[*CHEAP, f"detector.heatmaps.size={size}", 'method.variants=["full"]'])

@@ -221,6 +221,7 @@ def of_case(study, case):
     return replace(study, trials=trials.with_columns(case=pl.lit("")), **kept)
 
 
+@pytest.mark.slow
 def test_each_case_breaks_by_itself(cases):
     numbers = digest(cases)
     assert list(numbers["by_case"]) == ["poor", "good"]

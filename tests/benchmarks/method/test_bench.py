@@ -285,6 +285,7 @@ def test_tables_fit_a_page_on_any_machine(factor):
     assert [max(map(len, text.splitlines())) <= WIDTH for text in texts] == [True] * 4
 
 
+@pytest.mark.slow
 def test_stages_and_curve_are_complete(tmp_path):
     file = tmp_path / "figures.json"
     assert main(["--quick", "--only", "stages", "curve", "--json", str(file)]) == 0
@@ -302,6 +303,7 @@ def test_stages_and_curve_are_complete(tmp_path):
         )
 
 
+@pytest.mark.slow
 def test_the_result_has_the_command_without_folders(tmp_path, capsys):
     file = tmp_path / "made" / "a name.json"
     options = ["--only", "reid", "published", "--quick", "--json"]
@@ -311,6 +313,7 @@ def test_the_result_has_the_command_without_folders(tmp_path, capsys):
     assert str(tmp_path) not in text
 
 
+@pytest.mark.slow
 def test_published_sizes_have_our_times_and_other_times_in_separate_columns(tmp_path):
     file = tmp_path / "figures.json"
     assert main(["--quick", "--only", "published", "reid", "--json", str(file)]) == 0

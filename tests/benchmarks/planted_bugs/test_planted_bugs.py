@@ -100,6 +100,7 @@ class TestNearTests:
         assert outcome.what.startswith(what)
         assert bool(outcome.what) == caught
 
+    @pytest.mark.slow
     def test_no_test_is_no_pass(self, tmp_path):
         (tmp_path / "test_none.py").write_text("")
         with pytest.raises(ValueError, match="no tests were run"):
@@ -132,6 +133,7 @@ def imported(file):
 
 
 class TestFirstStage:
+    @pytest.mark.slow
     def test_no_module_that_makes_detections_imports_a_later_stage(self):
         later = {each.removesuffix(".py").replace("/", ".") for each in AFTER_DETECTION}
         for each in AFTER_DETECTION:

@@ -119,6 +119,7 @@ def number(cell):
     return float(cell.split()[0].rstrip(","))
 
 
+@pytest.mark.slow
 def test_curves_are_at_the_figures():
     check_curves(curves(made()), made())
 

@@ -57,6 +57,7 @@ def test_ghosts_of_short_life_are_estimates_of_nobody_under_five_frames():
     assert short_ghosts(truth, frames) == 0.4
 
 
+@pytest.mark.slow
 def test_a_loss_keeps_the_first_frame_and_loses_its_share_of_the_pictures():
     given = recording(1000)
     left = Loss("half", chance=0.5).of(given, draw=0)

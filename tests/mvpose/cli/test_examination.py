@@ -84,6 +84,7 @@ class TestCommand:
         (line,) = verdicts(estimate(lab, "--no-page"))
         assert line.endswith("frames: Camera cam2 moved by 4 degrees. `mvpose doctor` says what mends it")
 
+    @pytest.mark.slow
     def test_a_failure_of_the_doctor_is_none_of_the_estimation(self, lab, monkeypatch):
         def broken(*_, **__):
             raise ZeroDivisionError("half way")

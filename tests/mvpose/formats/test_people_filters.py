@@ -58,6 +58,7 @@ def test_the_spline_that_is_chosen_is_near_the_best(frames, hertz):
     assert np.all(error(spline(noisy, times, 6.0)) < 1.3 * best)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["butterworth", "spline"])
 def test_noise_falls_and_slow_motion_stays(name):
     people, rng = swinging(0.5), np.random.default_rng(0)

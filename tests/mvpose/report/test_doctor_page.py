@@ -212,6 +212,7 @@ def page_of(folder, rig, sightings, findings, repair=None):
 
 
 class TestPage:
+    @pytest.mark.slow
     def test_residuals_are_those_of_the_diagnosis(self, tmp_path):
         """One quantity has one value, in the words of the doctor and in the table and the pictures of its page."""
         rig, own = ring(4), np.array([11.1, 22.2, 43.9, 14.4])

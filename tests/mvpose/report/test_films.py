@@ -83,6 +83,7 @@ def test_nothing_is_printed(tmp_path, capfd):
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("somebody", [True, False])
 def test_the_page_shows_the_films(tmp_path, somebody):
     rig, frames, people = recording(1, frames=2, cameras=2)

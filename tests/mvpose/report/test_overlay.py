@@ -181,6 +181,7 @@ def test_bad_mosaics_are_refused(pictures, titles, message):
         mosaic(pictures, titles)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(800, 600), (320, 240), (1600, 1200)])
 def test_a_legend_fits_its_picture(size):
     entries = [

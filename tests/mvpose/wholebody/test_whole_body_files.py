@@ -109,6 +109,7 @@ class TestCommand:
     def run(self, *arguments):
         return CliRunner().invoke(app, [str(each) for each in arguments])
 
+    @pytest.mark.slow
     def test_all_joints_come_out_and_those_of_the_body_are_the_same(self, tmp_path):
         skeleton = skeleton_by_name("halpe26")
         rig, joints, pixels = filmed(skeleton)

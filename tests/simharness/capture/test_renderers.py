@@ -232,6 +232,7 @@ def assert_agree(one, other, *, share=1e-4):
     assert np.median(apart) < 0.1 * MILLIMETRE
 
 
+@pytest.mark.slow
 def test_the_renderers_agree_on_a_crowd(raster, gl):
     scene = crowd(32)
     seen = set()

@@ -381,6 +381,7 @@ def test_regressions_come_whole_suite_first_and_worst_first():
     assert worse[0].loss > worse[-1].loss > 1
 
 
+@pytest.mark.slow
 def test_a_tolerance_of_zero_is_valid():
     strict = GateSection.model_validate({"tolerance": {"pcp": 0.0}})
     assert not regressions(lambda trial: {}, strict)

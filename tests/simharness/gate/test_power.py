@@ -71,6 +71,7 @@ def test_an_even_slowdown_of_seven_variants_is_seen_at_seven_seeds():
     assert slower[0].p == pytest.approx(2 * 2.0**-6)
 
 
+@pytest.mark.slow
 def test_changes_of_one_score_do_not_hide_those_of_another():
     """Six scores change at random in both variants and all cases; PCP in one case."""
 

@@ -242,6 +242,7 @@ def unfinished(tmp_path, monkeypatch):
 
 
 class TestInterruption:
+    @pytest.mark.slow
     def test_finished_trials_are_kept_until_the_suite_has_ended(self, tmp_path, unfinished):
         path, trials = tmp_path / "small.toml", load_study(tmp_path / "small.toml").trials
         stored = f"interrupted: 5 of {trials} trials are stored; the same command continues"

@@ -104,6 +104,7 @@ def test_every_score_that_a_variant_has_is_on_the_page():
     assert "All scores" not in render(make_record())
 
 
+@pytest.mark.slow
 def test_nobody_misses_people_who_are_absent():
     record = make_record(absent=1)
     assert np.isnan(joint_errors(record, "full")).sum() == 17  # those of person 0 in frame 2

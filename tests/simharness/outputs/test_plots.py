@@ -50,6 +50,7 @@ def test_every_plot_is_one_svg_element_in_the_colours_of_the_page(people, frames
         assert not re.match(r"<svg[^>]* width=", svg), "the page sets the width"
 
 
+@pytest.mark.slow
 def test_plots_on_one_page_share_no_ids():
     ids = [name for svg in draw_all() for name in re.findall(r'\bid="([^"]+)"', svg)]
     assert len(ids) == len(set(ids))

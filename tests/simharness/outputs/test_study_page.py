@@ -166,6 +166,7 @@ def test_a_study_of_which_nothing_finished_says_so(tmp_path):
     Reader(page)
 
 
+@pytest.mark.slow
 def test_one_seed_has_no_intervals_and_no_tests(tmp_path):
     page = render_study(make_study(tmp_path, seeds=1))
     assert "A single seed has no interval" in page

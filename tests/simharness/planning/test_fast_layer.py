@@ -224,6 +224,7 @@ class TestPrediction:
             made = _prediction(scenes, terms, Reconstruction(moved, moved, np.zeros(scenes.place.shape)))
             assert made.person_error_mm[scenes.present] == pytest.approx(expected)
 
+    @pytest.mark.slow
     def test_more_cameras_are_better_and_more_people_are_worse(self, corners):
         def pcp(people, count):
             layer = FastLayer.in_volume(Volume.box(3, 3), detector=read_profile("typical"), people=people, spacing=0.75)

@@ -226,6 +226,7 @@ def test_labels_of_cameras_in_one_corner_do_not_touch_from_the_side(axis: int, m
         assert shared_area(one, other) == 0.0
 
 
+@pytest.mark.slow
 def test_preview_draws_the_room(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["plan", "lab", "--preview", "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output

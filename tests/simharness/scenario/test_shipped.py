@@ -206,6 +206,7 @@ class TestPairing:
         assert few.real == lasting.real == shared.real
         assert 0 < few.false < min(lasting.false, shared.false)
 
+    @pytest.mark.slow
     def test_one_person_more_changes_nobody_before(self):
         few, many = (see(setting("crowd", {"people.count": count})) for count in (3, 4))
         assert np.array_equal(few.sequence.joints, many.sequence.joints[:, :3])
@@ -226,6 +227,7 @@ class TestPairing:
         assert many.real == {key: few.real[key] for key in many.real}
         assert len(many.real) < len(few.real)
 
+    @pytest.mark.slow
     def test_a_wrong_calibration_changes_no_picture(self):
         right, wrong = (see(setting("calibration", {"faults.rotation": degrees})) for degrees in (0.0, 4.0))
         assert np.array_equal(right.sequence.joints, wrong.sequence.joints)

@@ -113,6 +113,7 @@ class TestClusters:
         with pytest.raises(ValueError, match=f"--scheduler {address}: no Dask scheduler"):
             next(run_units(units_of(tmp_path, 1), Fake(tmp_path / "calls"), scheduler=address))
 
+    @pytest.mark.slow
     def test_a_scheduler_without_workers_or_with_other_code_is_refused(self, tmp_path, monkeypatch):
         from distributed import LocalCluster
 

@@ -252,6 +252,7 @@ class TestCode:
         assert code().method != before.method
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folders", [identity.SIMULATION, identity.SCORES, identity.FAILURES])
 def test_folders_that_make_results_import_nothing_else(folders):
     """Their imports from the package are in these folders too; ``runtime`` runs work and makes no results."""

@@ -29,6 +29,7 @@ def trial(tmp_path_factory):
     return lambda *overrides: run_trial(load(path, overrides=overrides), until="score")
 
 
+@pytest.mark.slow
 def test_detections_have_the_known_times_and_clocks_change_nothing_else(trial):
     blind, known = (
         trial("faults.clock_offset=0.06", "faults.dropped=0.3", f"faults.clocks_known={value}")

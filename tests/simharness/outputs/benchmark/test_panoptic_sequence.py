@@ -318,6 +318,7 @@ class TestAtomicFolder:
         assert done
         assert not list(tmp_path.iterdir())
 
+    @pytest.mark.slow
     def test_an_error_leaves_an_earlier_export_unchanged(self, trial, tmp_path, monkeypatch):
         made, _ = exported(trial.scenario, tmp_path / "tiny", pictures=False)
         before = {file: file.read_bytes() for file in made.rglob("*.json")}
@@ -326,6 +327,7 @@ class TestAtomicFolder:
             export_sequence(trial.scenario, ExportPlan(made))
         assert {file: file.read_bytes() for file in made.rglob("*.json")} == before
 
+    @pytest.mark.slow
     def test_an_earlier_export_is_replaced_completely(self, trial, tmp_path):
         made, _ = exported(trial.scenario, tmp_path / "tiny", pictures=False)
         exported(trial.scenario, tmp_path / "tiny", every=2, pictures=False)

@@ -38,6 +38,7 @@ def test_a_picture_for_every_camera_and_frame_and_a_mosaic(plain):
     assert [path.name for path in plain.parent.iterdir()] == ["tiny"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layer", ["truth", "detections", "estimates"])
 def test_each_layer_changes_the_picture(plain, tmp_path, layer):
     folder = render(tiny(), RenderPlan(overlay=frozenset({layer}), every=2), out=tmp_path)
@@ -47,6 +48,7 @@ def test_each_layer_changes_the_picture(plain, tmp_path, layer):
     assert 0.003 < changed < 0.5
 
 
+@pytest.mark.slow
 def test_a_film_holds_every_frame(plain, tmp_path):
     folder = render(tiny(), RenderPlan(video=True), out=tmp_path)
     assert sorted(path.name for path in folder.glob("*.*")) == [".written", "cam0.mp4", "cam1.mp4", "mosaic.mp4"]
@@ -63,6 +65,7 @@ def test_a_film_holds_every_frame(plain, tmp_path):
     assert np.abs(frames[1] - still).mean() < 12
 
 
+@pytest.mark.slow
 def test_a_dead_camera_is_black(tmp_path):
     folder = render(
         tiny(faults=FaultsSection(dead=(1,))), RenderPlan(every=3, overlay=frozenset({"truth"})), out=tmp_path
@@ -71,6 +74,7 @@ def test_a_dead_camera_is_black(tmp_path):
     assert cv2.imread(str(folder / "cam0" / "0000.png")).any()
 
 
+@pytest.mark.slow
 def test_channels_are_written_beside_the_pictures(tmp_path):
     folder = render(tiny(), RenderPlan(channels=frozenset({"depth", "ids", "parts"}), every=3), out=tmp_path)
     depth, ids, parts = (

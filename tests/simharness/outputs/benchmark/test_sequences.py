@@ -78,6 +78,7 @@ def test_all_files_have_their_checksums(benchmark):
     assert described_file["sha256"] == sums[described_file["contentUrl"]]
 
 
+@pytest.mark.slow
 def test_what_is_there_is_kept_and_what_is_not_is_made(scenario, tmp_path):
     folder = tmp_path / "grows"
     export_benchmark(scenario, folder, BARE, sequences=1)

@@ -51,6 +51,7 @@ def test_noise_of_predictions_is_that_of_repeated_draws(views):
     np.testing.assert_allclose(np.nanmean(square, axis=(0, 2, 3)), sigma**2, rtol=0.04)
 
 
+@pytest.mark.slow
 def test_variance_of_joints_is_that_of_repeated_draws():
     rig, sigma = ring(4), 0.25
     keypoints, unit = seen(rig, 1000, noise=sigma)

@@ -121,6 +121,7 @@ class TestDrops:
         slack = 0.1 * expected  # visibility from capsules is no better
         assert sum(each.low - slack <= expected <= each.high + slack for each in values) >= 5  # of 6, at 95 %
 
+    @pytest.mark.slow
     def test_shares_of_staged_bodies(self, filmed):
         """Where bodies show what hides what, shares of all limb joints together are exact."""
         sample = filmed.sample(staged=True, **DROPPING)
@@ -129,6 +130,7 @@ class TestDrops:
             n, k = (each[:, index, 3:].sum() for each in found.classes["drop"])
             assert k / n == pytest.approx(expected, abs=4 * np.sqrt(expected * (1 - expected) / n))
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("factors", [(0.25, 0.5), (0.9, 0.1)])
     def test_factors_of_joints_at_edges(self, filmed, factors):
         """Also where the shares of kinds of joint differ: elbows are hidden at edges more often than others."""
@@ -141,12 +143,14 @@ class TestDrops:
                 share = found[f"keypoints.drop.{name}.{kind}"]
                 assert share == pytest.approx(kinds[kind], abs=0.04), (name, kind)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("growth", "within"), [(0.0, 1.0), (5.0, 1.5), (14.0, 2.0), (30.0, 6.0)])
     def test_growth_of_drops_with_depth(self, filmed, growth, within):
         drop = {"self_occluded": {**dict.fromkeys(KINDS, 0.2), "elbows": 0.4}, "depth": growth}
         found = point_estimates(filmed.sample(staged=True, keypoints={"drop": drop}))["keypoints.drop.depth"]
         assert found == pytest.approx(growth, abs=within)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("error", ["inversion", "swap"])
     @pytest.mark.parametrize("factor", [0.1, 0.5])
     def test_factors_of_joints_that_nothing_else_hides(self, filmed, error, factor):
@@ -161,6 +165,7 @@ class TestDrops:
         assert not measured["keypoints.drop.edge.self_occluded"].known
         assert "edge" not in settings(measured, name="few")["keypoints"]["drop"]
 
+    @pytest.mark.slow
     def test_joints_below_a_missing_one_do_not_count(self, filmed):
         """The same detections as of a top-down detector: wrists also fall with their elbows and shoulders."""
         sample = part(filmed.sample(**DROPPING), 80)
@@ -196,6 +201,7 @@ class TestDrops:
         assert (np.diff(found) > 0).all()
         assert dropping["boxes.missed"].value == pytest.approx(0.05, abs=0.015)
 
+    @pytest.mark.slow
     def test_joints_beyond_the_border(self, filmed):
         """The detector reports joints up to 2 units beyond the border: nobody knows without the views beside."""
         narrow = narrowed(filmed, width=420)
@@ -266,6 +272,7 @@ class TestClasses:
     def test_factors_of_hidden_joints(self, erring, key, expected, within):
         assert mean(erring, key) == pytest.approx(expected, abs=within)
 
+    @pytest.mark.slow
     def test_hidden_joints_of_each_kind(self, filmed):
         """They differ as they should, but less: some visible joints are taken for hidden ones. Calibration mends it."""
         found = point_estimates(filmed.sample(staged=True, **BY_KIND))
@@ -303,6 +310,7 @@ class TestClasses:
     def test_scores_by_class_and_visibility(self, erring, key, expected, within):
         assert erring[f"scores.{key}"].value == pytest.approx(expected, abs=within)
 
+    @pytest.mark.slow
     def test_misses_are_not_taken_for_inversions_and_swaps(self, filmed):
         """A fifth of all joints are misses, and some of them are near another joint by chance."""
         found = point_estimates(part(filmed.sample(keypoints={"scatter": 0.2, "miss": 0.2}), 100))
@@ -310,6 +318,7 @@ class TestClasses:
             assert np.mean([found[f"share.{key}.{kind}"] for kind in LIMB_KINDS]) < 0.01
         assert np.mean([found[f"share.miss.{kind}"] for kind in LIMB_KINDS]) == pytest.approx(0.2, abs=0.04)
 
+    @pytest.mark.slow
     def test_a_perfect_detector_has_no_errors(self, filmed):
         found = measure_detector(part(filmed.sample(), 100), resamples=50)
         for kind in LIMB_KINDS:
@@ -350,6 +359,7 @@ class TestGuesses:
         assert guessing["scores.outside"] == pytest.approx(0.6, abs=0.08)
         assert "keypoints.border" not in guessing
 
+    @pytest.mark.slow
     def test_errors_of_a_limb_do_not_depend_on_guesses(self, filmed):
         """Guesses of a limb are wrong together, because its pose is unusual; its other errors are independent here."""
         errors = {"scatter": 0.2, "miss": 0.06, "guess": {"self_occluded": 0.9, "occluded": 0.9}}
@@ -395,6 +405,7 @@ class TestDependence:
         assert np.mean([width(lasting, kind) / width(dropping, kind) for kind in LIMB_KINDS]) > 1.5
 
 
+@pytest.mark.slow
 def test_an_offset_that_all_views_share_is_not_seen(filmed):
     """The consensus has the bias of the detector: residuals stay small, whatever it is."""
     sample = part(filmed.sample(keypoints={"scatter": 0.2}), 60)
@@ -413,6 +424,7 @@ def test_values_agree_within_the_interval_of_their_difference():
     assert MeasuredValue(0.15, 0.12, 0.2, 100).agrees(one)
 
 
+@pytest.mark.slow
 def test_two_draws_of_one_detector_agree_and_two_detectors_do_not(filmed, dropping, erring):
     again = measure_detector(filmed.sample(seed=7, **DROPPING), resamples=100)
     different, compared = agreement(dropping, again)
@@ -423,6 +435,7 @@ def test_two_draws_of_one_detector_agree_and_two_detectors_do_not(filmed, droppi
     assert len(different) > 0.3 * compared
 
 
+@pytest.mark.slow
 def test_people_who_are_not_measured_only_hide_others(filmed):
     """With one person measured, the shares are those of that person."""
     sample = part(filmed.sample(**DROPPING), 100)

@@ -45,6 +45,7 @@ def test_a_rival_is_judged_where_it_predicts_something():
     assert np.isnan(forecasts([1.0], [1.0], {"rival": [np.nan]}).skill("rival").mean)
 
 
+@pytest.mark.slow
 def test_the_interval_of_the_error_covers_it():
     """The mean absolute error without noise is 2; draws of recording and twins scatter about their own figures."""
     inside = []

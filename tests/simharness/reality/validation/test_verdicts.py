@@ -61,6 +61,7 @@ def test_a_figure_that_the_recording_lacks_is_not_judged_good():
     assert near("pcp", "pcp.x", figure(math.nan, 90.0), 1.5).state == CANNOT_TELL
 
 
+@pytest.mark.slow
 def test_equivalence_has_the_level_of_two_one_sided_tests():
     """At a true difference on the bound a verdict holds in 5 %, and fails in 5 %."""
     rng = np.random.default_rng(0)

@@ -129,6 +129,7 @@ def test_both_feet_stand_on_the_block(kinematics, seed):
     assert both.min() == pytest.approx(0.0, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sit", "carry", "step"])
 def test_props_fit_the_body(name):
     sizes = {perform(name, Kinematics(make_body(draw_shape(stream(seed, "props")))), seed)[1].size for seed in range(3)}

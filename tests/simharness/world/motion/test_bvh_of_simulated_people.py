@@ -18,6 +18,7 @@ def node_of(joint):
     return side.capitalize() + _NODES[part] if part in _NODES else joint
 
 
+@pytest.mark.slow
 def test_joints_of_the_files(tmp_path):
     scenario = simharness.load_scenario(
         "quickstart", overrides=["duration=0.8", "rate=25", "people.count=2", 'rendering.renderer="rays"']

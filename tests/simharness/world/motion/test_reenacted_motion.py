@@ -85,6 +85,7 @@ def test_limbs_are_where_they_were(recorded):
     assert off.max() < 0.1
 
 
+@pytest.mark.slow
 def test_limbs_are_nearer_than_noisy_tracks(recorded):
     """Errors of 15 mm along each axis put joints 26 mm off; the height of the floor is unknown."""
     noise = stream(0, "noise").normal(0.0, 0.015, recorded.tracks.joints.shape)
@@ -121,6 +122,7 @@ def test_bodies_have_the_recorded_size(recorded):
         assert mover.body.stature == pytest.approx(performer(k).body.stature, abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("person", "shoulders", "hips"), [(0, 0.8, 1.25), (1, 1.2, 0.8), (4, 1.3, 0.8)])
 def test_bodies_are_as_wide_as_the_recorded_one(recorded, person, shoulders, hips):
     wide = Kinematics(make_body(replace(performer(person).body.shape, shoulders=shoulders, hips=hips)))
@@ -207,6 +209,7 @@ class TestScenario:
         one, other = planned.func(together).motions
         assert np.linalg.norm(one.root[:, :2] - other.root[:, :2], axis=1).max() < 0.05
 
+    @pytest.mark.slow
     def test_who_leaves_the_room_is_refused(self, planned):
         with pytest.raises(ValueError, match=r"person \d leaves the room, .* first two numbers of room.size to \d"):
             planned(size=(3.0, 3.0, 3.0))

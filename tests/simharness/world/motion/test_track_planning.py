@@ -117,6 +117,7 @@ def test_no_requests_need_no_room():
     assert plan_tracks(0, [], area=0.01, spacing=9.0, span=SPAN) == ()
 
 
+@pytest.mark.slow
 def test_a_crowd_that_does_not_fit_names_the_keys_to_change():
     with pytest.raises(ValueError, match=r"people.count = 9 .*people.area = 1 m.*people.spacing = 1.5 m") as error:
         plan_tracks(0, [STAND] * 9, area=1.0, spacing=1.5, span=SPAN)

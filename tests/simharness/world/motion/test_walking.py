@@ -113,6 +113,7 @@ def test_arms_swing_against_the_legs(walked):
         assert np.corrcoef(arm, leg)[0, 1] < -0.5
 
 
+@pytest.mark.slow
 def test_a_straight_walk_is_close_to_the_curves():
     kinematics = Kinematics(make_body(draw_shape(stream(9, "walk"))))
     gait = make_gait(kinematics, speed=1.2)

@@ -124,6 +124,7 @@ def test_windows_are_holes_in_the_walls_of_pictures():
     assert areas[0] - areas[1] == pytest.approx(holes, abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_piece_more_moves_none_of_those_before_it():
     _, _, _, small = furnished("office", size=(7.0, 7.0, 3.0))
     _, _, _, again = furnished("office", size=(7.0, 7.0, 3.0))

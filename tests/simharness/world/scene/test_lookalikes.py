@@ -121,6 +121,7 @@ class TestInSpace:
 
 
 class TestInPictures:
+    @pytest.mark.slow
     def test_pixels_are_where_the_joints_appear(self):
         playback, rig = played()
         state = playback.at(0.2)
@@ -191,6 +192,7 @@ class TestInPictures:
                 (seen,) = observer.observe([playback.at(0.2)], [camera])
                 assert not seen.lookalike_visible.any()
 
+    @pytest.mark.slow
     def test_a_still_scene_rolls_as_it_stands(self):
         playback, rig = played(2)
         state = playback.at(0.2)

@@ -105,6 +105,7 @@ def test_free_walking_follows_the_plan(kinematics):
     assert misplaced(plan, happened).max() > 1e-3  # it is not the plan itself
 
 
+@pytest.mark.slow
 def test_a_walk_without_assistance_falls():
     plan = walking(MAN, duration=3.0)
     (happened,) = track(room([MAN]), [MAN.body], [plan], assist=1e-6)

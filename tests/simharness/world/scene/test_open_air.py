@@ -100,6 +100,7 @@ def far_rig():
     return build_rig(CamerasSection(count=4, radius=15.0, height=3.0))
 
 
+@pytest.mark.slow
 def test_surroundings_hide_nothing(far_rig):
     """No line between two points of the floor, the ground around it and the cameras meets anything above the ground."""
     for rig, reach in ((far_rig, 15.0), (build_rig(CamerasSection(count=3, radius=2.5)), np.hypot(8.0, 7.0))):

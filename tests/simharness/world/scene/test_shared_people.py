@@ -57,6 +57,7 @@ def test_other_people_are_not_taken_for_these(nobody_made, other):
     assert built("seed=3").bodies[0] is here.bodies[0]
 
 
+@pytest.mark.slow
 def test_poses_leave_nothing_behind_in_the_kinematics_that_scenes_share(nobody_made):
     walking, waving = built("seed=3").motions
     mover = make_person(shape_of_person(3, 0, 0.0), draw_looks(3, 1)[0]).mover

@@ -47,6 +47,7 @@ def test_daylight_is_brightest_below_the_windows():
     assert near > 1.3 * far
 
 
+@pytest.mark.slow
 def test_a_window_without_a_pane_shows_the_panorama():
     room = settled(RoomSection(kind="office"), 2)
     openings = draw_openings(room, 2)
