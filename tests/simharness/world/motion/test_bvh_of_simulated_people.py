@@ -1,6 +1,7 @@
 """BVH files of tracked simulated people: their joints lie at those of the tracks, and nearer to the true ones."""
 
 import numpy as np
+import pytest
 
 import simharness
 from mvpose import COCO17, preset
