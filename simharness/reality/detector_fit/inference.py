@@ -12,7 +12,8 @@ A measured value varies as the bootstrap of the recording says, or, where errors
 bootstrap, as it does between simulations at the result.
 """
 
-from collections.abc import Callable, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -21,7 +22,7 @@ from scipy.special import expit, logit
 
 from mvpose.arrays import Floats
 from simharness.reality.detector_fit.detector_measurement import MeasuredValue
-from simharness.reality.detector_fit.parameters import SHARES
+from simharness.reality.detector_fit.parameters import SHARES, STATES
 from simharness.reality.detector_fit.visibility_errors import (
     independent,
     measured_parameters,
@@ -33,16 +34,16 @@ from simharness.scenario.sections.detector_section import KINDS
 ROUNDS = 8
 """Simulations before the slopes are found, and after."""
 
-Scale = Literal["logit", "log", "fisher", "linear"]
+Scale = Literal["logit", "log", "factor", "fisher", "linear"]
 
 Scales = Mapping[Scale, tuple[str, ...]]
 
 SCALES: Scales = {
     "logit": (
-        *("keypoints.jitter", "keypoints.miss", "keypoints.inversion.", "keypoints.swap", "keypoints.stray"),
+        *("keypoints.jitter", "keypoints.miss", "keypoints.inversion.", "keypoints.swap.", "keypoints.stray"),
         *("keypoints.guess.self_occluded", "keypoints.guess.occluded", "correlation.scatter_noise"),
         *("keypoints.drop.edge", "keypoints.drop.self_occluded", "keypoints.drop.occluded"),
-        *("boxes.missed_hidden", "keypoints.inversion_uncovered"),
+        "boxes.missed_hidden",
         *("scores.good", "scores.jitter", "scores.miss", "scores.inversion", "scores.swap", "scores.hidden"),
         *("scores.guess", "scores.overconfident", "scores.underconfident"),
     ),
@@ -51,34 +52,52 @@ SCALES: Scales = {
         "keypoints.drop.depth",
         *("correlation.life", "correlation.scatter_life", "boxes.life", "phantoms.rate", "scores.deviation"),
     ),
+    "factor": ("keypoints.inversion_uncovered", "keypoints.swap_uncovered"),
     "linear": SHARES,
     "fisher": (
         *("correlation.views", "correlation.gross_views", "correlation.limb", "correlation.scatter_near"),
         *("correlation.scatter_views", "boxes.missed_views"),
     ),
 }
-"""Inferred parameters of a recording by their scale and the beginning of their keys: shares, amounts, and correlations,
-which are on the inverse hyperbolic tangent; measured ones may be below 0. Shares of joints by their state are linear:
-the measured ones are mixtures of those of all states, because some joints are not in the state in which they seem. Of
-visible joints that hardly ever err, they are mostly hidden ones', which no scale without bounds can tell."""
+"""Inferred parameters of a recording by their scale and the beginning of their keys: shares, amounts, factors of 1 at
+most, and correlations, which are on the inverse hyperbolic tangent; measured ones may be below 0. Shares of joints by
+their state are linear: the measured ones are mixtures of those of all states, because some joints are not in the state
+in which they seem. Of visible joints that hardly ever err, they are mostly hidden ones', which no scale without bounds
+can tell."""
 
 _WIDTHS = {
     **dict.fromkeys(SCALES["fisher"], (0.35, 0.0)),
     **dict.fromkeys(SCALES["log"], (0.7, 0.0)),
+    **dict.fromkeys(SCALES["factor"], (1.75, 0.0)),
     **dict.fromkeys(("keypoints.self_occluded", "keypoints.occluded"), (1.0, 1.0)),
     "keypoints.scatter": (0.2, 0.5),
     "keypoints.jitter_mean": (0.6, 0.6),
 }
 """Standard deviations of the prior on the scale, of each parameter and of what the kinds of joint have in common, by
-the beginning of the keys: by so much the fits to MoveNet and OpenPose differ from the shipped profiles."""
+the beginning of the keys: by so much the fits to MoveNet and OpenPose differ from the shipped profiles. Factors of
+uncovered joints are .005 (inversions of OpenPose on Shelf) to .6 (swaps of MoveNet), and 1 in shipped profiles."""
 
 _WIDTH = (1.0, 1.0)  # of the others, which are shares
 
-_PERTURBATIONS: Mapping[Scale, float] = {"logit": 0.5, "log": 0.3, "fisher": 0.3}
+_PERTURBATIONS: Mapping[Scale, float] = {"logit": 0.5, "log": 0.3, "factor": 0.5, "fisher": 0.3}
 _LINEAR_STEP = 4.0  # deviations of the measured values
 _APART = 0.2
 """Distance of the left-right counterpart, heights of the box, at which inversions are inferred: joints that are told
 from their counterpart are about so far from it. Shares at no distance are extrapolated with the reach."""
+
+_BY_SHARE = {"keypoints.inversion": "share.inversion", "keypoints.swap": "share.swap"}
+"""Groups of parameters that are inferred as the shares of joints that nothing else hides, from the measured shares of
+all joints: most joints are such, and few say by which factor the shares of the others, those of the profile, are
+larger."""
+
+_UNCOVERED = {group: f"{group}_uncovered" for group in _BY_SHARE}
+"""Keys of the factors of joints that nothing else hides."""
+
+_DROPS = tuple(f"keypoints.drop.{state}" for state in STATES)
+_OF_DROPS = ("keypoints.drop.edge", "keypoints.drop.depth")  # without effect where no joint is dropped
+
+_AMOUNTS = ("phantoms.life", "phantoms.deviation", "scores.joint", "keypoints.border", "size")
+"""Values that are not inferred, and are no shares."""
 
 _ANEW = tuple(f"correlation.{key}" for key in ("life", "views", "gross_views", "limb")) + (
     "boxes.life",
@@ -89,6 +108,7 @@ _ANEW = tuple(f"correlation.{key}" for key in ("life", "views", "gross_views", "
 _NOISE, _NOISE_ANEW = 0.4, 1.2
 """Noise of changes between simulations with the same draws, and with others, deviations of the measured values."""
 
+_TOLD = 2.0  # deviations from none, from which a value depends on a parameter that is not its own
 _STEP = 1.0  # largest change in a round, on the scale
 _NORMAL = 1.96  # deviations from the mean to the ends of a 95 % interval
 _ONE_SIDED = 1.645  # deviations to the one end of a 95 % interval
@@ -123,30 +143,58 @@ def infer(
         scales: inferred parameters.
     """
     prior = prior_shares(prior)
-    found = (_parameter(key, value, prior.get(key, 0.0), scales) for key, value in independent(measured).items())
-    parameters = [each for each in found if each is not None]
+    parameters = _parameters(measured, prior, scales)
     if not parameters or not rounds:
         return dict(measured)
     state = _Inference(tuple(parameters))
     fixed = {key: each.value for key, each in measured.items()}
+    simulated: list[Mapping[str, float]] = []
 
     def run(change: Floats | float, draw: int) -> Floats:
         of = simulate(with_parameters({**fixed, **state.values(change)}), draw)
-        return np.array([each.seen(of.get(each.key, np.nan)) for each in parameters])
+        simulated.append(of)
+        return np.array([each.seen(of.get(each.measured_by, np.nan)) for each in parameters])
 
     for draw in range(rounds):
         state.add(run(0.0, draw))
     state.find_slopes(lambda change: run(change, rounds))
     for draw in range(rounds, 2 * rounds):
         state.add(run(0.0, draw))
-    deviation, result = state.posterior()[1], dict(measured)
+    result = _as_wide_as_simulated(measured, simulated[-rounds:])
+    deviation = state.posterior()[1]
     reach = np.diag(_NORMAL * state.of_values(deviation))
+    unsure = deviation > _PRIORS_SHARE * state.prior_deviation
+    unsure |= state.uncovered @ unsure > 0
     for index, each in enumerate(parameters):
         low, value, high = (state.values(side * reach[index])[each.key] for side in (-1.0, 0.0, 1.0))
-        unsure = bool(deviation[index] > _PRIORS_SHARE * state.prior_deviation[index])
-        result[each.key] = replace(measured[each.key], value=value, low=low, high=high, by_prior=unsure)
+        result[each.key] = replace(measured[each.key], value=value, low=low, high=high, by_prior=bool(unsure[index]))
     shares = {key: each for key, each in measured.items() if key.startswith(SHARES)}
     return {**result, **measured_parameters(result), **shares}
+
+
+def _as_wide_as_simulated(
+    measured: Mapping[str, MeasuredValue], simulated: Sequence[Mapping[str, float]]
+) -> dict[str, MeasuredValue]:
+    """Return measured values whose intervals are at least as wide as the values vary between simulations.
+
+    Kinds of joint are alike.
+    """
+    groups: dict[str, dict[str, float]] = defaultdict(dict)
+    for key, each in measured.items():
+        values = np.array([of.get(key, np.nan) for of in simulated])
+        deviation = (each.high - each.low) / (2 * _NORMAL)
+        if np.isfinite(values).all() and deviation > 0:
+            start, _, last = key.rpartition(".")
+            groups[start if last in KINDS else key][key] = float(values.var(ddof=1) / deviation**2)
+    result = dict(measured)
+    for ratios in groups.values():
+        factor = np.sqrt(max(1.0, float(np.mean(list(ratios.values())))))
+        for key in ratios:
+            each = measured[key]
+            low, high = (each.value + factor * (end - each.value) for end in (each.low, each.high))
+            most = np.inf if key.startswith(_AMOUNTS) else max(1.0, each.high)
+            result[key] = replace(each, low=float(max(low, min(each.low, 0.0))), high=float(min(high, most)))
+    return result
 
 
 def misfit(measured: Mapping[str, MeasuredValue], simulated: Mapping[str, float]) -> float:
@@ -155,10 +203,10 @@ def misfit(measured: Mapping[str, MeasuredValue], simulated: Mapping[str, float]
     Over the parameters of :data:`SCALES`; each counts :data:`_MOST` at most, so that no single one decides.
     """
     squares = []
-    for key, each in independent(measured).items():
-        parameter = _parameter(key, each, 0.5, SCALES)
-        if parameter is not None and np.isfinite(parameter.observed) and np.isfinite(simulated.get(key, np.nan)):
-            away = (parameter.seen(simulated[key]) - parameter.observed) / (np.sqrt(2) * parameter.deviation)
+    for each in _parameters(measured, dict.fromkeys(measured, 0.5), SCALES):
+        value = simulated.get(each.measured_by, np.nan)
+        if np.isfinite(each.observed) and np.isfinite(value):
+            away = (each.seen(value) - each.observed) / (np.sqrt(2) * each.deviation)
             squares.append(min(away**2, _MOST))
     return float(np.mean(squares)) if squares else np.nan
 
@@ -169,6 +217,8 @@ class _Parameter:
 
     key: str
     """Its key."""
+    measured_by: str
+    """Key of the measured value that says most of it."""
     scale: Scale
     """Its scale."""
     prior: float
@@ -179,6 +229,8 @@ class _Parameter:
     """Standard deviation of the measured value."""
     count: int
     """Number of joints, people or detections behind it."""
+    recorded: float
+    """Measured value of the recording, not on the scale."""
 
     @property
     def group(self) -> str:
@@ -193,7 +245,7 @@ class _Parameter:
 
     def scaled(self, value: float) -> float:
         """Return a value on the scale."""
-        if self.scale == "log":
+        if self.scale in ("log", "factor"):
             return float(np.log(max(value, _SMALLEST)))
         if self.scale == "linear":
             return float(value)
@@ -213,16 +265,29 @@ class _Parameter:
             return float(np.clip(place, _LEAST, 1 - _LEAST))
         if self.scale == "fisher":
             return float(np.clip(np.tanh(place), 0.0, _STRONGEST))
+        if self.scale == "factor":
+            return float(np.exp(min(place, 0.0)))
         return float(np.exp(place) if self.scale == "log" else expit(place))
 
 
-def _parameter(key: str, measured: MeasuredValue, prior: float, scales: Scales) -> _Parameter | None:
-    """Return the parameter of a key; None if it is not inferred, or if nothing is known of it."""
-    scale = next((scale for scale, starts in scales.items() if key.startswith(starts)), None)
-    if scale is None:
-        return None
+def _parameters(measured: Mapping[str, MeasuredValue], prior: Mapping[str, float], scales: Scales) -> list[_Parameter]:
+    """Return the parameters that are inferred, and of which the recording or the prior says something."""
+    dropped = any(each.value > 0 for key, each in measured.items() if key.startswith(_DROPS))
+    result = []
+    for key in independent(measured):
+        group, _, kind = key.rpartition(".")
+        by = f"{_BY_SHARE.get(group, group)}.{kind}"
+        by = by if by in measured else key
+        scale = next((scale for scale, starts in scales.items() if key.startswith(starts)), None)
+        if scale is not None and (dropped or not key.startswith(_OF_DROPS)):
+            result.append(_parameter(key, by, measured[by], prior.get(key, 0.0), scale))
+    return [each for each in result if np.isfinite(each.prior) or np.isfinite(each.observed)]
+
+
+def _parameter(key: str, measured_by: str, measured: MeasuredValue, prior: float, scale: Scale) -> _Parameter:
+    """Return a parameter by the measured value that says most of it."""
     n = measured.count
-    result = _Parameter(key, scale, np.nan, np.nan, 1.0, n)
+    result = _Parameter(key, measured_by, scale, np.nan, np.nan, 1.0, n, measured.value)
     if prior > 0:
         result = replace(result, prior=result.scaled(prior))
     if measured.known and n > 0 and (prior > 0 or measured.value > 0):
@@ -236,7 +301,7 @@ def _parameter(key: str, measured: MeasuredValue, prior: float, scales: Scales) 
         if scale == "logit" and measured.value == 0 and np.isfinite(measured.high):  # the interval has one end
             deviation = max((result.seen(measured.high) - observed) / _ONE_SIDED, 0.5)
         result = replace(result, observed=observed, deviation=deviation)
-    return result if np.isfinite(result.prior) or np.isfinite(result.observed) else None
+    return result
 
 
 @dataclass
@@ -256,17 +321,20 @@ class _Inference:
         self.at = np.where(np.isfinite(self.prior), self.prior, self.observed)
         scales = np.array([each.scale for each in self.parameters])
         self.least = np.where(scales == "fisher", 0.0, np.where(scales == "linear", _LEAST, -np.inf))
-        self.most = np.where(scales == "linear", 1 - _LEAST, np.inf)
+        self.most = np.where(scales == "linear", 1 - _LEAST, np.where(scales == "factor", 0.0, np.inf))
         self.at = np.clip(self.at, self.least, self.most)
         self.slopes = _OWN * np.eye(len(self.parameters))
         self.reach = next((i for i, each in enumerate(self.parameters) if each.key == "keypoints.inversion_reach"), -1)
         self.apart = np.array([each.group == "keypoints.inversion" for each in self.parameters]) * (self.reach >= 0)
+        uncovered = [[_UNCOVERED.get(each.group) == other.key for other in self.parameters] for each in self.parameters]
+        self.uncovered = np.array(uncovered, float)
         self.groups: dict[str, dict[str, int]] = {}
         for index, each in enumerate(self.parameters):
             self.groups.setdefault(each.group, {})[each.kind] = index
+        recorded = np.array([each.recorded for each in self.parameters])
         for rows in map(list, (each.values() for each in self.groups.values())):
             # One value that is measured for several kinds of joint counts once.
-            alike = self.observed[rows] == self.observed[rows][:, None]
+            alike = recorded[rows] == recorded[rows][:, None]
             self.deviation[rows] *= np.sqrt(np.maximum(alike.sum(axis=0), 1))
         self.inverse, self.prior_deviation = self._of_prior()
 
@@ -294,12 +362,16 @@ class _Inference:
     def values(self, change: Floats | float = 0.0) -> dict[str, float]:
         """Return the present parameters, or those at a distance, (N,) on their scales, by key."""
         place = self.at + change
-        place = place + self.apart * _APART / np.exp(place[self.reach])
+        place = place + self.apart * _APART / np.exp(place[self.reach]) - self.uncovered @ np.minimum(place, 0.0)
         return {each.key: each.value(there) for each, there in zip(self.parameters, place, strict=True)}
 
     def of_values(self, deviation: Floats) -> Floats:
-        """Return the deviations of the values, (N,): shares of inversions at no distance also depend on the reach."""
-        return np.hypot(deviation, self.apart * _APART * deviation[self.reach] / np.exp(self.at[self.reach]))
+        """Return the deviations of the values, (N,): shares of inversions at no distance also depend on the reach.
+
+        Those of joints that others hide also depend on the factor of uncovered ones.
+        """
+        by_reach = self.apart * _APART * deviation[self.reach] / np.exp(self.at[self.reach])
+        return np.sqrt(deviation**2 + by_reach**2 + self.uncovered @ deviation**2)
 
     def add(self, measured: Floats) -> None:
         """Add the measured values of a simulation, (N,), and move towards the mean of the posterior."""
@@ -310,6 +382,7 @@ class _Inference:
     def find_slopes(self, run: Callable[[Floats | float], Floats]) -> None:
         """Find the slopes of all measured values by the parameters of each group; levels are found anew."""
         before, slopes = run(0.0), np.zeros_like(self.slopes)
+        spread = self.deviation * np.sqrt(self._between())
         for group, columns in self.groups.items():
             index = list(columns.values())
             scale = self.parameters[index[0]].scale
@@ -322,11 +395,11 @@ class _Inference:
             noise = _NOISE_ANEW if anew else _NOISE
             for of, rows in self.groups.items():
                 row, own = np.array(list(rows.values())), of == group
-                weight = np.where(known[row] & (own or not anew), (step / (noise * self.deviation[row])) ** 2, 0.0)
+                weight = np.where(known[row] & (own or not anew), (step / (noise * spread[row])) ** 2, 0.0)
                 usual = (weight @ change[row] + own * _OWN / _SPREAD**2) / (weight.sum() + _SPREAD**-2)
                 sure = weight + _KIND_SPREAD**-2
                 slope = (weight * change[row] + usual / _KIND_SPREAD**2) / sure
-                slope[slope**2 * sure < 1] = 0.0  # not told from none
+                slope[slope**2 * sure < (1.0 if own else _TOLD**2)] = 0.0  # not told from none
                 for each, place in zip(slope, row, strict=True):
                     kind = self.parameters[place].kind
                     if own:
@@ -352,6 +425,17 @@ class _Inference:
         pull = weighed @ np.where(known, self.observed - level, 0.0) + 1e-6 * self.at
         pull = pull + self.inverse @ np.nan_to_num(self.prior)
         return np.linalg.solve(information, pull), np.sqrt(np.diag(np.linalg.inv(information)))
+
+    def _between(self) -> Floats:
+        """Return by how much variances between the simulations so far exceed those of the bootstrap, (N,).
+
+        Parameters moved between them: a value followed its own at the usual slope, or did not.
+        """
+        measured, places = np.array(self.measured), np.array(self.places)
+        weight = np.isfinite(measured) / np.maximum(np.isfinite(measured).sum(axis=0), 1)
+        either = (measured, measured - places @ self.slopes.T)
+        first, second = (self._more(each - (weight * np.nan_to_num(each)).sum(axis=0), weight) for each in either)
+        return np.minimum(first, second)
 
     def _more(self, away: Floats, weight: Floats) -> Floats:
         """Return by how much variances between simulations exceed those of the recording's bootstrap, (N,), 1 or more.

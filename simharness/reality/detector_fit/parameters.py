@@ -44,6 +44,7 @@ _MIN_ERRORS = 200  # errors needed to estimate their correlations
 _ROUNDS = 4
 _PRIOR = 20.0  # joints
 _PRIOR_ERRORS = 3.0
+_PRIOR_FACTOR = 1.0  # errors of a kind of hidden joint needed to say something about their factor, and added to them
 _LEAST_FACTOR = 0.1  # hidden joints may err less than visible ones by chance
 _MIN_HIDDEN = 20  # joints of a kind needed to say something about the kind
 _MIN_INVERTED = 20.0  # inversions needed to see how far left and right are apart
@@ -182,7 +183,8 @@ def _guesses(n: dict[str, Floats], k: dict[str, Floats], sums: FrameSums) -> dic
     """Return the parameters of a detector that guesses: shares that are guessed, and factors on jitter.
 
     The share guessed begins as the share of gross errors among the joints in that state; calibration raises it, because
-    many guesses are right.
+    many guesses are right. Kinds of which few are hidden in this way are unknown: values that they took from the others
+    would count more than once in the inference, whose prior has what kinds have in common.
 
     Args:
         n: joints that each class could have taken, (R, 3, 9) by class.
@@ -190,14 +192,14 @@ def _guesses(n: dict[str, Floats], k: dict[str, Floats], sums: FrameSums) -> dic
         sums: all sums.
     """
     result: dict[str, Floats] = {}
-    # Kinds that are never hidden in this way count as the others.
     usual = np.nan_to_num(k["jitter"][:, 0] / n["jitter"][:, 0])
     for index, name in _HIDDEN:
         wrong, reported = k["miss"][:, index], n["miss"][:, index]
-        pooled = wrong.sum(axis=1, keepdims=True) / reported.sum(axis=1, keepdims=True)
-        share = np.where(reported >= _MIN_HIDDEN, wrong / reported, np.nan_to_num(pooled))
+        share = np.where(reported >= _MIN_HIDDEN, wrong / reported, np.nan)
         _put_by_kind(result, f"keypoints.guess.{name}", np.clip(share, 0.0, 1.0))
-        _put_by_kind(result, f"keypoints.{name}", _factors(k["jitter"][:, index], n["jitter"][:, index] * usual))
+        expected = n["jitter"][:, index] * usual
+        factor = (k["jitter"][:, index] + _PRIOR_FACTOR) / (expected + _PRIOR_FACTOR)
+        _put_by_kind(result, f"keypoints.{name}", np.where(expected >= _PRIOR_FACTOR, factor, np.nan))
     outside = sums.outside.n.sum(axis=1, keepdims=True)
     share = np.broadcast_to(sums.outside.k.sum(axis=1, keepdims=True) / outside, sums.outside.n.shape)
     _put_by_kind(result, "keypoints.guess.outside", np.where(outside >= _MIN_HIDDEN, share, np.nan))

@@ -111,10 +111,10 @@ def _below(counts: Floats, level: Floats) -> Floats:
 
 
 def guess_scores(sums: FrameSums) -> dict[str, Floats]:
-    """Return the usual scores of guesses by kind, and the factor of those outside of the image."""
+    """Return the usual scores of guesses by kind, NaN of few, and the factor of those outside of the image."""
     wrong = sums.scores.shown[:, 1, SCORED.index("miss")]
     pooled = expit(quantile(wrong.sum(axis=1), 0.5))[:, None]
-    level = np.where(wrong.sum(axis=-1) >= _MIN_HIDDEN, expit(quantile(wrong, 0.5)), pooled)
+    level = np.where(wrong.sum(axis=-1) >= _MIN_HIDDEN, expit(quantile(wrong, 0.5)), np.nan)
     outside = expit(quantile(sums.scores.outside, 0.5))
     result = {"scores.outside": np.minimum(outside / pooled[:, 0], 1.0)}
     result |= {f"scores.guess.{kind}": level[:, index] for index, kind in enumerate(KINDS)}

@@ -139,6 +139,9 @@ def test_one_value_of_several_kinds_counts_once():
     found = infer(measured, lambda values, draw: dict.fromkeys(keys, np.mean([values[key] for key in keys])), prior)
     alone = infer({keys[0]: measured[keys[0]]}, lambda values, draw: values, {keys[0]: 0.3})[keys[0]]
     assert found[keys[0]].high - found[keys[0]].low > alone.high - alone.low
+    counts = {key: MeasuredValue(0.3, 0.25, 0.35, 200 + index) for index, key in enumerate(keys)}
+    counted = infer(counts, lambda values, draw: dict.fromkeys(keys, np.mean([values[key] for key in keys])), prior)
+    assert counted[keys[0]].high - counted[keys[0]].low > 0.95 * (found[keys[0]].high - found[keys[0]].low)
 
 
 def test_other_parameters_are_told_apart_by_what_they_do():
@@ -176,3 +179,72 @@ def test_people_who_are_seen_less_hidden_than_they_are():
     found = infer(measured, lambda values, draw: mixed(values, np.random.default_rng([6, draw])), prior)
     for key, each in zip(real, true, strict=True):
         assert abs(found[key].value - each) < 0.4 * max(abs(real[key] - each), 0.02), (key, found[key], real[key])
+
+
+def test_uncovered_joints_are_inferred_with_a_factor_that_few_hidden_ones_tell():
+    """Of 10,000 joints 20 are behind others: the share of uncovered ones is known, their factor is the prior's."""
+    key, factor, share = "keypoints.swap.knees", "keypoints.swap_uncovered", "share.swap.knees"
+    covered, whole = 20, 10_000
+
+    def seen(values, draw):
+        hidden = values[key] * covered
+        return {share: (hidden + values[key] * values[factor] * (whole - covered)) / whole, key: 0.5, factor: np.nan}
+
+    real = seen({key: 0.02, factor: 1.0}, 0)
+    measured = {
+        share: MeasuredValue(real[share], 0.018, 0.022, whole),
+        key: MeasuredValue(0.02, 0.0, 1.0, whole),
+        factor: MeasuredValue(np.nan, np.nan, np.nan, 0),
+    }
+    found = infer(measured, seen, {key: 0.02, factor: 0.08})
+    assert found[key].value * found[factor].value == pytest.approx(0.02, rel=0.15)
+    assert found[factor].by_prior
+    assert found[key].by_prior  # as far as the factor is
+    assert found[factor].low < 0.02
+    assert found[factor].high == 1.0
+    assert found[key].low < 0.02
+    assert found[key].high > 0.3
+
+
+def test_what_changes_drops_is_unknown_where_nothing_is_dropped():
+    depth, share = "keypoints.drop.depth", "keypoints.drop.occluded.knees"
+    unknown = MeasuredValue(np.nan, np.nan, np.nan, 0)
+    prior = {depth: 10.0, share: 0.1}
+    for dropped in (0.0, 0.1):
+        measured = {depth: unknown, share: MeasuredValue(dropped, dropped, dropped + 0.01, 1000)}
+        found = infer(measured, lambda values, draw: {share: values[share], depth: np.nan}, prior)
+        assert found[depth].known == (dropped > 0)
+
+
+def test_intervals_of_values_that_are_not_inferred_are_as_wide_as_simulations():
+    """Scores of joints vary three times as much as the bootstrap says, those of people as much."""
+    joints = [f"scores.joint.{kind}" for kind in KINDS]
+    key, drawn = "keypoints.jitter.knees", {**dict.fromkeys(joints, 0.03), "phantoms.life": 0.01}
+    measured = {each: MeasuredValue(0.5, 0.5 - 1.96 * 0.01, 0.5 + 1.96 * 0.01, 500) for each in drawn}
+    measured[key] = MeasuredValue(0.04, 0.03, 0.05, 1000)
+
+    def seen(values, draw):
+        rng = np.random.default_rng([19, draw])
+        return {each: 0.5 + sigma * rng.standard_normal() for each, sigma in drawn.items()} | {key: values[key]}
+
+    found = infer(measured, seen, {key: 0.04})
+    assert found[joints[0]].high - found[joints[0]].low == pytest.approx(2 * 1.96 * 0.03, rel=0.35)
+    assert found["phantoms.life"].high - found["phantoms.life"].low < 2 * 1.96 * 0.02
+    assert {found[each].value for each in drawn} == {0.5}
+
+
+def test_noise_of_a_value_says_little_of_other_parameters():
+    """Scores vary six times as much between simulations as their intervals say, also with the same draws."""
+    shares, noisy = [f"keypoints.stray.{kind}" for kind in LIMBS], [f"scores.guess.{kind}" for kind in LIMBS]
+    measured = dict.fromkeys(noisy, MeasuredValue(0.4, 0.38, 0.42, 1000))
+    measured |= dict.fromkeys(shares, MeasuredValue(np.nan, np.nan, np.nan, 0))
+    away = []
+    for seed in range(6):
+
+        def seen(values, draw, seed=seed):
+            rng = np.random.default_rng([23, seed, int(1e6 * sum(values.values())) + draw])
+            return {key: values[key] + 0.12 * rng.standard_normal() for key in noisy}
+
+        found = infer(measured, seen, {**dict.fromkeys(shares, 0.3), **dict.fromkeys(noisy, 0.4)})
+        away.append(max(abs(found[key].value - 0.3) for key in shares))
+    assert np.mean(away) < 0.06
