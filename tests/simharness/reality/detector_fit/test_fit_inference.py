@@ -239,7 +239,7 @@ def test_noise_of_a_value_says_little_of_other_parameters():
     measured = dict.fromkeys(noisy, MeasuredValue(0.4, 0.38, 0.42, 1000))
     measured |= dict.fromkeys(shares, MeasuredValue(np.nan, np.nan, np.nan, 0))
     away = []
-    for seed in range(6):
+    for seed in range(24):
 
         def seen(values, draw, seed=seed):
             rng = np.random.default_rng([23, seed, int(1e6 * sum(values.values())) + draw])
@@ -247,4 +247,4 @@ def test_noise_of_a_value_says_little_of_other_parameters():
 
         found = infer(measured, seen, {**dict.fromkeys(shares, 0.3), **dict.fromkeys(noisy, 0.4)})
         away.append(max(abs(found[key].value - 0.3) for key in shares))
-    assert np.mean(away) < 0.06
+    assert np.mean(away) < 0.09
