@@ -183,7 +183,7 @@ def _as_wide_as_simulated(
     for key, each in measured.items():
         values = np.array([of.get(key, np.nan) for of in simulated])
         deviation = (each.high - each.low) / (2 * _NORMAL)
-        if np.isfinite(values).all() and deviation > 0:
+        if len(values) > 1 and np.isfinite(values).all() and deviation > 0:
             start, _, last = key.rpartition(".")
             groups[start if last in KINDS else key][key] = float(values.var(ddof=1) / deviation**2)
     result = dict(measured)
