@@ -160,10 +160,7 @@ def _through(detections: Detections, rig: Rig, bent: list[Camera]) -> Detections
 def _swapped_files(recording: BenchRecording, rng: np.random.Generator) -> Case:
     a, b = rng.choice(len(recording.rig), 2, replace=False)
     cameras = list(recording.rig)
-    cameras[a], cameras[b] = (
-        replace(cameras[b], name=cameras[a].name),
-        replace(cameras[a], name=cameras[b].name),
-    )
+    cameras[a], cameras[b] = (replace(cameras[b], name=cameras[a].name), replace(cameras[a], name=cameras[b].name))
     return Case(Rig(cameras), recording.frames, int(min(a, b)))  # findings about a pair have its first camera
 
 

@@ -155,10 +155,7 @@ def _turned_rows(results: Sequence[Mapping[str, Any]]) -> list[Row | None]:
     for case in dict.fromkeys(each["case"] for each in results):
         some = [each for each in results if each["case"] == case]
         excluded = float(case) >= EXCLUDED["degrees"]
-        rows += [
-            _share(f"{_turn(case)}: named", some, "named", None),
-            _fine(some, 5.0 if excluded else None),
-        ]
+        rows += [_share(f"{_turn(case)}: named", some, "named", None), _fine(some, 5.0 if excluded else None)]
     return rows
 
 

@@ -183,10 +183,7 @@ def stick_people(places: Floats, rng: np.random.Generator) -> Floats:
 
 def _limb_directions(ahead: Floats, aside: Floats) -> Floats:
     """Return unit directions, (n, 3), of limbs rotated from straight down by angles ahead and aside, radians."""
-    return np.stack(
-        [np.sin(ahead) * np.cos(aside), np.sin(aside), -np.cos(ahead) * np.cos(aside)],
-        axis=1,
-    )
+    return np.stack([np.sin(ahead) * np.cos(aside), np.sin(aside), -np.cos(ahead) * np.cos(aside)], axis=1)
 
 
 @dataclass(frozen=True)

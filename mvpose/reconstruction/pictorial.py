@@ -30,13 +30,7 @@ from mvpose.reconstruction.bone_length_prior import personal_prior, published_bo
 from mvpose.reconstruction.error_scale import person_scale
 from mvpose.reconstruction.inference import max_product
 from mvpose.reconstruction.likelihood import Noise, log_likelihood
-from mvpose.reconstruction.limb_direction_prior import (
-    LimbDirections,
-    body_axes,
-    limb_directions,
-    pull_bones,
-    set_left,
-)
+from mvpose.reconstruction.limb_direction_prior import LimbDirections, body_axes, limb_directions, pull_bones, set_left
 from mvpose.reconstruction.poses import Poses, clear, empty_poses, gather
 from mvpose.reconstruction.refinement import climb, fit_scale, write_uncertainty
 from mvpose.reconstruction.triangulation import consensus, pair_point

@@ -37,15 +37,7 @@ from simharness.scenario.sections.detector_section import DetectorSection
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views
 
-MODULES = (
-    "keypoints",
-    "score_distance",
-    "boxes",
-    "phantoms",
-    "false_positives",
-    "heatmaps",
-    "delivery",
-)
+MODULES = ("keypoints", "score_distance", "boxes", "phantoms", "false_positives", "heatmaps", "delivery")
 """Modules of ``simharness.detector`` that register steps, in the order in which steps of one stage run."""
 
 

@@ -254,11 +254,7 @@ def _removed(before: FailureKind, after: FailureKind | None) -> bool:
 
 
 def _blame_frame(
-    real: _FrameInput,
-    estimator: Estimator,
-    estimate: Estimate,
-    failures: Sequence[Failure],
-    tracked: Estimate | None,
+    real: _FrameInput, estimator: Estimator, estimate: Estimate, failures: Sequence[Failure], tracked: Estimate | None
 ) -> Iterable[Blamed]:
     """Yield the stages to blame; ``tracked`` is the estimate of a tracker from perfect detections."""
     perfect = _FrameInput(real.rig, *perfect_detections(real.detections, real.truth))

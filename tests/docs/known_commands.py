@@ -51,10 +51,7 @@ NAMES = (  # mentioned
     "simharness hunt my-room.toml --budget 30m",  # tests/simharness/hunt/test_hunt_run.py
     "simharness shrink results/failures/NAME.toml",  # tests/simharness/hunt/test_kept_failure.py
 )
-CHECKS = (
-    "simharness check ci --workers 2",
-    "simharness check ci --workers 2 --junit junit.xml --summary summary.md",
-)
+CHECKS = ("simharness check ci --workers 2", "simharness check ci --workers 2 --junit junit.xml --summary summary.md")
 CHECK_OF_TRACKING = "simharness check ci_tracking --workers 2"
 CHECK_OF_REPAIR = "simharness check ci_repair --workers 2"
 SHELF = (

@@ -32,11 +32,7 @@ PARTS = 2
 
 def of_slurm(part):
     words = ["bash", str(ROOT / "examples" / "slurm.sh"), "my-lab.toml"]
-    return words, {
-        "SLURM_ARRAY_TASK_ID": str(part),
-        "SLURM_ARRAY_TASK_COUNT": str(PARTS),
-        "SLURM_CPUS_PER_TASK": "1",
-    }
+    return words, {"SLURM_ARRAY_TASK_ID": str(part), "SLURM_ARRAY_TASK_COUNT": str(PARTS), "SLURM_CPUS_PER_TASK": "1"}
 
 
 def of_kubernetes(part):

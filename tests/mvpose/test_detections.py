@@ -29,10 +29,7 @@ BAD = {
     "two poses, one view": ({"keypoints": np.ones((2, 17, 2))}, r"keypoints must be \(1, 17, 2\), got \(2, 17, 2\)$"),
     "ragged": ({"keypoints": [[[1, 2]] * 16 + [[1]]]}, r"keypoints must be numbers of shape \(m, J, 2\)"),
     "scores of another shape": ({"scores": np.ones((17, 1))}, r"scores must be \(1, 17\), got \(17, 1\)"),
-    "percent": (
-        {"scores": np.full((1, 17), 80.0)},
-        r"lie in 0\.\.1, got 80 for joint 'nose' of detection 0",
-    ),
+    "percent": ({"scores": np.full((1, 17), 80.0)}, r"lie in 0\.\.1, got 80 for joint 'nose' of detection 0"),
     "logits": ({"scores": [[0.5] * 16 + [-2.5]]}, r"got -2\.5 for joint 'right_ankle' .* the sigmoid of logits"),
     "infinite score": ({"scores": [[0.5, np.inf] + [0.5] * 15]}, "got inf for joint 'left_eye'"),
     "negative view": ({"view": [-1]}, "view must be camera indices from 0, got -1"),

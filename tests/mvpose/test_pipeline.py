@@ -57,9 +57,7 @@ def test_phantoms_give_no_people():
     detections, person = detect(rig, people)
     phantom = np.full((1, 17, 2), 200.0) + 60 * np.random.default_rng(0).standard_normal((17, 2))
     with_phantom = Detections.from_keypoints(
-        [*detections.view, 3],
-        np.concatenate([detections.keypoints, phantom]),
-        np.full((len(person) + 1, 17), 0.9),
+        [*detections.view, 3], np.concatenate([detections.keypoints, phantom]), np.full((len(person) + 1, 17), 0.9)
     )
     estimate = Pipeline().estimate(rig, with_phantom)
     assert len(estimate) == 2

@@ -138,15 +138,7 @@ class TestNames:
 
     @pytest.mark.parametrize(
         "command",
-        [
-            ["run"],
-            ["render"],
-            ["export"],
-            ["show"],
-            ["study"],
-            ["check", "--baseline", "baseline.json"],
-            ["mjcf"],
-        ],
+        [["run"], ["render"], ["export"], ["show"], ["study"], ["check", "--baseline", "baseline.json"], ["mjcf"]],
     )
     def test_every_command_refuses_an_unknown_name_with_the_nearest(self, simharness, tmp_path, command):
         result = simharness(*command, "quikstart")

@@ -16,15 +16,7 @@ from simharness.reality.evaluation import ABLATION
 from simharness.trial.identity import PROVENANCE, provenance
 from tools.paper_tables.__main__ import main
 from tools.paper_tables.seed_scores import main as seed_scores
-from tools.paper_tables.tables import (
-    COMPARISON,
-    INPUTS,
-    SEED_SCORES,
-    VARIANTS,
-    paper_tables,
-    read_inputs,
-    write_tables,
-)
+from tools.paper_tables.tables import COMPARISON, INPUTS, SEED_SCORES, VARIANTS, paper_tables, read_inputs, write_tables
 from tools.paper_tables.text import markdown
 
 ON_SHELF = [name for name in VARIANTS if name != "appearance"]

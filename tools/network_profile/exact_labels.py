@@ -28,12 +28,7 @@ from simharness.detector.viewing_conditions import (
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.association import Association
 from simharness.reality.detector_fit.consensus import Consensus
-from simharness.reality.detector_fit.joint_labels import (
-    LabelledJoints,
-    bearing_bins,
-    error_classes,
-    expected_people,
-)
+from simharness.reality.detector_fit.joint_labels import LabelledJoints, bearing_bins, error_classes, expected_people
 from simharness.scenario.sections.detector_section import KIND_OF_JOINT, KINDS, BiasSection
 from simharness.types.sequence import Sequence as PoseSequence
 from simharness.types.truth import GOOD_BELOW, KeypointError

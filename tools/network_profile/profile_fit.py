@@ -30,14 +30,7 @@ from simharness.scenario.sections.detector_section import BEARINGS, KIND_OF_JOIN
 from simharness.types.random_streams import stream
 from simharness.types.truth import MISS_FROM, KeypointError
 from tools.network_profile.error_curves import error_curves, neighbour_distance
-from tools.network_profile.exact_labels import (
-    Results,
-    decoy_hits,
-    kind_of,
-    label_scenes,
-    measure_bias,
-    shared_scatter,
-)
+from tools.network_profile.exact_labels import Results, decoy_hits, kind_of, label_scenes, measure_bias, shared_scatter
 from tools.network_profile.profiled_scenes import ProfiledScene
 
 ROUNDS = 6

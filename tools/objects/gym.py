@@ -4,14 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tools.objects.belongings import (
-    DARK,
-    STEEL,
-    put_bottle,
-    put_holdall,
-    put_shoes,
-    some_cloth,
-)
+from tools.objects.belongings import DARK, STEEL, put_bottle, put_holdall, put_shoes, some_cloth
 from tools.objects.builder import ObjectBuilder
 
 _BEECH, _VINYL = np.array([0.80, 0.65, 0.45]), np.array([[0.16, 0.28, 0.48], [0.50, 0.18, 0.16], [0.20, 0.36, 0.30]])

@@ -5,16 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from simharness.world.scene.objects.shapes import loft
-from tools.objects.belongings import (
-    DARK,
-    STEEL,
-    WHITE,
-    put_bottle,
-    put_cable,
-    put_holdall,
-    put_papers,
-    some_cloth,
-)
+from tools.objects.belongings import DARK, STEEL, WHITE, put_bottle, put_cable, put_holdall, put_papers, some_cloth
 from tools.objects.builder import ObjectBuilder
 
 _WOODS = np.array([[0.16, 0.11, 0.08], [0.34, 0.20, 0.12], [0.08, 0.08, 0.09]])

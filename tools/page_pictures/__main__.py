@@ -64,13 +64,7 @@ def _write_pages(folder: Path, result: TrialResult) -> None:
 
     fine = diagnose(recording.rig, frames)
     write_page(
-        folder,
-        name="Hall, take 1",
-        people=people,
-        rig=recording.rig,
-        frames=frames,
-        diagnosis=fine,
-        pictures=picture,
+        folder, name="Hall, take 1", people=people, rig=recording.rig, frames=frames, diagnosis=fine, pictures=picture
     )
     wrong = _moved(recording.rig)
     write_doctor_page(

@@ -179,12 +179,7 @@ def _comparison(data: str, inputs: Mapping[str, Mapping[str, Any]]) -> Iterator[
     for head in HEADS if data == "shelf" else ():
         for variant, method in _OURS.items():
             scores = inputs[head]["variants"][variant]
-            yield {
-                "method": method,
-                "of": head,
-                "actors": scores["pcp_actors"],
-                "average": [scores["pcp"], None, None],
-            }
+            yield {"method": method, "of": head, "actors": scores["pcp_actors"], "average": [scores["pcp"], None, None]}
     for variant, method in _OURS.items():
         yield {"method": method, "of": "twin", "actors": None, "average": _ends(inputs[data]["pcp"][variant])}
 

@@ -10,12 +10,7 @@ from simharness.runtime.number_text import fixed, signed
 from simharness.trial.identity import provenance_sentence
 
 _DATA = {"campus": "Campus", "shelf": "Shelf"}
-_OF = {
-    "paper": "paper",
-    "voxelpose": "real Shelf, VoxelPose head",
-    "2019": "real Shelf, 2019 head",
-    "twin": "twin",
-}
+_OF = {"paper": "paper", "voxelpose": "real Shelf, VoxelPose head", "2019": "real Shelf, 2019 head", "twin": "twin"}
 
 _PLACED = {"campus": "people", "shelf": "people or the rack"}  # a seed at which these find no free place has no scene
 

@@ -161,14 +161,7 @@ def _panels(tiles: Sequence[Tile]) -> dict[str, dict[str, Any]]:
         ("score", "PCP and breaking points", _HARNESS, _ROOM[0] + _ROOM[2] + _GAP, _BELOW),
     )
     return {
-        name: {
-            "number": number,
-            "name": name,
-            "caption": caption,
-            "color": color,
-            "left": left,
-            "top": top + _TITLE,
-        }
+        name: {"number": number, "name": name, "caption": caption, "color": color, "left": left, "top": top + _TITLE}
         for number, (name, caption, color, left, top) in enumerate(panels, 1)
     }
 

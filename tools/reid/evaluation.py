@@ -57,10 +57,7 @@ def evaluate(
         log(f"look_alike {value:g}: {curve[f'{value:g}']}")
     sample = np.isin(sites[0].seed, [group.seed for group in plan.sample_job.groups])
     return Evaluation(
-        data={
-            "held_out": card.of_crops(Crops.joined(sites)),
-            "held_out_sample": card.of_sample(sites[0][sample]),
-        },
+        data={"held_out": card.of_crops(Crops.joined(sites)), "held_out_sample": card.of_sample(sites[0][sample])},
         results={"held_out": at_sites, "look_alike": curve},
         distances={
             **card.bins(),

@@ -91,14 +91,7 @@ def _free_space(room: RoomSection, rig: Rig) -> FreeSpace:
     places = np.linspace(-REACH, REACH, 3)
     columns = np.meshgrid(places, places, np.linspace(0.1, _TALL, 6), indexing="ij")
     joints = np.stack(columns, axis=-1).reshape(1, -1, 6, 3)
-    return FreeSpace(
-        room=room,
-        area=REACH + _ARMS,
-        time=np.zeros(1),
-        pelvises=joints[:, :, 0],
-        joints=joints,
-        rig=rig,
-    )
+    return FreeSpace(room=room, area=REACH + _ARMS, time=np.zeros(1), pelvises=joints[:, :, 0], joints=joints, rig=rig)
 
 
 def _tinted(solid: Solid, tints: Mapping[str, NDArray[np.float32]]) -> Mesh:

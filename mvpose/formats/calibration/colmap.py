@@ -94,12 +94,7 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
         Path(path).with_name(name).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-FORMAT = CalibrationFormat(
-    "COLMAP (text)",
-    lambda file: file.path.name in FILES,
-    read_calibration,
-    write_calibration,
-)
+FORMAT = CalibrationFormat("COLMAP (text)", lambda file: file.path.name in FILES, read_calibration, write_calibration)
 
 
 def _lines(text: str) -> list[str]:

@@ -77,12 +77,7 @@ def blocks_below(
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def dim(
-    drawn: DrawnPixels,
-    blocks: np.ndarray,
-    view: PixelRays,
-    layers: ShadowLayers,
-    dimming: np.ndarray,
-    rgb: np.ndarray,
+    drawn: DrawnPixels, blocks: np.ndarray, view: PixelRays, layers: ShadowLayers, dimming: np.ndarray, rgb: np.ndarray
 ) -> None:
     """Darken the pixels of still meshes that moving ones shade, in place.
 

@@ -105,12 +105,7 @@ def stage_times(times: Mapping[str, Mapping[str, float]]) -> str:
 
 
 def floor_plan(
-    rig: Rig,
-    room: tuple[float, float],
-    *,
-    things: Sequence[Floats],
-    paths: Floats,
-    estimates: Floats,
+    rig: Rig, room: tuple[float, float], *, things: Sequence[Floats], paths: Floats, estimates: Floats
 ) -> str:
     """Plot the scene from above.
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,12 +22,6 @@ _RULE_OF_THREE = 3.0
 """An event that never happened in n independent trials has a probability of at most 3 / n, at 95 %. Correlated trials
 count as fewer."""
 
-
-def _people_hidden(index: int, sums: FrameSums) -> Floats:
-    """Return how many people are hidden by ``index`` fifths in each frame, (T,)."""
-    return sums.people.hidden.n[:, index]
-
-
 _COUNTED: Mapping[str, Callable[[FrameSums], Floats]] = {
     "keypoints.inversion_uncovered": lambda sums: sums.classes["inversion"].k[:, 2],
     "keypoints.swap_uncovered": lambda sums: sums.classes["swap"].k[:, 2],
@@ -39,7 +32,6 @@ _COUNTED: Mapping[str, Callable[[FrameSums], Floats]] = {
     "keypoints.stray": lambda sums: sums.miss.n,
     "boxes": lambda sums: sums.people.all.n,
     "boxes.duplicates": lambda sums: sums.people.detected,
-    **{f"boxes.missed_hidden.{index}": partial(_people_hidden, index) for index in range(5)},
     "phantoms": lambda sums: sums.false.n,
     "size": lambda sums: sums.size.n,
     "size.fragments": lambda sums: sums.false.fragments,
@@ -229,4 +221,4 @@ def _count(key: str, sums: FrameSums) -> int:
     if kind is not None:
         return int(sums.scatter.n[:, kind].sum())
     counted = _COUNTED.get(key, _COUNTED.get(section, lambda sums: sums.classes["drop"].n))
-    return int(counted(sums).sum())
+    return int((sums.people.hidden.n[:, int(rest[-1])] if rest[0] == "missed_hidden" else counted(sums)).sum())

@@ -90,9 +90,6 @@ _BY_SHARE = {"keypoints.inversion": "share.inversion", "keypoints.swap": "share.
 all joints: most joints are such, and few say by which factor the shares of the others, those of the profile, are
 larger."""
 
-_UNCOVERED = {group: f"{group}_uncovered" for group in _BY_SHARE}
-"""Keys of the factors of joints that nothing else hides."""
-
 _DROPS = tuple(f"keypoints.drop.{state}" for state in STATES)
 _OF_DROPS = ("keypoints.drop.edge", "keypoints.drop.depth")  # without effect where no joint is dropped
 
@@ -175,10 +172,7 @@ def infer(
 def _as_wide_as_simulated(
     measured: Mapping[str, MeasuredValue], simulated: Sequence[Mapping[str, float]]
 ) -> dict[str, MeasuredValue]:
-    """Return measured values whose intervals are at least as wide as the values vary between simulations.
-
-    Kinds of joint are alike.
-    """
+    """Return measured values with intervals as wide as they vary between simulations, alike for kinds of joint."""
     groups: dict[str, dict[str, float]] = defaultdict(dict)
     for key, each in measured.items():
         values = np.array([of.get(key, np.nan) for of in simulated])
@@ -326,7 +320,7 @@ class _Inference:
         self.slopes = _OWN * np.eye(len(self.parameters))
         self.reach = next((i for i, each in enumerate(self.parameters) if each.key == "keypoints.inversion_reach"), -1)
         self.apart = np.array([each.group == "keypoints.inversion" for each in self.parameters]) * (self.reach >= 0)
-        uncovered = [[_UNCOVERED.get(each.group) == other.key for other in self.parameters] for each in self.parameters]
+        uncovered = [[f"{each.group}_uncovered" == other.key for other in self.parameters] for each in self.parameters]
         self.uncovered = np.array(uncovered, float)
         self.groups: dict[str, dict[str, int]] = {}
         for index, each in enumerate(self.parameters):
@@ -366,10 +360,7 @@ class _Inference:
         return {each.key: each.value(there) for each, there in zip(self.parameters, place, strict=True)}
 
     def of_values(self, deviation: Floats) -> Floats:
-        """Return the deviations of the values, (N,): shares of inversions at no distance also depend on the reach.
-
-        Those of joints that others hide also depend on the factor of uncovered ones.
-        """
+        """Return the deviations of the values, (N,): shares also depend on the reach and on the factor of uncovered."""
         by_reach = self.apart * _APART * deviation[self.reach] / np.exp(self.at[self.reach])
         return np.sqrt(deviation**2 + by_reach**2 + self.uncovered @ deviation**2)
 
@@ -426,17 +417,6 @@ class _Inference:
         pull = pull + self.inverse @ np.nan_to_num(self.prior)
         return np.linalg.solve(information, pull), np.sqrt(np.diag(np.linalg.inv(information)))
 
-    def _between(self) -> Floats:
-        """Return by how much variances between the simulations so far exceed those of the bootstrap, (N,).
-
-        Parameters moved between them: a value followed its own at the usual slope, or did not.
-        """
-        measured, places = np.array(self.measured), np.array(self.places)
-        weight = np.isfinite(measured) / np.maximum(np.isfinite(measured).sum(axis=0), 1)
-        either = (measured, measured - places @ self.slopes.T)
-        first, second = (self._more(each - (weight * np.nan_to_num(each)).sum(axis=0), weight) for each in either)
-        return np.minimum(first, second)
-
     def _more(self, away: Floats, weight: Floats) -> Floats:
         """Return by how much variances between simulations exceed those of the recording's bootstrap, (N,), 1 or more.
 
@@ -450,3 +430,11 @@ class _Inference:
             count = ((weight[:, index] > 0).sum(axis=0) - 1.0).clip(0.0)
             result[index] = max(1.0, (count @ ratio[index] + 1.0) / (count.sum() + 1.0))
         return result
+
+    def _between(self) -> Floats:
+        """Return the same of all simulations so far, (N,): values followed their moving parameters, or did not."""
+        measured, places = np.array(self.measured), np.array(self.places)
+        weight = np.isfinite(measured) / np.maximum(np.isfinite(measured).sum(axis=0), 1)
+        either = (measured, measured - places @ self.slopes.T)
+        first, second = (self._more(each - (weight * np.nan_to_num(each)).sum(axis=0), weight) for each in either)
+        return np.minimum(first, second)

@@ -52,10 +52,7 @@ class GateSection(Section):
     """Rule of ``simharness check``: a change fails it that is significant and larger than allowed."""
 
     level: float = key(
-        0.05,
-        "significance level: chance of a false alarm of a check where the method did not change",
-        gt=0.0,
-        lt=1.0,
+        0.05, "significance level: chance of a false alarm of a check where the method did not change", gt=0.0, lt=1.0
     )
     slowdown: float = key(
         1.3, "largest factor by which the time of a frame, relative to a reference kernel, may grow", gt=1.0, le=100.0

@@ -40,12 +40,7 @@ class Group:
 
 
 def choreograph(
-    scenario: Scenario,
-    cast: Cast,
-    time: Floats,
-    *,
-    widest: float | None = None,
-    cameras: Floats = _NO_CAMERAS,
+    scenario: Scenario, cast: Cast, time: Floats, *, widest: float | None = None, cameras: Floats = _NO_CAMERAS
 ) -> Performance:
     """Plan the motions and props of all people, and the times at which they are in the scene.
 
@@ -199,12 +194,7 @@ class _Stage:
     """
 
     def __init__(
-        self,
-        scenario: Scenario,
-        groups: Sequence[Group],
-        cast: Cast,
-        time: Floats,
-        doors: tuple[Door, ...],
+        self, scenario: Scenario, groups: Sequence[Group], cast: Cast, time: Floats, doors: tuple[Door, ...]
     ) -> None:
         seed = scenario.seed
         self._scenario, self._doors, self._spacing = scenario, doors, scenario.people.spacing

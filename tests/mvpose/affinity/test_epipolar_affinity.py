@@ -19,10 +19,7 @@ def test_epipolar_distance_is_the_mean_over_both_lines():
     rig, people = ring(3), crowd(2)
     detections, person = detect(rig, people, noise=5.0)
     distance = epipolar_distance(rig, detections)
-    a, b = (
-        np.argmax((detections.view == 0) & (person == 0)),
-        np.argmax((detections.view == 1) & (person == 1)),
-    )
+    a, b = (np.argmax((detections.view == 0) & (person == 0)), np.argmax((detections.view == 1) & (person == 1)))
     x, y = detections.keypoints[a], detections.keypoints[b]
     in_b = cv2.computeCorrespondEpilines(x[:, None], 1, rig.F[0, 1])[:, 0]  # normalised lines
     in_a = cv2.computeCorrespondEpilines(y[:, None], 2, rig.F[0, 1])[:, 0]

@@ -17,11 +17,7 @@ def two_rays(origin, direction, other_origin, other_direction):
     directions = np.array([[direction], [other_direction]], float)
     directions /= np.linalg.norm(directions, axis=2, keepdims=True)
     return Rays(
-        np.array([0, 1]),
-        np.array([origin, other_origin], float),
-        directions,
-        np.ones((2, 1)),
-        np.full(2, 1e-3),
+        np.array([0, 1]), np.array([origin, other_origin], float), directions, np.ones((2, 1)), np.full(2, 1e-3)
     )
 
 
@@ -226,12 +222,7 @@ def test_ray_affinity_does_not_depend_on_resolution():
     for scale in (0.25, 1.0, 4.0):
         rig = ring(4)
         cameras = [
-            Camera(
-                np.diag([scale, scale, 1]) @ c.K,
-                c.R,
-                c.t,
-                size=(int(c.size[0] * scale), int(c.size[1] * scale)),
-            )
+            Camera(np.diag([scale, scale, 1]) @ c.K, c.R, c.t, size=(int(c.size[0] * scale), int(c.size[1] * scale)))
             for c in rig
         ]
         detections, _ = detect(Rig(cameras), people, noise=3.0 * scale)

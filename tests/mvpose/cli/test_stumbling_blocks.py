@@ -30,11 +30,7 @@ RIGS = {
     ("rig", "pixels", "part"),
     [
         ("as it is", lambda p: p / [1280, 960], "camera 'cam0': the keypoints lie between"),
-        (
-            "as it is",
-            lambda p: 2.0 * p,
-            "beyond its picture of 1280 x 960 pixels: the calibration is of another",
-        ),
+        ("as it is", lambda p: 2.0 * p, "beyond its picture of 1280 x 960 pixels: the calibration is of another"),
         ("principal point", lambda p: p, "the principal point (6395, 479.5) lies outside its picture of 1280 x 960"),
         ("y up", lambda p: p, "where the y axis of the world points up; expected z. If this is so, give --up=y"),
         ("camera 1 as the world", lambda p: p, "where the -y axis of the world points up"),

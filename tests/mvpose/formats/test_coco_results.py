@@ -34,9 +34,7 @@ def write(folder, **cameras):
 def test_people_belong_to_the_frame_and_the_camera_that_they_name(tmp_path):
     a, b, c, other = (person(seed) for seed in range(4))
     write(
-        tmp_path,
-        right=[entry(9, c, box=(1, 2, 3, 4)), entry(5, b), entry(700, other)],
-        left=[entry(5, a, score=1.3)],
+        tmp_path, right=[entry(9, c, box=(1, 2, 3, 4)), entry(5, b), entry(700, other)], left=[entry(5, a, score=1.3)]
     )
     first, second, third = read(tmp_path)
     assert first.view.tolist() == [0, 1]
@@ -70,10 +68,7 @@ def test_other_skeletons_are_converted_by_name(tmp_path):
 @pytest.mark.parametrize(
     ("left", "message"),
     [
-        (
-            [entry(5, person(0)), entry(5, person(0, 25))],
-            r"left\.json: entry 1: keypoints must be 51 .* got 75",
-        ),
+        ([entry(5, person(0)), entry(5, person(0, 25))], r"left\.json: entry 1: keypoints must be 51 .* got 75"),
         ([{"keypoints": [0.0] * 51}], r"left\.json: entry 0: expected image_id, .* got null"),
         ([{"image_id": "a.jpg", "keypoints": []}], r'left\.json: entry 0: expected image_id, .* got "a\.jpg"'),
         ([{"image_id": 5}], r"left\.json: entry 0: no numbers 'keypoints'"),

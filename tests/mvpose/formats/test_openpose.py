@@ -81,10 +81,7 @@ def test_nobody_anywhere_is_an_empty_frame(tmp_path):
         ("", "truncated JSON .*0 bytes"),
         ('{"persons": []}', "no list 'people'"),
         ('{"people": [{"face": []}]}', r"people\[0\] has no 'pose_keypoints_2d'"),
-        (
-            json.dumps({"people": [{"pose_keypoints_2d": [0.1] * 54}]}),
-            r"people\[0\].*75 numbers \(BODY_25\), got 54",
-        ),
+        (json.dumps({"people": [{"pose_keypoints_2d": [0.1] * 54}]}), r"people\[0\].*75 numbers \(BODY_25\), got 54"),
         (json.dumps({"people": [{"pose_keypoints_2d": ["a"] * 75}]}), r"people\[0\].*other than numbers"),
         ('{"people": [{"pose_keypoints_2d": [' + "NaN," * 74 + "1]}]}", r"people\[0\].*not finite"),
     ],

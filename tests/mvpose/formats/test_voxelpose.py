@@ -67,10 +67,7 @@ def test_a_rig_too_large_for_millimetres_is_refused(tmp_path):
     ("damage", "message"),
     [
         (lambda cameras: cameras["b"].pop("fx"), r"camera 'b' lacks fx; expected fx, fy, cx, cy, R, T, k, p"),
-        (
-            lambda cameras: cameras["b"].update(R=[[1, 0], [0, 1]]),
-            r"camera 'b': R must be \(3, 3\), got \(2, 2\)",
-        ),
+        (lambda cameras: cameras["b"].update(R=[[1, 0], [0, 1]]), r"camera 'b': R must be \(3, 3\), got \(2, 2\)"),
         (lambda cameras: cameras["a"].update(T=[1, 2]), r"camera 'a': T must be \(3,\), got \(2,\)"),
         (lambda cameras: cameras["a"].update(fx="wide"), r"camera 'a': fx must be numbers"),
         (lambda cameras: cameras["a"].update(k=[[0.1], ["x"], [0]]), r"camera 'a': k must be numbers"),

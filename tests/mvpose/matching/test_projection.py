@@ -40,10 +40,7 @@ def test_the_projection_is_the_nearest_point_of_c(seed):
     matrix, view = random_case(seed)
     result = project(matrix, view)
     rng = np.random.default_rng(seed + 1)
-    corners = [
-        np.eye(len(view)),
-        project(20 * random_case(seed + 2, scale=5)[0][:1, :1] * np.ones_like(matrix), view),
-    ]
+    corners = [np.eye(len(view)), project(20 * random_case(seed + 2, scale=5)[0][:1, :1] * np.ones_like(matrix), view)]
     for _ in range(20):
         other = rng.standard_normal(matrix.shape) * 30
         corners.append(project(other + other.T, view))

@@ -21,12 +21,7 @@ from mvpose.reconstruction.bone_length_prior import (
 from mvpose.reconstruction.error_scale import SHARED
 from mvpose.reconstruction.inference import marginalize, max_product
 from mvpose.reconstruction.likelihood import log_likelihood
-from mvpose.reconstruction.limb_direction_prior import (
-    body_axes,
-    direction_log_likelihood,
-    limb_directions,
-    pull_bones,
-)
+from mvpose.reconstruction.limb_direction_prior import body_axes, direction_log_likelihood, limb_directions, pull_bones
 from mvpose.reconstruction.pictorial import propose_all, propose_single_views
 from mvpose.reconstruction.refinement import _add_ambiguity, climb, refine
 from mvpose.reconstruction.triangulation import consensus

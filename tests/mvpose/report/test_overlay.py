@@ -171,10 +171,7 @@ def test_mosaic_fits_smaller_pictures_into_its_tiles_without_stretching_them():
 
 @pytest.mark.parametrize(
     ("pictures", "titles", "message"),
-    [
-        ([], [], "got 0 pictures and 0 titles"),
-        ([BLACK], [], "got 1 pictures and 0 titles"),
-    ],
+    [([], [], "got 0 pictures and 0 titles"), ([BLACK], [], "got 1 pictures and 0 titles")],
 )
 def test_bad_mosaics_are_refused(pictures, titles, message):
     with pytest.raises(ValueError, match=message):

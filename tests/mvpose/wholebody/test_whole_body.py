@@ -117,10 +117,7 @@ class TestSkeletons:
         [
             ("name = 3", "expected a skeleton"),
             ('name = "x"\njoints = 4', "expected a skeleton"),
-            (
-                'name = "x"\n[joints]\ntoe = { sigma = 0.1 }',
-                "joints.toe: needs parent, because it is no",
-            ),
+            ('name = "x"\n[joints]\ntoe = { sigma = 0.1 }', "joints.toe: needs parent, because it is no"),
             ('name = "x"\n[joints]\ntoe = { parent = "", sigma = "wide" }', "joints.toe: sigma must be a number"),
             ('name = "x"\n[joints]\ntoe = { parent = "", sigma = 0 }', "sigmas must be positive"),
             ('name = "x"\n[joints]\ntoe = { parent = "foot", sigma = 1 }', "joints.toe: parent 'foot' is no joint"),

@@ -277,11 +277,7 @@ class TestSplit:
 
     def test_a_half_without_joints_is_not_detected(self):
         people, views, rig = crowd(50)
-        for values, nothing in (
-            (people.keypoints, np.nan),
-            (people.scores, 0.0),
-            (people.error, KeypointError.ABSENT),
-        ):
+        for values, nothing in ((people.keypoints, np.nan), (people.scores, 0.0), (people.error, KeypointError.ABSENT)):
             values[:, :, :, ~UPPER_BODY] = nothing
         pixels = np.where((LIMB_OF_JOINT == 2)[:, None], np.nan, views.pixels)  # behind the camera
         found = find((people, replace(views, pixels=pixels), rig), split=1.0)

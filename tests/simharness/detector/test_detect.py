@@ -51,8 +51,7 @@ def test_a_perfect_detector_sees_the_exact_projections():
 
 def test_perfect_detections_are_reconstructed_to_under_a_millimetre():
     scenario = load(
-        "scenarios/quickstart.toml",
-        overrides=["detector.profile=perfect", "duration=1.0", "rendering.renderer=rays"],
+        "scenarios/quickstart.toml", overrides=["detector.profile=perfect", "duration=1.0", "rendering.renderer=rays"]
     )
     trial = build_trial(scenario)
     sequence = simulate(trial.scene)

@@ -32,13 +32,7 @@ class TestKeypoints:
         np.testing.assert_allclose(read.keypoints, made.keypoints, atol=1e-3)
         np.testing.assert_allclose(read.scores, made.scores, atol=1e-5)
 
-    @given(
-        st.sampled_from(SIZES),
-        st.floats(0.6, 4.0),
-        st.floats(0.0, 1.0),
-        st.floats(0.01, 1.0),
-        st.integers(0, 1000),
-    )
+    @given(st.sampled_from(SIZES), st.floats(0.6, 4.0), st.floats(0.0, 1.0), st.floats(0.01, 1.0), st.integers(0, 1000))
     def test_the_strongest_mode_is_the_keypoint_for_any_head(self, size, width, floor, score, seed):
         made = peaks(2, seed=seed, scores=score, contested=0.5, size=size, width=width, floor=floor)
         maps = made.heatmaps()

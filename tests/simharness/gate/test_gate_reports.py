@@ -104,7 +104,7 @@ class TestJUnit:
         suite, cases = cases_of(made())
         assert list(cases) == [WHOLE, "a<b|c", "base", "crowd", SPEED]
         assert [suite.get(key) for key in ("name", "tests", "failures", "errors", "time")] == [
-            *("ci", "5", "0", "0", "61.2"),
+            *("ci", "5", "0", "0", "61.2")
         ]
         assert not [child for case in cases.values() for child in case]
 

@@ -145,12 +145,7 @@ def test_the_changed_stage_is_named(measured, variant, score, where):
 
 @pytest.mark.parametrize(
     ("fault", "score"),
-    [
-        ("forgetful", "missed"),
-        ("humble", "score_brier"),
-        ("upside_down", "map"),
-        ("shaky", "mpjpe_mm"),
-    ],
+    [("forgetful", "missed"), ("humble", "score_brier"), ("upside_down", "map"), ("shaky", "mpjpe_mm")],
 )
 def test_a_planted_fault_is_a_regression(measured, fault, score):
     assert verdicts(measured["same"], measured[fault]).get(score) == "worse"

@@ -20,12 +20,7 @@ def test_annotated_people_are_scored(head):
     assert calls == [(k, 9) for k in range(1, 10)]
     assert all(method.calls == 4 for method in methods.values())  # one more to compile
     summary = json.loads(json.dumps(evaluation.summary(), allow_nan=False))
-    assert (summary["name"], summary["head"], summary["frames"], summary["frames_annotated"]) == (
-        "shelf",
-        head,
-        3,
-        2,
-    )
+    assert (summary["name"], summary["head"], summary["frames"], summary["frames_annotated"]) == ("shelf", head, 3, 2)
     one, both, none = (summary["variants"][name] for name in methods)
     assert one["pcp_actors"] == [100.0, 0.0, None]
     assert (one["pcp"], one["precision"], one["recall"]) == (50.0, 1.0, 2 / 3)

@@ -61,8 +61,7 @@ def test_detections_and_truth_belong_to_the_same_frames(shelf):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("head", "actors", "average"),
-    [("voxelpose", (99.5, 93.5, 98.5), 97.2), ("2019", (98.5, 91.9, 98.6), 96.3)],
+    ("head", "actors", "average"), [("voxelpose", (99.5, 93.5, 98.5), 97.2), ("2019", (98.5, 91.9, 98.6), 96.3)]
 )
 def test_true_correspondences_reach_the_published_scores(shelf, head, actors, average):
     """The whole protocol: detections assigned to true people by projection, then score-weighted DLT."""

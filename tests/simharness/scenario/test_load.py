@@ -108,10 +108,7 @@ class TestValues:
             ("[cameras]\npositions = [[1, 2, 3], [1, 2]]", "cameras.positions[1]: expected 3 numbers (x, y, z), got 2"),
             ("[cameras]\ndistortion = [-0.1, 0.02]", "got 2: [-0.1, 0.02]; e.g. [-0.1, 0.02, 0, 0, 0]"),
             ("[faults]\nswapped = [[1]]", "faults.swapped[0]: expected 2 numbers (camera, camera), got 1: [1]"),
-            (
-                "[detector.bias]\nhips = [0.1]",
-                "3 numbers (forward, outward, up), got 1: [0.1]; e.g. [0.1, 0, 0]",
-            ),
+            ("[detector.bias]\nhips = [0.1]", "3 numbers (forward, outward, up), got 1: [0.1]; e.g. [0.1, 0, 0]"),
         ],
     )
     def test_a_list_of_a_wrong_length_is_one_mistake_with_an_example(self, scenario_file, text, message):
@@ -314,9 +311,7 @@ SCENARIOS = st.builds(
     seed=st.integers(0, 2**53 - 1),
     people=st.builds(PeopleSection, count=st.integers(0, 100)),
     cameras=st.builds(
-        CamerasSection,
-        fov=st.floats(1.0, 170.0, exclude_min=True, exclude_max=True),
-        start=st.floats(-360.0, 360.0),
+        CamerasSection, fov=st.floats(1.0, 170.0, exclude_min=True, exclude_max=True), start=st.floats(-360.0, 360.0)
     ),
 )
 

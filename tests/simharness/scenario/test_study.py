@@ -217,10 +217,7 @@ class TestRanges:
     @pytest.mark.parametrize(
         ("text", "part"),
         [
-            (
-                "{ start = 0, stop = 2, num = 5 }",
-                "start, stop, num is not a key of a range; write a list, [2, 3",
-            ),
+            ("{ start = 0, stop = 2, num = 5 }", "start, stop, num is not a key of a range; write a list, [2, 3"),
             ("{ from = 0, to = 2 }", "a range needs from, to and steps"),
             ("{ from = 0, to = 2, steps = 2.5 }", "expected 2 to 10000 steps, got 2.5"),
             ("{ from = 0, to = 2, steps = 1 }", "expected 2 to 10000 steps, got 1"),

@@ -57,11 +57,7 @@ def test_a_shifted_estimate_loses_the_parts_shorter_than_twice_the_shift(shift):
 @pytest.mark.parametrize(
     ("joint", "part", "boundary"),
     [
-        (
-            "right_ankle",
-            "right_lower_leg",
-            0.5,
-        ),  # one end off by the length: the mean of the ends is half of it
+        ("right_ankle", "right_lower_leg", 0.5),  # one end off by the length: the mean of the ends is half of it
         ("left_wrist", "left_lower_arm", 0.25),
         ("head_top", "head", 0.25),
     ],

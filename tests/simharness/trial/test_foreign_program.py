@@ -61,10 +61,7 @@ def shell(text, **bounds):
         (f"{CHILD} echo loading >&2; wait", r"did not answer within 0\.5 s; its standard error ends: loading"),
         ("exec >&- 2>&-; sleep 300", r"did not answer within 0\.5 s"),
         ("while :; do echo warning >&2; done", r"did not answer within 0\.5 s; its standard error ends: .*warning"),
-        (
-            f"{CHILD} echo first >&2; echo no weights >&2; exit 4",
-            r"ended with exit code 4; .*: first \| no weights",
-        ),
+        (f"{CHILD} echo first >&2; echo no weights >&2; exit 4", r"ended with exit code 4; .*: first \| no weights"),
         (f"{CHILD} kill -SEGV $$", "was ended by SIGSEGV"),
         ("(while :; do echo; done) & echo $! >> pids; exit 5", "ended with exit code 5"),
     ],

@@ -162,10 +162,7 @@ def test_a_file_that_is_no_pose_head_is_named(scenario):
     [
         ("nobody", r"detector\.network: network 'nobody': no such file or name; `mvpose networks list`"),
         ("none.onnx", r"detector\.network: .*none\.onnx"),
-        (
-            "yolox_boxes.onnx",
-            r"detector\.network: yolox_boxes\.onnx gives boxes alone; name a pose head",
-        ),
+        ("yolox_boxes.onnx", r"detector\.network: yolox_boxes\.onnx gives boxes alone; name a pose head"),
     ],
 )
 def test_a_network_that_finds_no_keypoints_is_named(scenario, tmp_path, given, message):

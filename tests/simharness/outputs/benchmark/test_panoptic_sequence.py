@@ -267,10 +267,7 @@ def test_repeated_pictures_are_in_the_manifest(scenario, tmp_path):
         assert camera["lost"] == []
         first, *others = sorted((made / "hdImgs" / camera["name"]).iterdir())
         assert {other.read_bytes() for other in others} == {first.read_bytes()}
-        assert camera["clock"] == {
-            "mean": 0.0,
-            "deviation": 0.0,
-        }  # relative to the frame of the picture
+        assert camera["clock"] == {"mean": 0.0, "deviation": 0.0}  # relative to the frame of the picture
 
 
 def test_cameras_of_panoptic_keep_their_names(scenario, tmp_path):

@@ -266,8 +266,7 @@ class TestClasses:
         assert mean(erring, key) == pytest.approx(expected, abs=within)
 
     @pytest.mark.parametrize(
-        ("key", "expected", "within"),
-        [("keypoints.self_occluded", 1.5, 0.2), ("keypoints.occluded", 2.0, 0.25)],
+        ("key", "expected", "within"), [("keypoints.self_occluded", 1.5, 0.2), ("keypoints.occluded", 2.0, 0.25)]
     )
     def test_factors_of_hidden_joints(self, erring, key, expected, within):
         assert mean(erring, key) == pytest.approx(expected, abs=within)

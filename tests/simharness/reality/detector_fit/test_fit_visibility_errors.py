@@ -34,11 +34,7 @@ def shares_of(miss, jitter, *factors):
     return dict(zip(KEYS, [*wrong, miss / wrong[0]], strict=True))
 
 
-@given(
-    st.floats(1e-5, 0.3),
-    st.floats(1e-5, 0.3),
-    st.tuples(st.floats(0.01, 1.0), st.floats(0.01, 1.0)),
-)
+@given(st.floats(1e-5, 0.3), st.floats(1e-5, 0.3), st.tuples(st.floats(0.01, 1.0), st.floats(0.01, 1.0)))
 def test_parameters_have_the_shares_that_they_are_made_of(miss, jitter, reach):
     most = min(1 / max(miss, jitter), LARGEST_MULTIPLE / 2)  # shares of hidden joints are 1 at most
     factors = [each * most for each in reach]

@@ -61,10 +61,7 @@ def test_truth_without_legs_is_named():
         legs = [k for k, part in enumerate(SHELF14.parts) if part in {"knee", "ankle"}]
         truth[:, :, legs] = np.nan
 
-    with pytest.raises(
-        ValueError,
-        match=r"with all 12 joints .* no left knee, right knee, left ankle, right ankle",
-    ):
+    with pytest.raises(ValueError, match=r"with all 12 joints .* no left knee, right knee, left ankle, right ankle"):
         check_recording(of_truth(cut))
 
 

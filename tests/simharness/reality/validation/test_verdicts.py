@@ -159,12 +159,7 @@ class TestRanks:
 
     @pytest.mark.parametrize(
         ("low", "high", "state"),
-        [
-            (0.8 - 1e-16, 0.8, HOLDS),
-            (0.7, 0.9, CANNOT_TELL),
-            (0.7, 0.75, FAILS),
-            (0.7, math.nan, CANNOT_TELL),
-        ],
+        [(0.8 - 1e-16, 0.8, HOLDS), (0.7, 0.9, CANNOT_TELL), (0.7, 0.75, FAILS), (0.7, math.nan, CANNOT_TELL)],
     )
     def test_bounds(self, low, high, state):
         assert at_least("draw_rank", "x", Interval((low + high) / 2, low, high, 1), 0.8).state == state

@@ -96,11 +96,7 @@ def test_positive_angles_of_limbs_move_joints_in_the_named_direction(person, dof
 
 
 @pytest.mark.parametrize(
-    ("dof", "bone", "direction"),
-    [
-        ("ankle_dorsiflexion", "ToeBase", Z),
-        ("wrist_flexion", "HandFinger1", -Y),
-    ],
+    ("dof", "bone", "direction"), [("ankle_dorsiflexion", "ToeBase", Z), ("wrist_flexion", "HandFinger1", -Y)]
 )
 def test_positive_angles_of_hands_and_feet_move_them_in_the_named_direction(person, dof, bone, direction):
     for side, mirror in (("left", [1, 1, 1]), ("right", [1, -1, 1])):

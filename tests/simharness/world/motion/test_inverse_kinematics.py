@@ -17,11 +17,7 @@ from simharness.world.motion.poses.foot_placement import (
     spot_to_world,
     stance,
 )
-from simharness.world.motion.poses.inverse_kinematics import (
-    arm_angles,
-    reach_with,
-    solve_legs,
-)
+from simharness.world.motion.poses.inverse_kinematics import arm_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease
 

@@ -154,10 +154,7 @@ def test_follow_does_not_jump_between_solutions(kinematics):
     np.testing.assert_allclose(found, angles, atol=1e-6)
 
 
-@given(
-    axis=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1),
-    angle=st.floats(0.0, np.pi),
-)
+@given(axis=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1), angle=st.floats(0.0, np.pi))
 @settings(max_examples=60, deadline=None)
 def test_a_ball_joint_reaches_every_orientation(axis, angle):
     """Three hinges through one point reach any orientation, including half a turn."""

@@ -113,11 +113,7 @@ def test_real_files(shared_data, name, frames, rate, height):
         ("Frames: 2", "Frames: 1", r"line 25: Frames: states 1, got 2 lines of values"),
         ("Frames: 2", "Frames: 0", r"line 22: expected a count of 1 or more after Frames:, got '0'"),
         ("Frames: 2", "Frames: many", r"line 22: expected a count of 1 or more after Frames:, got 'many'"),
-        (
-            "Frames: 2",
-            "Frames: 99999999999999999999",
-            r"Frames: states 999999999999999999, got 2 lines",
-        ),
+        ("Frames: 2", "Frames: 99999999999999999999", r"Frames: states 999999999999999999, got 2 lines"),
         ("Frames: 2\n", "", r"line 22: expected Frames: and a count, got 'Frame Time: 0.02'"),
         ("Frame Time: 0.02", "Frame Time: 0", r"line 23: expected a Frame Time of 0.0001 to 10 s, got 0"),
         ("Frame Time: 0.02", "Frame Time:", r"line 23: expected 1 value for Frame Time, got 0"),

@@ -171,10 +171,7 @@ def test_motion_does_not_depend_on_the_duration(bodies, shared_data):
 
 
 @pytest.mark.parametrize(
-    ("mocap", "message"),
-    [
-        ({"file": "walk.bvh"}, r"people.motion.file = 'walk.bvh': no such file"),
-    ],
+    ("mocap", "message"), [({"file": "walk.bvh"}, r"people.motion.file = 'walk.bvh': no such file")]
 )
 def test_missing_files_are_refused(mocap, message):
     with pytest.raises(ValueError, match=message):

@@ -46,16 +46,10 @@ def test_a_scenario_names_a_file_beside_it(tmp_path, name):
         (b"", r"found a file that begins with b''; expected one of Panoptic \(JSON\), .*, OpenCV \(YAML, XML, JSON\)$"),
         (b"\x89PNG\r\n", r"found a file that begins with b'\\x89PNG"),
         (b"[cameras]\ncount = 4\n", r'found TOML with the keys "cameras"; expected'),
-        (
-            b'{"a": {"b": 1}}',
-            r'found JSON with the keys "a"; expected one of Panoptic \(JSON\), ',
-        ),
+        (b'{"a": {"b": 1}}', r'found JSON with the keys "a"; expected one of Panoptic \(JSON\), '),
         (b'{"cameras": [', r"truncated JSON .* cut off"),
         (b"%YAML:1.0\n---\nsize: 3\n", r"no camera found, only size; expected an OpenCV calibration"),
-        (
-            b"%YAML:1.0\n---\nK: [1, 2\n",
-            r"as OpenCV's FileStorage \(line 3: did not find expected ',' or '\]'",
-        ),
+        (b"%YAML:1.0\n---\nK: [1, 2\n", r"as OpenCV's FileStorage \(line 3: did not find expected ',' or '\]'"),
         (b"%YAML:1.0\n---\n", r"FileStorage cannot read it|without named values"),
         (
             b'%YAML:1.0\n---\nnames:\n  - "01"\n  - "02"\n',

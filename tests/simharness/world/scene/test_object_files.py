@@ -16,13 +16,7 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.identity import trial_identity
 from simharness.world.motion.motion import PropKind
 from simharness.world.scene.objects.materials import draw_sheet
-from simharness.world.scene.objects.object_files import (
-    ASSETS,
-    load_object,
-    load_shipped,
-    object_dependencies,
-    variants,
-)
+from simharness.world.scene.objects.object_files import ASSETS, load_object, load_shipped, object_dependencies, variants
 from simharness.world.scene.placement.clutter import CLUTTER_KINDS, place_clutter
 from simharness.world.scene.placement.free_space import WALL_MARGIN
 from simharness.world.scene.placement.sight_lines import intersects
