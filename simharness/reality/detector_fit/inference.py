@@ -105,7 +105,6 @@ _ANEW = tuple(f"correlation.{key}" for key in ("life", "views", "gross_views", "
 _NOISE, _NOISE_ANEW = 0.4, 1.2
 """Noise of changes between simulations with the same draws, and with others, deviations of the measured values."""
 
-_TOLD = 2.0  # deviations from none, from which a value depends on a parameter that is not its own
 _STEP = 1.0  # largest change in a round, on the scale
 _NORMAL = 1.96  # deviations from the mean to the ends of a 95 % interval
 _ONE_SIDED = 1.645  # deviations to the one end of a 95 % interval
@@ -390,7 +389,7 @@ class _Inference:
                 usual = (weight @ change[row] + own * _OWN / _SPREAD**2) / (weight.sum() + _SPREAD**-2)
                 sure = weight + _KIND_SPREAD**-2
                 slope = (weight * change[row] + usual / _KIND_SPREAD**2) / sure
-                slope[slope**2 * sure < (1.0 if own else _TOLD**2)] = 0.0  # not told from none
+                slope[slope**2 * sure < 1] = 0.0  # not told from none
                 for each, place in zip(slope, row, strict=True):
                     kind = self.parameters[place].kind
                     if own:
