@@ -196,11 +196,8 @@ def agreement(real: MeasuredDetector, simulated: MeasuredDetector) -> tuple[list
 
     About 5 % of equal parameters differ by more.
     """
-    compared = [
-        key
-        for key, each in real.values.items()
-        if key.split(".")[0] in FITTED_SECTIONS and each.known and simulated[key].known
-    ]
+    known = [key for key, each in real.values.items() if each.known and simulated[key].known]
+    compared = [key for key in known if key.split(".")[0] in FITTED_SECTIONS]
     return [key for key in compared if not real[key].agrees(simulated[key])], len(compared)
 
 

@@ -1,7 +1,6 @@
 """Out-of-sample check of a fit: does it say more about the other half of a recording than the shipped profile?"""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -51,10 +50,7 @@ class HalfCheck:
 
     def summary(self) -> dict[str, Any]:
         """Return all numbers ready for JSON."""
-        return {"worse": self.fit_is_worse, "shipped_name": self.shipped_name} | {
-            "fitted": list(self.fitted),
-            "shipped": list(self.shipped),
-        }
+        return {"worse": self.fit_is_worse, **asdict(self)}
 
 
 def check_halves(recording: AnnotatedRecording, *, resamples: int = 200) -> HalfCheck:
@@ -81,8 +77,6 @@ def check_halves(recording: AnnotatedRecording, *, resamples: int = 200) -> Half
 def _misfit(part: AnnotatedRecording, own: DetectorFit, profile: DetectorSection) -> float:
     """Return the misfit of simulated detections of a profile to the measured values of a half."""
     profile = profile.model_copy(update={"kind": part.kind})
-    simulated: list[Mapping[str, float]] = [
-        point_estimates(sample_of(filmed_twin(part, film, profile, seed=200 + k), own.people, own.films[0]))
-        for k, film in enumerate(own.films[:_TWINS])
-    ]
+    twins = (filmed_twin(part, film, profile, seed=200 + k) for k, film in enumerate(own.films[:_TWINS]))
+    simulated = (point_estimates(sample_of(twin, own.people, own.films[0])) for twin in twins)
     return float(np.mean([misfit(own.real.values, each) for each in simulated]))

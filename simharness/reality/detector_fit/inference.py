@@ -113,6 +113,7 @@ _LEAST, _SMALLEST = 2e-4, 1e-3  # of a share, and of an amount
 _STRONGEST = 0.95  # correlation
 _PRIORS_SHARE = 0.85  # of the prior's deviation, from which a parameter is the prior's
 _OWN, _STEEPEST = 0.7, 1.5  # usual slope of a measured value by its parameter, and its bound
+_BENT, _FAR = 3.0, 0.8  # deviations from none, of a change of the own slope; way on the scale, from which it counts
 _SPREAD, _KIND_SPREAD = 0.4, 0.2  # of slopes about the usual ones, and of those of one kind of joint about all
 _SCORED = ("good", "jitter", "miss", "inversion", "swap")
 
@@ -316,7 +317,7 @@ class _Inference:
         self.least = np.where(scales == "fisher", 0.0, np.where(scales == "linear", _LEAST, -np.inf))
         self.most = np.where(scales == "linear", 1 - _LEAST, np.where(scales == "factor", 0.0, np.inf))
         self.at = np.clip(self.at, self.least, self.most)
-        self.slopes = _OWN * np.eye(len(self.parameters))
+        self.slopes, self.found = _OWN * np.eye(len(self.parameters)), False
         self.reach = next((i for i, each in enumerate(self.parameters) if each.key == "keypoints.inversion_reach"), -1)
         self.apart = np.array([each.group == "keypoints.inversion" for each in self.parameters]) * (self.reach >= 0)
         uncovered = [[f"{each.group}_uncovered" == other.key for other in self.parameters] for each in self.parameters]
@@ -390,39 +391,49 @@ class _Inference:
                 sure = weight + _KIND_SPREAD**-2
                 slope = (weight * change[row] + usual / _KIND_SPREAD**2) / sure
                 slope[slope**2 * sure < 1] = 0.0  # not told from none
-                for each, place in zip(slope, row, strict=True):
-                    kind = self.parameters[place].kind
-                    if own:
-                        slopes[place, place] = np.clip(each, 0.0, _STEEPEST)
-                    elif kind in columns:
-                        slopes[place, columns[kind]] = each
-                    else:
-                        slopes[place, index] = each / len(index)
-        self.slopes, self.places, self.measured = slopes, [], []
+                for each, place in zip(np.clip(slope, 0.0, _STEEPEST) if own else slope, row, strict=True):
+                    by = [columns[kind]] if (kind := self.parameters[place].kind) in columns else index
+                    slopes[place, by] = each / len(by)
+        self.slopes, self.places, self.measured, self.found = slopes, [], [], True
 
     def posterior(self) -> tuple[Floats, Floats]:
         """Return mean and standard deviation of the parameters, (N,) each."""
-        levels = np.array(self.measured) - np.array(self.places) @ self.slopes.T
-        # Simulations near the end count more, where all parameters were near to theirs.
-        weight = np.where(np.isfinite(levels), (np.arange(len(levels)) + 1.0)[:, None] ** 2, 0.0)
-        weight = weight / np.maximum(weight.sum(axis=0), 1e-9)
-        level = (weight * np.nan_to_num(levels)).sum(axis=0)
-        known = np.isfinite(self.observed) & (weight.sum(axis=0) > 0)
-        variance = self.deviation**2 * self._more(levels - level, weight) * (1 + (weight**2).sum(axis=0))
-        slopes = np.where(known[:, None], self.slopes, 0.0)
-        weighed = slopes.T / variance
+        levels, weight, slopes = self._levels()
+        level, known = (weight * levels).sum(axis=0), np.isfinite(self.observed) & (weight.sum(axis=0) > 0)
+        variance = self.deviation**2 * self._more(levels, weight) * (1 + (weight**2).sum(axis=0))
+        weighed = np.where(known[:, None], slopes, 0.0).T / variance
         information = weighed @ slopes + self.inverse + 1e-6 * np.eye(len(level))
-        pull = weighed @ np.where(known, self.observed - level, 0.0) + 1e-6 * self.at
-        pull = pull + self.inverse @ np.nan_to_num(self.prior)
+        prior = self.inverse @ np.nan_to_num(self.prior) + 1e-6 * self.at
+        pull = weighed @ np.where(known, self.observed - level, 0.0) + prior
         return np.linalg.solve(information, pull), np.sqrt(np.diag(np.linalg.inv(information)))
 
-    def _more(self, away: Floats, weight: Floats) -> Floats:
+    def _levels(self) -> tuple[Floats, Floats, Floats]:
+        """Return the levels of simulations, 0 where unknown, and their weights, (n, N) each, and the slopes, (N, N).
+
+        A slope of one place is wrong at others: where a parameter has gone far since, its own follows its way.
+        """
+        places = np.array(self.places)
+        levels = np.array(self.measured) - places @ self.slopes.T
+        # Simulations near the end count more, where all parameters were near to theirs.
+        weight = np.where(np.isfinite(levels), (np.arange(len(levels)) + 1.0)[:, None] ** 2, 0.0)
+        weight, levels = weight / np.maximum(weight.sum(axis=0), 1e-9), np.nan_to_num(levels)
+        away, moved = (each - (weight * each).sum(axis=0) for each in (levels, places))
+        both, square = (weight * moved * away).sum(axis=0), (weight * moved**2).sum(axis=0) + 1e-12
+        alike = both**2 / square / ((weight * away**2).sum(axis=0) + 1e-12)  # squared correlation
+        free = 1 / np.maximum((weight**2).sum(axis=0), 1e-9) - 2
+        bent = self.found & (np.ptp(places, axis=0) > _FAR) & (alike * free > _BENT**2 * (1 - alike))
+        bend, own = np.where(bent, both / square, 0.0), self.slopes.diagonal()
+        bend = np.clip(own + bend, 0.0, _STEEPEST) - own
+        return levels - places * bend, weight, self.slopes + np.diag(bend)
+
+    def _more(self, levels: Floats, weight: Floats) -> Floats:
         """Return by how much variances between simulations exceed those of the recording's bootstrap, (N,), 1 or more.
 
-        Kinds of joint are alike. Levels of simulations less their mean are ``away``, with weights, (n, N).
+        Kinds of joint are alike. Levels of simulations, and their weights: (n, N).
         """
         free = np.maximum(1 - (weight**2).sum(axis=0), 1e-9)
-        ratio = (weight * np.nan_to_num(away) ** 2).sum(axis=0) / free / self.deviation**2
+        away = levels - (weight * levels).sum(axis=0)
+        ratio = (weight * away**2).sum(axis=0) / free / self.deviation**2
         result = np.ones(len(ratio))
         for rows in self.groups.values():
             index = list(rows.values())
@@ -435,5 +446,4 @@ class _Inference:
         measured, places = np.array(self.measured), np.array(self.places)
         weight = np.isfinite(measured) / np.maximum(np.isfinite(measured).sum(axis=0), 1)
         either = (measured, measured - places @ self.slopes.T)
-        first, second = (self._more(each - (weight * np.nan_to_num(each)).sum(axis=0), weight) for each in either)
-        return np.minimum(first, second)
+        return np.minimum(*(self._more(np.nan_to_num(each), weight) for each in either))

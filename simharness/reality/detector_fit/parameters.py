@@ -26,7 +26,7 @@ from simharness.reality.detector_fit.tetrachoric import (
     joint_probability,
     tetrachoric_correlation,
 )
-from simharness.scenario.sections.detector_section import BEARINGS, KINDS
+from simharness.scenario.sections.detector_section import KINDS
 from simharness.types.truth import GOOD_BELOW
 
 UNCOVERED = 0.08
@@ -263,11 +263,7 @@ def _face(sums: FrameSums) -> dict[str, Floats]:
     around_n, around_k = (np.roll(each, 1, axis=-1) + np.roll(each, -1, axis=-1) + 1e-9 for each in (n, k))
     rate = (k + _PRIOR_ERRORS * around_k / around_n) / (n + _PRIOR_ERRORS)
     rate = np.where(n.sum(axis=-1, keepdims=True) > 0, rate, np.nan)
-    return {
-        f"keypoints.face.{KINDS[kind]}.{index}": rate[:, kind, index]
-        for kind in range(3)
-        for index in range(len(BEARINGS))
-    }
+    return {f"keypoints.face.{KINDS[kind]}.{at}": rate[:, kind, at] for kind, at in np.ndindex(rate.shape[1:])}
 
 
 def _dependence(sums: FrameSums, step: float) -> dict[str, Floats]:

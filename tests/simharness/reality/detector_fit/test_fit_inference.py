@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simharness.reality.detector_fit.detector_measurement import MeasuredValue
-from simharness.reality.detector_fit.inference import infer
+from simharness.reality.detector_fit.inference import ROUNDS, infer
 from simharness.scenario.sections.detector_section import KINDS
 
 LIMBS = KINDS[3:]
@@ -248,3 +248,20 @@ def test_noise_of_a_value_says_little_of_other_parameters():
         found = infer(measured, seen, {**dict.fromkeys(shares, 0.3), **dict.fromkeys(noisy, 0.4)})
         away.append(max(abs(found[key].value - 0.3) for key in shares))
     assert np.mean(away) < 0.09
+
+
+def test_a_parameter_that_was_led_where_its_value_is_flat_comes_back():
+    """The first simulations measure too much, so that the slope is found where there is none."""
+    keys, true = list(SCATTER), 0.25
+
+    def broadened(values, draw):
+        rng = np.random.default_rng([37, draw])
+        extra = 0.6 if draw < ROUNDS else 0.0
+        return {key: float(np.hypot(values[key], 0.2) * np.exp(extra + 0.05 * rng.standard_normal())) for key in keys}
+
+    values = broadened(dict.fromkeys(keys, true), 10**6)
+    measured = {
+        key: MeasuredValue(each, each * np.exp(-0.1), each * np.exp(0.1), 100_000) for key, each in values.items()
+    }
+    found = infer(measured, broadened, dict.fromkeys(keys, 0.8))
+    assert all(found[key].value == pytest.approx(true, rel=0.3) for key in keys)
