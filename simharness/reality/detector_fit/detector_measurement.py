@@ -22,6 +22,8 @@ _RULE_OF_THREE = 3.0
 """An event that never happened in n independent trials has a probability of at most 3 / n, at 95 %. Correlated trials
 count as fewer."""
 
+_COUNTED_ERRORS = (*CLASSES, "guess", "wrong", "missed", "duplicates")
+
 _COUNTED: Mapping[str, Callable[[FrameSums], Floats]] = {
     "keypoints.inversion_uncovered": lambda sums: sums.classes["inversion"].k[:, 2],
     "keypoints.swap_uncovered": lambda sums: sums.classes["swap"].k[:, 2],
@@ -168,7 +170,7 @@ def measure_labels(labels: LabelledJoints, *, name: str, weights: Floats, indepe
     for key, value in whole.items():
         low, high = interval(drawn[key], blocks=independent)
         n = _count(key, sums)
-        if key.split(".")[1] in (*CLASSES, "guess", "wrong") and value[0] < _RULE_OF_THREE * design / max(n, 1):
+        if key.split(".")[1] in _COUNTED_ERRORS and value[0] < _RULE_OF_THREE * design / max(n, 1):
             high = np.fmax(high, min(1.0, _RULE_OF_THREE * design / max(n, 1)))
         # A percentile interval need not contain the value itself near a bound such as zero.
         result[key] = MeasuredValue(float(value[0]), float(np.fmin(low, value[0])), float(np.fmax(high, value[0])), n)
