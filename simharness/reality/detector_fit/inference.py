@@ -105,6 +105,7 @@ _ANEW = tuple(f"correlation.{key}" for key in ("life", "views", "gross_views", "
 _NOISE, _NOISE_ANEW = 0.4, 1.2
 """Noise of changes between simulations with the same draws, and with others, deviations of the measured values."""
 
+_TOLD = 2.0  # deviations from none, from which a value depends on a parameter that is not its own
 _STEP = 1.0  # largest change in a round, on the scale
 _NORMAL = 1.96  # deviations from the mean to the ends of a 95 % interval
 _ONE_SIDED = 1.645  # deviations to the one end of a 95 % interval
@@ -390,7 +391,9 @@ class _Inference:
                 usual = (weight @ change[row] + own * _OWN / _SPREAD**2) / (weight.sum() + _SPREAD**-2)
                 sure = weight + _KIND_SPREAD**-2
                 slope = (weight * change[row] + usual / _KIND_SPREAD**2) / sure
-                slope[slope**2 * sure < 1] = 0.0  # not told from none
+                # What a group does to another is told of one kind, or of all together; else it is noise.
+                alike = usual**2 * (weight.sum() + _SPREAD**-2) >= _TOLD**2
+                slope[slope**2 * sure < (1.0 if own else _TOLD**2 * (not alike))] = 0.0
                 for each, place in zip(np.clip(slope, 0.0, _STEEPEST) if own else slope, row, strict=True):
                     by = [columns[kind]] if (kind := self.parameters[place].kind) in columns else index
                     slopes[place, by] = each / len(by)
