@@ -105,7 +105,7 @@ _ANEW = tuple(f"correlation.{key}" for key in ("life", "views", "gross_views", "
 _NOISE, _NOISE_ANEW = 0.4, 1.2
 """Noise of changes between simulations with the same draws, and with others, deviations of the measured values."""
 
-_TOLD = 2.0  # deviations from none, from which a value depends on a parameter that is not its own
+_TOLD = 2.0  # least significance of a cross slope, deviations
 _STEP = 1.0  # largest change in a round, on the scale
 _NORMAL = 1.96  # deviations from the mean to the ends of a 95 % interval
 _ONE_SIDED = 1.645  # deviations to the one end of a 95 % interval
@@ -114,7 +114,7 @@ _LEAST, _SMALLEST = 2e-4, 1e-3  # of a share, and of an amount
 _STRONGEST = 0.95  # correlation
 _PRIORS_SHARE = 0.85  # of the prior's deviation, from which a parameter is the prior's
 _OWN, _STEEPEST = 0.7, 1.5  # usual slope of a measured value by its parameter, and its bound
-_BENT, _FAR = 3.0, 0.8  # deviations from none, of a change of the own slope; way on the scale, from which it counts
+_BENT, _FAR = 3.0, 0.8  # least significance of a changed slope, deviations, and least move, on the scale
 _SPREAD, _KIND_SPREAD = 0.4, 0.2  # of slopes about the usual ones, and of those of one kind of joint about all
 _SCORED = ("good", "jitter", "miss", "inversion", "swap")
 
@@ -391,7 +391,7 @@ class _Inference:
                 usual = (weight @ change[row] + own * _OWN / _SPREAD**2) / (weight.sum() + _SPREAD**-2)
                 sure = weight + _KIND_SPREAD**-2
                 slope = (weight * change[row] + usual / _KIND_SPREAD**2) / sure
-                # What a group does to another is told of one kind, or of all together; else it is noise.
+                # A cross slope counts where it is significant for its kind of joint, or pooled over all kinds.
                 alike = usual**2 * (weight.sum() + _SPREAD**-2) >= _TOLD**2
                 slope[slope**2 * sure < (1.0 if own else _TOLD**2 * (not alike))] = 0.0
                 for each, place in zip(np.clip(slope, 0.0, _STEEPEST) if own else slope, row, strict=True):
@@ -413,11 +413,11 @@ class _Inference:
     def _levels(self) -> tuple[Floats, Floats, Floats]:
         """Return the levels of simulations, 0 where unknown, and their weights, (n, N) each, and the slopes, (N, N).
 
-        A slope of one place is wrong at others: where a parameter has gone far since, its own follows its way.
+        Where a parameter has moved far since its slope was found, the slope is that of a regression over its places.
         """
         places = np.array(self.places)
         levels = np.array(self.measured) - places @ self.slopes.T
-        # Simulations near the end count more, where all parameters were near to theirs.
+        # Later simulations weigh more: their parameters are nearer to the result.
         weight = np.where(np.isfinite(levels), (np.arange(len(levels)) + 1.0)[:, None] ** 2, 0.0)
         weight, levels = weight / np.maximum(weight.sum(axis=0), 1e-9), np.nan_to_num(levels)
         away, moved = (each - (weight * each).sum(axis=0) for each in (levels, places))
@@ -445,7 +445,7 @@ class _Inference:
         return result
 
     def _between(self) -> Floats:
-        """Return the same of all simulations so far, (N,): values followed their moving parameters, or did not."""
+        """Return the same of all simulations so far, (N,): the smaller of measured values' and of their levels'."""
         measured, places = np.array(self.measured), np.array(self.places)
         weight = np.isfinite(measured) / np.maximum(np.isfinite(measured).sum(axis=0), 1)
         either = (measured, measured - places @ self.slopes.T)

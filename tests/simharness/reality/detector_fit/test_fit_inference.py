@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy.special import expit, logit
 
 from simharness.reality.detector_fit.detector_measurement import MeasuredValue
 from simharness.reality.detector_fit.inference import ROUNDS, infer
@@ -265,3 +266,24 @@ def test_a_parameter_that_was_led_where_its_value_is_flat_comes_back():
     }
     found = infer(measured, broadened, dict.fromkeys(keys, 0.8))
     assert all(found[key].value == pytest.approx(true, rel=0.3) for key in keys)
+
+
+def test_an_effect_that_all_kinds_of_joint_share_is_told_where_that_on_each_is_not():
+    """Scores tell shares that nothing else measures: their logit follows with a slope of 0.2."""
+    shares, scores = [f"keypoints.stray.{kind}" for kind in LIMBS], [f"scores.guess.{kind}" for kind in LIMBS]
+    prior = {**dict.fromkeys(shares, 0.3), **dict.fromkeys(scores, 0.5)}
+    found = []
+    measured = dict.fromkeys(shares, MeasuredValue(np.nan, np.nan, np.nan, 0))
+    for index, key in enumerate(scores):  # values that are alike would count once
+        low, value, high = expit(0.6 + 0.01 * index + np.array([-0.5, 0.0, 0.5]))
+        measured[key] = MeasuredValue(float(value), float(low), float(high), 1000)
+    for seed in range(8):
+
+        def seen(values, draw, seed=seed):
+            rng = np.random.default_rng([41, seed, int(1e6 * sum(values[key] for key in shares)) + draw])
+            moved = {score: logit(values[share]) - logit(0.3) for share, score in zip(shares, scores, strict=True)}
+            return {score: float(expit(0.2 * each + 0.03 * rng.standard_normal())) for score, each in moved.items()}
+
+        inferred = infer(measured, seen, prior)
+        found.append(np.mean([logit(inferred[key].value) for key in shares]))
+    assert 1.0 < np.mean(found) - logit(0.3) < 3.0  # the prior holds back a part of the 3 that the scores say
